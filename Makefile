@@ -1,0 +1,23 @@
+# make train: learn a grasp-force policy and compare it with the hand-written controller. make test: the tests.
+# Both set themselves up in .venv; set PYTHON to use another interpreter (3.11 or newer).
+PYTHON ?= python3
+VENV := .venv
+RUN := runs/latest_$(shell date +%Y-%m-%d_%H-%M-%S)
+
+.PHONY: train test setup clean
+
+train: setup
+	$(VENV)/bin/forcegrasp train preset=quick hydra.run.dir=$(RUN)
+	$(VENV)/bin/forcegrasp evaluate policies=[$(RUN),force_pi] out=$(RUN)/evaluation
+
+test: setup
+	$(VENV)/bin/python -m pytest -q -n auto
+
+setup: $(VENV)/.ready
+
+$(VENV)/.ready: pyproject.toml constraints.txt tools/setup.sh
+	PYTHON=$(PYTHON) sh tools/setup.sh $(VENV)
+	touch $@
+
+clean:
+	rm -rf $(VENV)

@@ -1,0 +1,33 @@
+"""``forcegrasp evaluate``: policies and controllers on the same simulated grasps."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+from forcegrasp.cli.options import compose, help_text
+from forcegrasp.errors import ConfigError
+
+PURPOSE = "compare policies and controllers on the same simulated grasps"
+NOTES = """
+  policies=[A,B]   run directories of forcegrasp train, or controllers: force_pi (Lach et al. 2022), informed (knows the
+                   object's force scale: the mark to reach), close, nothing
+  out=DIR          where to write figures, trials.csv and evaluation.json; runs/evaluate_TIME by default
+"""
+
+
+def main(arguments: list[str]) -> int:
+    """Runs the verb; returns the exit status."""
+    if any(a in ("-h", "--help") for a in arguments):
+        print(help_text("evaluate", PURPOSE, NOTES), end="")
+        return 0
+    config = compose("evaluate", arguments)
+    out = Path(config.out or f"runs/evaluate_{time.strftime('%Y-%m-%d_%H-%M-%S')}")
+
+    from forcegrasp.evaluate.compare_policies import evaluate
+
+    try:
+        evaluate(config, out)
+    except OSError as error:
+        raise ConfigError(f"out={out}: could not write ({error.strerror})") from error
+    return 0

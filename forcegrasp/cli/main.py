@@ -1,0 +1,71 @@
+"""``forcegrasp VERB [key=value ...]``. Verbs are imported only when used, so that help comes up at once."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+import warnings
+
+from forcegrasp import __version__
+from forcegrasp.errors import ForcegraspError, closest
+
+VERBS = {
+    "train": "learn a grasp-force policy with PPO, or resume a run",
+    "evaluate": "compare policies and controllers on the same simulated grasps",
+}
+
+USAGE = """forcegrasp {version}: simulate tactile grasping, train grasp-force controllers, compare them
+
+usage: forcegrasp VERB [key=value ...]
+
+verbs
+{verbs}
+
+examples
+  forcegrasp train                                         the paper's method, 4.5 million frames
+  forcegrasp train experiment=no_ib budget=quick seed=1    an ablation, about five minutes
+  forcegrasp train -m experiment=ib,no_ib,no_rand seed=0,1,2 hydra/launcher=joblib
+  forcegrasp train resume=runs/RUN                         go on with an interrupted run
+  forcegrasp evaluate policies=[runs/RUN,force_pi]
+
+Every verb explains its options with --help. Exit status: 0 done, 2 bad input, 130 interrupted (and saved).
+"""
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Runs one verb; returns the exit status."""
+    arguments = sys.argv[1:] if arguments is None else arguments
+    if not arguments or arguments[0] in ("-h", "--help", "help"):
+        verbs = "\n".join(f"  {name:<10} {what}" for name, what in VERBS.items())
+        print(USAGE.format(version=__version__, verbs=verbs), end="")
+        return 0 if arguments else 2
+    if arguments[0] == "--version":
+        print(__version__)
+        return 0
+    verb, *rest = arguments
+    try:
+        if verb not in VERBS:
+            raise ForcegraspError(f"no verb {verb!r}{closest(verb, VERBS)}")
+        _quieten()
+        return importlib.import_module(f"forcegrasp.cli.{verb}").main(rest)
+    except ForcegraspError as error:
+        print(f"forcegrasp: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print("forcegrasp: interrupted", file=sys.stderr)
+        return 130
+
+
+def _quieten() -> None:
+    """Silences notices of libraries that a user can do nothing about, by their message."""
+    for message in (
+        ".*torchrl.*C\\+\\+.*",
+        ".*Failed to import torchrl C\\+\\+ binaries.*",
+        ".*`torch.jit.*` is deprecated.*",
+        ".*isinstance\\(treespec, LeafSpec\\).*",
+    ):
+        warnings.filterwarnings("ignore", message=message)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

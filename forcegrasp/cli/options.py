@@ -1,0 +1,116 @@
+"""From ``key=value`` arguments to a checked configuration, by way of Hydra; and the help text of a verb."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator
+from importlib.resources import files
+from typing import Any
+
+from forcegrasp.config import EvaluateConfig, TrainConfig, validate
+from forcegrasp.errors import ConfigError, closest
+
+SCHEMAS: dict[str, type] = {"train": TrainConfig, "evaluate": EvaluateConfig}
+
+
+def compose(verb: str, overrides: list[str]) -> Any:
+    """Returns the verb's configuration with the overrides applied, checked.
+
+    Raises:
+      ConfigError: if an option is unknown, of the wrong type, or out of its range.
+    """
+    from hydra import compose as hydra_compose
+    from hydra import initialize_config_module
+    from hydra.core.global_hydra import GlobalHydra
+    from hydra.errors import HydraException
+    from omegaconf import OmegaConf
+    from omegaconf.errors import OmegaConfBaseException
+
+    register_schemas()
+    for override in overrides:
+        _check_key(verb, override)
+    GlobalHydra.instance().clear()
+    try:
+        with initialize_config_module("forcegrasp.conf", version_base="1.3"):
+            composed = hydra_compose(verb, overrides=overrides)
+        config = OmegaConf.to_object(composed)
+    except (HydraException, OmegaConfBaseException) as error:
+        raise ConfigError(_one_line(error)) from error
+    validate(config)
+    return config
+
+
+def register_schemas() -> None:
+    """Makes the config dataclasses known to Hydra, under the names that conf/ uses."""
+    from hydra.core.config_store import ConfigStore
+
+    for verb, schema in SCHEMAS.items():
+        ConfigStore.instance().store(f"{verb}_schema", node=schema)
+
+
+def groups(verb: str) -> dict[str, list[str]]:
+    """Config groups of a verb and their choices, from conf/."""
+    text = (files("forcegrasp.conf") / f"{verb}.yaml").read_text()
+    found = {}
+    for folder in sorted(files("forcegrasp.conf").iterdir(), key=lambda f: f.name):
+        if folder.is_dir() and f"- {folder.name}:" in text:
+            found[folder.name] = sorted(f.name.removesuffix(".yaml") for f in folder.iterdir() if f.name.endswith(".yaml"))
+    return found
+
+
+def leaves(schema: type, prefix: str = "") -> Iterator[tuple[str, dataclasses.Field, Any]]:
+    """Every option of a schema: dotted name, field, default."""
+    instance = schema() if isinstance(schema, type) else schema
+    for entry in dataclasses.fields(instance):
+        value = getattr(instance, entry.name)
+        if dataclasses.is_dataclass(value):
+            yield from leaves(value, f"{prefix}{entry.name}.")
+        else:
+            yield f"{prefix}{entry.name}", entry, value
+
+
+def _check_key(verb: str, override: str) -> None:
+    key, equals, value = override.partition("=")
+    if not equals:
+        raise ConfigError(f"{override!r}: options are given as key=value, see forcegrasp {verb} --help")
+    choices = groups(verb)
+    known = [name for name, _, _ in leaves(SCHEMAS[verb])]
+    if key.startswith("hydra"):
+        return
+    if key in choices:
+        for choice in value.split(","):
+            if choice.strip() not in choices[key]:
+                raise ConfigError(f"no {key} named {choice.strip()!r}{closest(choice.strip(), choices[key])}")
+    elif key not in known:
+        raise ConfigError(f"no option {key!r}{closest(key, [*known, *choices])}")
+
+
+def _one_line(error: Exception) -> str:
+    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
+    key = next((line.removeprefix("full_key: ") for line in lines if line.startswith("full_key: ")), "")
+    cause = str(error.__cause__ or "").strip().splitlines()
+    text = lines[0] if lines else type(error).__name__
+    if text.startswith("Error merging override") and cause:
+        text = f"{text.removeprefix('Error merging override ')}: {cause[0]}"
+    return f"{key}: {text}" if key and key not in text else text
+
+
+def help_text(verb: str, purpose: str, notes: str = "") -> str:
+    """The verb's help: groups, then every option with default, unit, meaning and source."""
+    lines = [f"forcegrasp {verb}: {purpose}", "", f"usage: forcegrasp {verb} [key=value ...]", ""]
+    if notes:
+        lines += [notes.strip("\n"), ""]
+    lines.append("presets (a preset sets several options; options given beside it win)")
+    lines += [f"  {name}={'|'.join(choices)}" for name, choices in groups(verb).items()]
+    section = None
+    for name, entry, default in leaves(SCHEMAS[verb]):
+        head = name.rpartition(".")[0]
+        if head != section:
+            section = head
+            lines += ["", head or "general"]
+        meta = entry.metadata
+        shown = str(default).replace("'", "").replace(" ", "")
+        detail = meta["doc"] + (f" [{meta['unit']}]" if meta["unit"] else "") + (f" ({meta['source']})" if meta["source"] else "")
+        option = f"  {name}={shown}"
+        lines.append(f"{option}\n{'':<6}{detail}")
+    return "\n".join(lines) + "\n"

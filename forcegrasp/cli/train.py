@@ -1,0 +1,112 @@
+"""``forcegrasp train``: one run, a sweep (-m), or the continuation of a run (resume=)."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from forcegrasp.cli.options import compose, help_text, register_schemas
+from forcegrasp.errors import ConfigError, ForcegraspError
+
+PURPOSE = "learn a grasp-force policy with PPO"
+NOTES = """
+  -m / --multirun    run every combination of comma-separated values:
+                     forcegrasp train -m experiment=ib,no_ib seed=0,1,2   (hydra/launcher=joblib: side by side)
+  resume=RUN_DIR     go on with an interrupted run, exactly as if it had not been interrupted
+  hydra.run.dir=DIR  where to write the run; runs/TIME_EXPERIMENT_SEED by default
+
+Watch a training with: tensorboard --logdir runs. Ctrl-C saves and ends.
+"""
+
+
+def main(arguments: list[str]) -> int:
+    """Runs the verb; returns the exit status."""
+    if any(a in ("-h", "--help") for a in arguments):
+        print(help_text("train", PURPOSE, NOTES), end="")
+        return 0
+    resume = [a for a in arguments if a.startswith("resume=")]
+    multirun = [a for a in arguments if a in ("-m", "--multirun")]
+    overrides = [a for a in arguments if a not in resume and a not in multirun]
+    if resume:
+        if overrides or multirun or len(resume) > 1:
+            raise ConfigError(f"resume= goes on with the run's own configuration; drop {' '.join(overrides + multirun) or 'one'}")
+        return _resume(Path(resume[0].partition("=")[2]))
+    for single in _single_runs(overrides) if multirun else [overrides]:
+        compose("train", single)  # refuses bad input before anything is written
+    return _start(overrides, bool(multirun))
+
+
+def _single_runs(overrides: list[str]) -> list[list[str]]:
+    """Checks a sweep's values one at a time: each override list has no sweep in it."""
+    from hydra.core.override_parser.overrides_parser import OverridesParser
+    from hydra.errors import HydraException
+
+    fixed, swept = [], []
+    for text in overrides:
+        try:
+            parsed = OverridesParser.create().parse_override(text)
+        except HydraException as error:
+            raise ConfigError(f"{text!r}: {str(error).splitlines()[0]}") from error
+        if parsed.is_sweep_override() and parsed.is_discrete_sweep():
+            swept.append([f"{parsed.get_key_element()}={value}" for value in parsed.sweep_string_iterator()])
+        else:
+            fixed.append(text)
+    first = [values[0] for values in swept]
+    runs = [fixed + first]
+    for index, values in enumerate(swept):
+        runs += [fixed + first[:index] + [value] + first[index + 1 :] for value in values[1:]]
+    return runs
+
+
+def _start(overrides: list[str], multirun: bool) -> int:
+    import hydra
+    from omegaconf import DictConfig
+
+    register_schemas()
+    outcomes: list[int | ForcegraspError] = []
+
+    @hydra.main(version_base="1.3", config_path="pkg://forcegrasp.conf", config_name="train")
+    def job(composed: DictConfig) -> None:
+        outcomes.append(_run_job(composed))
+
+    sys.argv = ["forcegrasp train", *(["-m"] if multirun else []), *overrides]
+    job()
+    return max(outcomes, default=0)
+
+
+def _run_job(composed) -> int:
+    from hydra.core.hydra_config import HydraConfig
+    from omegaconf import OmegaConf
+
+    from forcegrasp.runs.run_dir import RunDir
+
+    config = OmegaConf.to_object(composed)
+    hydra = HydraConfig.get()
+    try:
+        run = RunDir.create(hydra.runtime.output_dir, config, list(hydra.overrides.task))
+        return _train(config, run, resume=False)
+    except ForcegraspError as error:
+        print(f"forcegrasp: {error}", file=sys.stderr)
+        return 2
+
+
+def _resume(path: Path) -> int:
+    from forcegrasp.runs.run_dir import RunDir
+
+    run = RunDir.open(path)
+    config = run.config()
+    if run.load()[1]["frames"] >= config.ppo.total_frames:
+        print(f"{path}: already trained to the end ({config.ppo.total_frames:,} frames)")
+        return 0
+    return _train(config, run, resume=True)
+
+
+def _train(config, run, resume: bool) -> int:
+    from forcegrasp.train.loop import train
+
+    print(f"run directory: {run.path}")
+    if train(config, run, resume):
+        print(f"trained. Compare it with the hand-written controller: forcegrasp evaluate policies=[{run.path},force_pi]")
+        return 0
+    print(f"stopped and saved; go on with: forcegrasp train resume={run.path}")
+    return 130

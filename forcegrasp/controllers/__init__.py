@@ -1,0 +1,33 @@
+"""Controllers with a policy's interface: they read a tensordict and write ``action`` in [−1, 1]."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from tensordict.nn import TensorDictModuleBase
+
+from forcegrasp.controllers.force_pi import ForcePI
+from forcegrasp.controllers.reference import Constant, Informed
+from forcegrasp.errors import ConfigError, closest
+
+#: Name → constructor, as named in ``policies=[...]``.
+CONTROLLERS: dict[str, Callable[[], TensorDictModuleBase]] = {
+    "force_pi": ForcePI,
+    "informed": Informed,
+    "close": lambda: Constant(-1.0),
+    "nothing": lambda: Constant(0.0),
+}
+
+
+def make_controller(name: str) -> TensorDictModuleBase:
+    """Returns the controller of that name.
+
+    Raises:
+      ConfigError: if there is none, with the closest names.
+    """
+    if name not in CONTROLLERS:
+        raise ConfigError(f"no controller or run directory named {name!r}{closest(name, CONTROLLERS)}")
+    return CONTROLLERS[name]()
+
+
+__all__ = ["CONTROLLERS", "Constant", "ForcePI", "Informed", "make_controller"]

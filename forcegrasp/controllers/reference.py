@@ -1,0 +1,44 @@
+"""Controllers that mark what is possible: doing nothing, only closing, and knowing the object."""
+
+from __future__ import annotations
+
+import torch
+from tensordict import TensorDictBase
+from tensordict.nn import TensorDictModuleBase
+
+from forcegrasp.physics.parameters import MAX_FORCE_N, force_scale_of_kappa
+
+
+class Constant(TensorDictModuleBase):
+    """The same action at every step, as in the paper's identification trials.
+
+    Args:
+      value: the action of both fingers, in [−1, 1]; −1 closes at full speed.
+    """
+
+    in_keys = ["had_contact"]
+    out_keys = ["action"]
+
+    def __init__(self, value: float) -> None:
+        super().__init__()
+        self.value = value
+
+    def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
+        return tensordict.set("action", torch.full_like(tensordict.get("had_contact"), self.value))
+
+
+class Informed(TensorDictModuleBase):
+    """Knows the object's force scale: waits on first touch, then commands the delta whose force is the goal.
+
+    No controller that must find out the softness by touch can be expected to do better. f = 100 N/m · f_α · Δq in the
+    simulator, hence a = −f_goal / (0.30 N · f_α).
+    """
+
+    in_keys = ["had_contact", "goal_force", "grasp_parameters"]
+    out_keys = ["action"]
+
+    def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
+        touched, goal, parameters = (tensordict.get(key) for key in self.in_keys)
+        both = touched.bool().all(-1, keepdim=True)
+        hold = (-goal / (MAX_FORCE_N * force_scale_of_kappa(parameters[..., :1]))).expand_as(touched)
+        return tensordict.set("action", torch.where(both, hold, touched - 1).clamp(-1, 1))

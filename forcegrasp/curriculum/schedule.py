@@ -1,0 +1,57 @@
+"""The paper's curriculum as a pure function of the frames trained so far (paper, Table 2)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from forcegrasp.config import CurriculumConfig, GraspConfig, RewardConfig
+
+
+@dataclass(frozen=True)
+class CurriculumValues:
+    """What the curriculum anneals."""
+
+    object_weight: float  #: α₂
+    speed_threshold_m: float  #: velocity threshold, metres per control step
+    radius_m: tuple[float, float]  #: range of object radii, W_o, metres
+    offset_m: tuple[float, float]  #: range of object offsets, O_y, metres
+
+    def scalars(self) -> dict[str, float]:
+        """Named numbers, for logs."""
+        return {
+            "object_weight": self.object_weight,
+            "speed_threshold_m": self.speed_threshold_m,
+            "radius_low_m": self.radius_m[0],
+            "radius_high_m": self.radius_m[1],
+            "offset_low_m": self.offset_m[0],
+            "offset_high_m": self.offset_m[1],
+        }
+
+
+def _mix(start, end, share: float):
+    """Linear interpolation of numbers and of ranges, exact at both ends."""
+    if isinstance(start, (list, tuple)):
+        return tuple(_mix(a, b, share) for a, b in zip(start, end, strict=True))
+    return float((1 - share) * start + share * end)
+
+
+class LinearSchedule:
+    """Interpolates from the start values to the final ones over the first ``end_frames`` frames, then stays.
+
+    Args:
+      curriculum: start values, and the share of training over which they are annealed.
+      grasp, reward: the final values.
+      total_frames: frames of the whole training.
+    """
+
+    def __init__(
+        self, curriculum: CurriculumConfig, grasp: GraspConfig, reward: RewardConfig, total_frames: int
+    ) -> None:
+        self.end_frames = curriculum.end_fraction * total_frames if curriculum.enabled else 0.0
+        self._start = (curriculum.object_weight, curriculum.speed_threshold_m, curriculum.radius_m, curriculum.offset_m)
+        self._end = (reward.object_weight, reward.speed_threshold_m, grasp.radius_m, grasp.offset_m)
+
+    def __call__(self, frames: int) -> CurriculumValues:
+        """The values after this many frames."""
+        share = 1.0 if self.end_frames == 0 else min(frames / self.end_frames, 1.0)
+        return CurriculumValues(*(_mix(a, b, share) for a, b in zip(self._start, self._end, strict=True)))

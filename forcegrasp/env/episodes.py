@@ -1,0 +1,56 @@
+"""What happened in a batch of whole episodes: the figures that training logs and evaluation report."""
+
+from __future__ import annotations
+
+import torch
+from tensordict import TensorDictBase
+from torch import Tensor
+
+#: Figure → what it is. All of shape ``(n,)``, one per episode.
+FIGURES = {
+    "force_reward_normalised": "Σ_t of r_force, authors' form (150 at best)",
+    "force_reward_paper": "Σ_t of r_force, paper's form (150 at best)",
+    "displacement_until_grasped_mm": "|object displacement| until both fingers have touched, mm",
+    "displacement_total_mm": "|object displacement| over the episode, mm",
+    "fast_steps": "control steps in which the object was faster than the threshold",
+    "action_change": "Σ_t Σ_i |a_i(t-1) - a_i(t)|",
+    "first_contact_s": "time until one finger touches, s (the episode's length if never)",
+    "both_contact_s": "time until both fingers have touched, s (the episode's length if never)",
+    "final_force_error_n": "mean |Δf| per finger over the last second, N",
+}
+
+
+def summarise(rollout: TensorDictBase, contact_threshold_n: float, period_s: float = 0.04) -> dict[str, Tensor]:
+    """Figures of every episode, from the true state.
+
+    Args:
+      rollout: whole episodes as an env's ``rollout`` gives them, batch ``(n, T)``.
+      contact_threshold_n: true force above which a finger counts as touching.
+      period_s: seconds per step.
+
+    Returns:
+      One tensor ``(n,)`` per entry of :data:`FIGURES`.
+    """
+    after = rollout.get("next")
+    terms = after.get("reward_terms")
+    force, position = after.get("force"), after.get("object_position").squeeze(-1)
+    start = rollout.get("object_position")[:, 0, 0]
+    steps = force.shape[1]
+
+    touched = (force > contact_threshold_n).cummax(dim=1).values
+    # steps before the first (second) finger has touched
+    first, both = (steps - t.sum(dim=1) for t in (touched.any(-1), touched.all(-1)))
+    at_grasp = position.gather(1, both.clamp_max(steps - 1).unsqueeze(1)).squeeze(1)
+    last_second = max(1, min(steps, round(1 / period_s)))
+    error = (after.get("goal_force") - force).abs()
+    return {
+        "force_reward_normalised": terms.get("force_normalised").sum((1, 2)),
+        "force_reward_paper": terms.get("force_paper").sum((1, 2)),
+        "displacement_until_grasped_mm": (at_grasp - start).abs() * 1e3,
+        "displacement_total_mm": (position[:, -1] - start).abs() * 1e3,
+        "fast_steps": -terms.get("object").sum((1, 2)),
+        "action_change": -terms.get("action").sum((1, 2)),
+        "first_contact_s": first * period_s,
+        "both_contact_s": both * period_s,
+        "final_force_error_n": error[:, -last_second:].mean((1, 2)),
+    }

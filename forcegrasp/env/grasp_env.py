@@ -1,0 +1,136 @@
+"""The grasp as a TorchRL environment: clean state in SI units; noise, memory and scaling are transforms."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+
+import numpy as np
+import torch
+from tensordict import TensorDict, TensorDictBase
+from torchrl.data import Bounded, Categorical, Composite, Unbounded
+from torchrl.envs import EnvBase
+
+from forcegrasp.config import GraspConfig, PhysicsConfig, RewardConfig
+from forcegrasp.env.reward import force_reward, normalised_force_reward, object_penalty
+from forcegrasp.physics import GraspParameters, GraspSampler, GraspSimulator
+from forcegrasp.physics.sampling import OPEN_M
+
+#: The entries a step writes beside reward and done, with shape and meaning.
+OBSERVATIONS = {
+    "joint_position": (2, "finger positions (left, right), metres; 0 closed, 0.045 open"),
+    "commanded_position": (2, "q_des held during the step (left, right), metres"),
+    "force": (2, "true fingertip forces (left, right), newtons"),
+    "goal_force": (1, "goal force of each finger, newtons"),
+    "object_position": (1, "object position along the grasp axis, metres"),
+    "object_speed": (1, "|change of object position|, metres per control step"),
+    "grasp_parameters": (5, "kappa, b2, radius_m, offset_m, goal_force_n of the grasp"),
+    ("reward_terms", "force_paper"): (1, "r_force as printed in the paper, unweighted"),
+    ("reward_terms", "force_normalised"): (1, "r_force divided by the goal force, unweighted"),
+    ("reward_terms", "object"): (1, "r_obj, unweighted"),
+}
+
+
+class GraspEnv(EnvBase):
+    """``n`` grasps at once. Action: ``joint_delta``, u = Δq_des in metres, ``(n, 2)``; see :data:`OBSERVATIONS`.
+
+    The reward is α₁ r_force + α₂ r_obj of paper eq. 10, from the true state; r_act needs the policy's own actions and is
+    added by :class:`~forcegrasp.transforms.ActionChangePenalty`. An episode is truncated, never terminated.
+
+    Args:
+      n: number of grasps, the batch size.
+      physics: tier and threads.
+      grasp: ranges the grasps are drawn from.
+      reward: form, weights and velocity threshold.
+      sampler: what to draw grasps with instead, ``(rng, ids) -> GraspParameters``.
+      seed: seed of the sampler's generator.
+
+    Raises:
+      ConfigError: if an option is out of its range.
+      PhysicsError: from a step, if a grasp diverged.
+    """
+
+    def __init__(
+        self,
+        n: int = 1,
+        physics: PhysicsConfig | None = None,
+        grasp: GraspConfig | None = None,
+        reward: RewardConfig | None = None,
+        sampler: Callable[[np.random.Generator, np.ndarray], GraspParameters] | None = None,
+        seed: int = 0,
+    ) -> None:
+        super().__init__(device="cpu", batch_size=torch.Size([n]))
+        physics, grasp = physics or PhysicsConfig(), grasp or GraspConfig()
+        self.reward_config = dataclasses.replace(reward or RewardConfig())
+        self.sampler = sampler or GraspSampler(grasp)
+        self.episode_steps = grasp.steps
+        self.simulator = GraspSimulator(n, physics.tier, physics.threads)
+        self._age = np.zeros(n, dtype=np.int64)
+        self.set_seed(seed)
+        self._make_specs(n)
+
+    def _make_specs(self, n: int) -> None:
+        self.action_spec = Composite(joint_delta=Bounded(-OPEN_M, OPEN_M, shape=(n, 2), dtype=torch.float32), shape=(n,))
+        self.observation_spec = Composite(shape=(n,))
+        for key, (size, _) in OBSERVATIONS.items():
+            self.observation_spec[key] = Unbounded(shape=(n, size), dtype=torch.float32)
+        self.observation_spec["reward_terms"].shape = (n,)
+        self.reward_spec = Unbounded(shape=(n, 1), dtype=torch.float32)
+        flag = Categorical(2, shape=(n, 1), dtype=torch.bool)
+        self.full_done_spec = Composite(
+            done=flag.clone(), terminated=flag.clone(), truncated=flag.clone(), shape=(n,)
+        )
+
+    def _set_seed(self, seed: int | None) -> None:
+        self.rng = np.random.default_rng(seed)
+
+    def _reset(self, tensordict: TensorDictBase | None = None, **kwargs) -> TensorDictBase:
+        mask = None if tensordict is None else tensordict.get("_reset", None)
+        ids = np.arange(self.simulator.n) if mask is None else np.flatnonzero(mask.numpy().reshape(-1))
+        self.simulator.reset(self.sampler(self.rng, ids), ids)
+        self._age[ids] = 0
+        return self._state().update(self._done())
+
+    def _step(self, tensordict: TensorDictBase) -> TensorDictBase:
+        self.simulator.step(tensordict.get("joint_delta").numpy().astype(np.float64))
+        self._age += 1
+        state, config = self._state(), self.reward_config
+        terms = state.get("reward_terms")
+        force = terms.get("force_paper" if config.form == "paper" else "force_normalised")
+        reward = config.force_weight * force + config.object_weight * terms.get("object")
+        return state.set("reward", reward).update(self._done())
+
+    def _state(self) -> TensorDict:
+        simulator = self.simulator
+        parameters = simulator.parameters
+
+        def column(values: np.ndarray) -> torch.Tensor:
+            return torch.from_numpy(values.reshape(simulator.n, -1).astype(np.float32))
+
+        force, goal, speed = column(simulator.force), column(parameters.goal_force_n), column(simulator.object_speed)
+        error = goal - force
+        terms = {
+            "force_paper": force_reward(error),
+            "force_normalised": normalised_force_reward(error, goal),
+            "object": object_penalty(speed, self.reward_config.speed_threshold_m),
+        }
+        return TensorDict(
+            {
+                "joint_position": column(simulator.joint_position),
+                "commanded_position": column(simulator.commanded_position),
+                "force": force,
+                "goal_force": goal,
+                "object_position": column(simulator.object_position),
+                "object_speed": speed,
+                "grasp_parameters": column(parameters.as_array()),
+                "reward_terms": TensorDict(terms, batch_size=self.batch_size),
+            },
+            batch_size=self.batch_size,
+        )
+
+    def _done(self) -> TensorDict:
+        truncated = torch.from_numpy(self._age >= self.episode_steps).unsqueeze(-1)
+        return TensorDict(
+            {"done": truncated, "truncated": truncated.clone(), "terminated": torch.zeros_like(truncated)},
+            batch_size=self.batch_size,
+        )

@@ -1,0 +1,56 @@
+"""One grasp of the paper's learning problem behind gymnasium's interface."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gymnasium
+import numpy as np
+import torch
+from tensordict import TensorDictBase
+from torchrl.envs.utils import step_mdp
+
+from forcegrasp.env.build import build_env, seed_env
+
+
+class GraspGymnasiumEnv(gymnasium.Env[np.ndarray, np.ndarray]):
+    """Observation: the stacked o(t), ``(30,)`` by default. Action: ``(2,)`` in [−1, 1], scaled to position deltas.
+
+    ``info`` holds the true state of the grasp (see :data:`forcegrasp.env.grasp_env.OBSERVATIONS`).
+
+    Args:
+      seed: seed until :meth:`reset` is given one.
+      **parts: configuration of :func:`~forcegrasp.env.build_env`.
+    """
+
+    metadata: dict[str, Any] = {"render_modes": [], "render_fps": 25}  # noqa: RUF012
+
+    def __init__(self, seed: int = 0, **parts: Any) -> None:
+        self._env = build_env(1, seed=seed, **parts)
+        self._state: TensorDictBase | None = None
+        size = self._env.observation_spec["observation"].shape[-1]
+        self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (size,), np.float32)
+        self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (2,), np.float32)
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[np.ndarray, dict]:
+        """Starts a new grasp."""
+        super().reset(seed=seed)
+        if seed is not None:
+            seed_env(self._env, seed)
+        self._state = self._env.reset()
+        return self._observe(self._state)
+
+    def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict]:
+        """One control step of 40 ms."""
+        if self._state is None:
+            raise gymnasium.error.ResetNeeded("call reset() before step()")
+        self._state.set("action", torch.as_tensor(action, dtype=torch.float32).reshape(1, 2))
+        stepped = self._env.step(self._state)
+        after = stepped.get("next")
+        observation, info = self._observe(after)
+        self._state = step_mdp(stepped)
+        return observation, float(after["reward"]), bool(after["terminated"]), bool(after["truncated"]), info
+
+    def _observe(self, state: TensorDictBase) -> tuple[np.ndarray, dict]:
+        info = {key: value[0].numpy().copy() for key, value in state.items() if isinstance(value, torch.Tensor)}
+        return info.pop("observation"), info

@@ -1,0 +1,44 @@
+"""The reward's terms, one function each, and their names. Torch in, torch out; no state."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+
+
+def force_reward(force_error: Tensor) -> Tensor:
+    """r_force = 1 − tanh(Σ_i |Δf_i|) (paper, eq. 7).
+
+    Args:
+      force_error: Δf = f_goal − f of both fingers, newtons, ``(*B, 2)``.
+
+    Returns:
+      ``(*B, 1)``, in [0, 1], 1 where both forces equal the goal.
+    """
+    return 1 - torch.tanh(force_error.abs().sum(-1, keepdim=True))
+
+
+def normalised_force_reward(force_error: Tensor, goal_force: Tensor) -> Tensor:
+    """r_force = 1 − tanh(Σ_i |Δf_i| / f_goal), the form that trained the published policies (authors' code).
+
+    Args:
+      force_error: newtons, ``(*B, 2)``.
+      goal_force: newtons, ``(*B, 1)``.
+
+    Returns:
+      ``(*B, 1)``, in [0, 1].
+    """
+    return force_reward(force_error / goal_force)
+
+
+def object_penalty(object_speed: Tensor, threshold: float) -> Tensor:
+    """r_obj = −1 where the object moves faster than the threshold, else 0 (paper, eq. 8).
+
+    Args:
+      object_speed: metres per control step, ``(*B, 1)``.
+      threshold: metres per control step.
+
+    Returns:
+      ``(*B, 1)``.
+    """
+    return -(object_speed > threshold).to(object_speed.dtype)

@@ -1,0 +1,31 @@
+"""Errors a user can act on: each message says what is wrong, where, and what to do, in one line."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+
+class ForcegraspError(Exception):
+    """Base of every error that is shown to the user as one line, without a traceback."""
+
+
+class ConfigError(ForcegraspError):
+    """An option is unknown, of the wrong type, or out of its range."""
+
+
+class PhysicsError(ForcegraspError):
+    """A simulated grasp diverged."""
+
+
+class CheckpointError(ForcegraspError):
+    """A run directory or checkpoint is missing, broken, or of another configuration."""
+
+
+def closest(name: str, known: Iterable[str]) -> str:
+    """Returns ``"; did you mean a, b or c?"`` for the (at most three) closest known names, or the list of all."""
+    known = sorted(known)
+    near = difflib.get_close_matches(name, known, n=3, cutoff=0.5)
+    if near:
+        return f"; did you mean {' or '.join(near)}?"
+    return f"; known: {', '.join(known)}"

@@ -1,0 +1,102 @@
+"""The pictures: force traces against their goals, and the paper's box plot of rewards over softness."""
+
+from __future__ import annotations
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from tensordict import TensorDictBase
+
+from forcegrasp.physics.model import CONTROL_PERIOD_S
+
+matplotlib.use("Agg")
+LEFT, RIGHT, GOAL = "#0072b2", "#d55e00", "#444444"
+#: One colour per policy, in order (Okabe and Ito's palette, told apart by the colour-blind).
+PALETTE = ("#999999", "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#f0e442")
+
+
+def _draw_forces(axes: Axes, episode: TensorDictBase) -> None:
+    after = episode["next"]
+    time = np.arange(1, len(after["force"]) + 1) * CONTROL_PERIOD_S
+    for finger, (colour, name) in enumerate(((LEFT, "left"), (RIGHT, "right"))):
+        axes.plot(time, after["sensed_force"][:, finger], color=colour, lw=0.6, alpha=0.4)
+        axes.plot(time, after["force"][:, finger], color=colour, lw=1.4, label=name)
+    axes.axhline(float(after["goal_force"][0]), color=GOAL, ls="--", lw=1, label="goal")
+    axes.set_xlim(0, time[-1])
+
+
+def force_traces(episodes: TensorDictBase, title: str) -> Figure:
+    """Forces of up to six episodes ``(n, T)`` against their goals; thin lines are the noisy readings."""
+    n = min(6, len(episodes))
+    rows = (n + 2) // 3
+    figure = Figure(figsize=(10, 2.7 * rows + 0.5), layout="constrained")
+    grid = figure.subplots(rows, min(n, 3), squeeze=False).reshape(-1)
+    for axes, episode in zip(grid, episodes, strict=False):
+        _draw_forces(axes, episode)
+        kappa, _, radius, offset, goal = episode["grasp_parameters"][0].tolist()
+        axes.set_title(f"κ {kappa:.2f} · r {radius * 1e3:.0f} mm · o_y {offset * 1e3:+.0f} mm", fontsize=9)
+        axes.set_ylim(-0.1 * goal, 2.1 * goal)
+        axes.set_xlabel("time [s]")
+        axes.set_ylabel("force [N]")
+    for axes in grid[n:]:
+        axes.remove()
+    grid[0].legend(fontsize=8, loc="lower right")
+    figure.suptitle(title)
+    return figure
+
+
+def draw_episode(episode: TensorDictBase, width: int, height: int) -> Figure:
+    """One episode's forces, sized in pixels, for use beside a video. The axes span 0.16-0.96 × 0.14-0.92."""
+    figure = Figure(figsize=(width / 100, height / 100), dpi=100)
+    axes = figure.add_axes((0.16, 0.14, 0.80, 0.78))
+    _draw_forces(axes, episode)
+    axes.set_xlabel("time [s]")
+    axes.set_ylabel("force [N]")
+    axes.legend(fontsize=8, loc="lower right")
+    axes.set_title(f"softness κ = {float(episode['grasp_parameters'][0, 0]):.2f}", fontsize=10)
+    return figure
+
+
+def figure_pixels(figure: Figure) -> np.ndarray:
+    """A figure as an RGB array, ``(height, width, 3)`` bytes."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    return np.asarray(canvas.buffer_rgba())[..., :3].copy()
+
+
+def reward_boxes(results: dict[str, np.ndarray], kappas: np.ndarray, ylabel: str) -> Figure:
+    """Box plot of a figure per softness value and policy, as in the paper's Fig. 2 (left).
+
+    Args:
+      results: policy → values, ``(kappas, trials)``.
+      kappas: softness values.
+      ylabel: what the values are.
+    """
+    figure = Figure(figsize=(max(8, 0.9 * len(kappas)), 4.2), layout="constrained")
+    axes = figure.subplots()
+    width = 0.8 / len(results)
+    handles = []
+    for index, (values, colour) in enumerate(zip(results.values(), PALETTE * len(results), strict=False)):
+        places = np.arange(len(kappas)) + (index + 0.5) * width - 0.4
+        boxes = axes.boxplot(
+            list(values),
+            positions=places,
+            widths=0.85 * width,
+            patch_artist=True,
+            flierprops={"marker": ".", "markersize": 3, "markeredgecolor": colour},
+            medianprops={"color": "black", "lw": 1},
+            boxprops={"facecolor": colour, "lw": 0.6},
+            whiskerprops={"lw": 0.6},
+            capprops={"lw": 0.6},
+        )
+        handles.append(boxes["boxes"][0])
+    axes.set_xticks(np.arange(len(kappas)), [f"{k:.2g}" for k in kappas])
+    axes.set_xlim(-0.5, len(kappas) - 0.5)
+    axes.set_xlabel("softness κ (0 hard, 1 soft)")
+    axes.set_ylabel(ylabel)
+    axes.grid(axis="y", alpha=0.3)
+    axes.legend(handles, list(results), fontsize=9, loc="lower left", ncols=4)
+    return figure

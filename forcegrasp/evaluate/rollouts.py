@@ -1,0 +1,70 @@
+"""Rolls a policy out over a grid of softness values, on the same grasps for every policy."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import torch
+from tensordict import TensorDictBase
+from tensordict.nn import TensorDictModuleBase
+from torchrl.envs.utils import ExplorationType, set_exploration_type
+
+from forcegrasp.config import ActionConfig, GraspConfig, ObservationConfig, PhysicsConfig, RewardConfig, SensorConfig
+from forcegrasp.env import build_env
+from forcegrasp.physics import FixedGrasps, GraspParameters, GraspSampler
+
+#: Grasps simulated at once; more would only take memory.
+BATCH = 256
+
+
+def kappa_grid(grasp: GraspConfig, kappas: int, trials: int, seed: int) -> GraspParameters:
+    """Draws ``trials`` grasps for each of ``kappas`` evenly spaced softness values; all else random.
+
+    Returns:
+      ``kappas · trials`` grasps, those of one softness next to each other.
+    """
+    rng = np.random.default_rng(seed)
+    parts = []
+    for kappa in np.linspace(*grasp.kappa, kappas):
+        sampler = GraspSampler(dataclasses.replace(grasp, kappa=[float(kappa)] * 2))
+        parts.append(sampler(rng, np.arange(trials)))
+    return GraspParameters.concatenate(parts)
+
+
+def roll_out(
+    policy: TensorDictModuleBase,
+    grasps: GraspParameters,
+    *,
+    physics: PhysicsConfig,
+    grasp: GraspConfig,
+    sensors: SensorConfig,
+    reward: RewardConfig,
+    action: ActionConfig,
+    observation: ObservationConfig | None = None,
+    seed: int = 0,
+) -> TensorDictBase:
+    """Runs one deterministic episode of every grasp and returns them whole, batch ``(n, T)``.
+
+    Raises:
+      PhysicsError: if a grasp diverged.
+    """
+    parts = []
+    for first in range(0, len(grasps), BATCH):
+        chunk = grasps[np.arange(first, min(first + BATCH, len(grasps)))]
+        env = build_env(
+            len(chunk),
+            physics=physics,
+            grasp=grasp,
+            sensors=sensors,
+            observation=observation,
+            action=action,
+            reward=reward,
+            sampler=FixedGrasps(chunk),
+            seed=seed + first,
+        )
+        if hasattr(policy, "make_tensordict_primer"):
+            env.append_transform(policy.make_tensordict_primer())
+        with torch.no_grad(), set_exploration_type(ExplorationType.DETERMINISTIC):
+            parts.append(env.rollout(grasp.steps, policy, break_when_any_done=False).exclude("observation", ("next", "observation")))
+    return torch.cat(parts)

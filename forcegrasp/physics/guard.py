@@ -1,0 +1,38 @@
+"""Notices a diverged simulation. MuJoCo resets a bad state to finite values and goes on; only counters tell."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+
+from forcegrasp.errors import PhysicsError
+from forcegrasp.physics.parameters import GraspParameters
+
+_BAD = {
+    mujoco.mjtWarning.mjWARN_BADQPOS: "positions",
+    mujoco.mjtWarning.mjWARN_BADQVEL: "velocities",
+    mujoco.mjtWarning.mjWARN_BADQACC: "accelerations",
+    mujoco.mjtWarning.mjWARN_BADCTRL: "commands",
+}
+
+
+def check(warnings: np.ndarray, parameters: GraspParameters, step: int) -> None:
+    """Raises if any grasp diverged.
+
+    Args:
+      warnings: MuJoCo's warning counters, shape ``(n, number of warnings)``, all 0 in a sound simulation.
+      parameters: the n grasps.
+      step: control step, for the message.
+
+    Raises:
+      PhysicsError: names the first grasp that diverged, what went wrong, and its parameters.
+    """
+    if not warnings.any():
+        return
+    grasp = int(np.flatnonzero(warnings.any(axis=1))[0])
+    kind = int(np.flatnonzero(warnings[grasp])[0])
+    what = _BAD.get(mujoco.mjtWarning(kind), mujoco.mjtWarning(kind).name)
+    raise PhysicsError(
+        f"grasp {grasp} diverged at control step {step} (bad {what}): {parameters.describe(grasp)};"
+        " narrow the ranges of `grasp` or set physics.tier=reference"
+    )

@@ -1,0 +1,67 @@
+"""A checkpoint is one safetensors file: tensors, and JSON in its header. Written whole or not at all; no pickle."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+import torch
+from safetensors import SafetensorError, safe_open
+from safetensors.torch import save
+from torch import Tensor
+
+from forcegrasp.errors import CheckpointError
+
+
+def write(path: Path, tensors: dict[str, Tensor], facts: dict[str, Any]) -> None:
+    """Writes a checkpoint under a temporary name, syncs it to disk, and renames it.
+
+    Args:
+      path: where to.
+      tensors: contiguous CPU tensors by name.
+      facts: whatever JSON can hold.
+
+    Raises:
+      CheckpointError: if the disk is full or not writable; an older file of that name is left as it was.
+    """
+    text = json.dumps(facts, sort_keys=True)
+    data = save(tensors, metadata={"facts": text, "sha256": _digest(tensors, text)})
+    part = path.with_suffix(".part")
+    try:
+        with open(part, "wb") as file:
+            file.write(data)
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(part, path)
+    except OSError as error:
+        part.unlink(missing_ok=True)
+        raise CheckpointError(f"{path}: could not save the checkpoint ({error.strerror}); free space or set hydra.run.dir") from error
+
+
+def read(path: Path) -> tuple[dict[str, Tensor], dict[str, Any]]:
+    """Returns the tensors and facts of a checkpoint.
+
+    Raises:
+      CheckpointError: if the file is missing, truncated, changed, or no checkpoint.
+    """
+    try:
+        with safe_open(path, framework="pt") as file:
+            header = file.metadata() or {}
+            tensors = {name: file.get_tensor(name) for name in file.keys()}
+        facts = json.loads(header["facts"])
+    except (OSError, SafetensorError, KeyError, ValueError) as error:
+        raise CheckpointError(f"{path}: not a readable checkpoint ({error}); remove it to use an older one") from error
+    if header.get("sha256") != _digest(tensors, header["facts"]):
+        raise CheckpointError(f"{path}: checksum differs, the file was changed or damaged; remove it to use an older one")
+    return tensors, facts
+
+
+def _digest(tensors: dict[str, Tensor], text: str) -> str:
+    digest = hashlib.sha256(text.encode())
+    for name in sorted(tensors):
+        digest.update(name.encode())
+        digest.update(tensors[name].reshape(-1).contiguous().view(torch.uint8).numpy().tobytes())
+    return digest.hexdigest()

@@ -1,0 +1,173 @@
+"""A run directory: resolved config, provenance, metrics and checkpoints, enough to understand and resume a run."""
+
+from __future__ import annotations
+
+import csv
+import dataclasses
+import hashlib
+import json
+import os
+import platform
+import subprocess
+import sys
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import yaml
+from omegaconf import OmegaConf
+from omegaconf.errors import OmegaConfBaseException
+from torch import Tensor
+
+from forcegrasp.config import TrainConfig, validate
+from forcegrasp.errors import CheckpointError, ConfigError
+from forcegrasp.runs import checkpoint
+
+_PACKAGES = ("torch", "torchrl", "tensordict", "mujoco", "gymnasium", "hydra-core", "numpy")
+
+
+def fingerprint(config: TrainConfig) -> str:
+    """Identifies a training by its whole configuration; checkpoints carry it."""
+    return hashlib.sha256(json.dumps(dataclasses.asdict(config), sort_keys=True).encode()).hexdigest()[:16]
+
+
+class RunDir:
+    """The files of one training run."""
+
+    def __init__(self, path: Path | str) -> None:
+        self.path = Path(path)
+        self.config_path = self.path / "config.yaml"
+        self.metrics_path = self.path / "metrics.csv"
+        self.checkpoints = self.path / "checkpoints"
+        self.tensorboard = self.path / "tensorboard"
+        self.figures = self.path / "figures"
+
+    @classmethod
+    def create(cls, path: Path | str, config: TrainConfig, overrides: list[str]) -> RunDir:
+        """Makes a new run directory and writes config and provenance into it.
+
+        Raises:
+          CheckpointError: if the directory already holds a run, or can't be written.
+        """
+        run = cls(path)
+        if run.config_path.exists():
+            raise CheckpointError(f"{run.path}: already holds a run; continue it with resume={run.path}, or name another")
+        try:
+            for folder in (run.checkpoints, run.tensorboard, run.figures):
+                folder.mkdir(parents=True, exist_ok=True)
+            (run.path / "run.json").write_text(json.dumps(_provenance(config, overrides), indent=2) + "\n")
+            run.config_path.write_text(yaml.safe_dump(dataclasses.asdict(config), sort_keys=False))
+        except OSError as error:
+            raise CheckpointError(f"{run.path}: could not make the run directory ({error.strerror})") from error
+        return run
+
+    @classmethod
+    def open(cls, path: Path | str) -> RunDir:
+        """Opens an existing run directory.
+
+        Raises:
+          CheckpointError: if it isn't one.
+        """
+        run = cls(path)
+        if not run.path.is_dir():
+            raise CheckpointError(f"{run.path}: no such run directory")
+        if not run.config_path.is_file():
+            raise CheckpointError(f"{run.path}: not a run directory (no config.yaml); a run is what forcegrasp train wrote")
+        return run
+
+    def config(self) -> TrainConfig:
+        """The run's configuration.
+
+        Raises:
+          CheckpointError: if config.yaml can't be read or holds unknown or invalid options.
+        """
+        try:
+            loaded = OmegaConf.load(self.config_path)
+            config = OmegaConf.to_object(OmegaConf.merge(OmegaConf.structured(TrainConfig), loaded))
+            validate(config)
+        except (OSError, yaml.YAMLError, OmegaConfBaseException, ConfigError, ValueError) as error:
+            first_line = str(error).strip().splitlines()[0]
+            raise CheckpointError(f"{self.config_path}: not a valid configuration ({first_line})") from error
+        return config
+
+    def save(self, frames: int, tensors: dict[str, Tensor], facts: dict[str, Any], keep: int) -> Path:
+        """Saves a checkpoint and removes all but the newest ``keep``.
+
+        Raises:
+          CheckpointError: if it can't be written.
+        """
+        path = self.checkpoints / f"frames_{frames:012d}.safetensors"
+        checkpoint.write(path, tensors, {**facts, "frames": frames, "config": fingerprint(self.config())})
+        for old in self._files()[:-keep]:
+            old.unlink()
+        return path
+
+    def load(self) -> tuple[dict[str, Tensor], dict[str, Any]]:
+        """Returns the newest checkpoint that can be read.
+
+        Raises:
+          CheckpointError: if there is none, or it was made with another configuration.
+        """
+        first_error = None
+        for path in reversed(self._files()):
+            try:
+                tensors, facts = checkpoint.read(path)
+            except CheckpointError as error:
+                first_error = first_error or error
+                continue
+            if facts.get("config") != fingerprint(self.config()):
+                raise CheckpointError(
+                    f"{path}: was trained with another configuration than {self.config_path}; restore that file"
+                )
+            return tensors, facts
+        raise first_error or CheckpointError(f"{self.checkpoints}: no checkpoint yet; train longer or restart the run")
+
+    def _files(self) -> list[Path]:
+        return sorted(self.checkpoints.glob("frames_*.safetensors"))
+
+    def log_metrics(self, row: dict[str, float]) -> None:
+        """Appends a row to metrics.csv; the first row decides the columns."""
+        new = not self.metrics_path.exists()
+        with open(self.metrics_path, "a", newline="") as file:
+            writer = csv.DictWriter(file, fieldnames=list(row))
+            if new:
+                writer.writeheader()
+            writer.writerow(row)
+
+    def drop_metrics_after(self, frames: int) -> None:
+        """Removes rows that lie after a checkpoint, so that a resumed run does not log them twice."""
+        if not self.metrics_path.exists():
+            return
+        with open(self.metrics_path, newline="") as file:
+            reader = csv.DictReader(file)
+            rows, columns = [row for row in reader if int(row["frames"]) <= frames], reader.fieldnames or []
+        part = self.metrics_path.with_suffix(".part")
+        with open(part, "w", newline="") as file:
+            writer = csv.DictWriter(file, fieldnames=columns)
+            writer.writeheader()
+            writer.writerows(rows)
+        os.replace(part, self.metrics_path)
+
+
+def _provenance(config: TrainConfig, overrides: list[str]) -> dict[str, Any]:
+    return {
+        "command": ["forcegrasp", "train", *overrides],
+        "seed": config.seed,
+        "config": fingerprint(config),
+        "git": _git_hash(),
+        "python": sys.version.split()[0],
+        "versions": {name: version(name) for name in _PACKAGES} | {"forcegrasp": version("forcegrasp")},
+        "machine": {"system": platform.platform(), "processor": platform.machine(), "cores": os.cpu_count()},
+    }
+
+
+def _git_hash() -> str | None:
+    """Commit of the source tree, with "+" where it has changes; None outside a checkout."""
+    root = Path(__file__).parents[2]
+    if not (root / ".git").exists():
+        return None
+    try:
+        run = lambda *args: subprocess.run(["git", *args], cwd=root, capture_output=True, text=True, check=True).stdout
+        return run("rev-parse", "HEAD").strip() + ("+" if run("status", "--porcelain").strip() else "")
+    except (OSError, subprocess.CalledProcessError):
+        return None

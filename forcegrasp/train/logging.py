@@ -1,0 +1,86 @@
+"""What training shows while it runs: TensorBoard, metrics.csv, figures and videos."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import torch
+from tensordict import TensorDictBase
+from torch.utils.tensorboard import SummaryWriter
+
+from forcegrasp.config import TrainConfig
+from forcegrasp.evaluate.plots import force_traces
+from forcegrasp.evaluate.video import NoRenderer, grasp_video
+from forcegrasp.runs.run_dir import RunDir
+
+#: Episodes drawn in a figure of force traces.
+TRACES = 6
+
+
+class TrainingLog:
+    """Writes one batch's figures under TensorBoard's tags and into metrics.csv."""
+
+    def __init__(self, run: RunDir, config: TrainConfig, frames: int) -> None:
+        self.run, self.config = run, config
+        run.drop_metrics_after(frames)
+        self.writer = SummaryWriter(str(run.tensorboard), purge_step=frames + 1 if frames else None)
+        if not frames:
+            self.writer.add_text("config", "```\n" + run.config_path.read_text() + "```")
+
+    def batch(self, number: int, frames: int, groups: dict[str, dict[str, float]], episodes: TensorDictBase) -> None:
+        """Logs one batch.
+
+        Args:
+          number: of the batch, from 1.
+          frames: trained so far.
+          groups: scalars by group and name; they become TensorBoard tags ``group/name``.
+          episodes: the batch itself, ``(n, T)``.
+        """
+        row = {"frames": frames}
+        for group, scalars in groups.items():
+            for name, value in scalars.items():
+                self.writer.add_scalar(f"{group}/{name}", value, frames)
+                row[f"{group}/{name}"] = value
+        self.run.log_metrics(row)
+        every = self.config.log
+        if every.histograms_every and number % every.histograms_every == 0:
+            self.writer.add_histogram("actions/policy", episodes["action"].clamp(-1, 1), frames, bins=64)
+            self.writer.add_histogram("forces/touching_n", _nonzero(episodes["next", "force"]), frames, bins=64)
+        if every.figures_every and number % every.figures_every == 0:
+            self.traces(episodes[:TRACES], frames)
+        self.writer.flush()
+
+    def traces(self, episodes: TensorDictBase, frames: int) -> None:
+        """Draws force against goal for a few episodes, as PNG and in TensorBoard."""
+        figure = force_traces(episodes, f"after {frames:,} frames")
+        figure.savefig(self.run.figures / f"traces_{frames:012d}.png", dpi=100)
+        self.writer.add_figure("grasps/force_traces", figure, frames)
+
+    def video(self, episode: TensorDictBase, frames: int) -> Path | None:
+        """Renders one episode, as GIF and in TensorBoard; says so and goes on where nothing can render."""
+        path = self.run.figures / f"grasp_{frames:012d}.gif"
+        try:
+            data = grasp_video(episode, self.config.physics.tier)
+        except NoRenderer as error:
+            print(f"forcegrasp: no video: {error}", file=sys.stderr)
+            return None
+        path.write_bytes(data)
+        _add_gif(self.writer, "grasps/video", data, frames)
+        return path
+
+    def close(self) -> None:
+        self.writer.close()
+
+
+def _nonzero(force: torch.Tensor) -> torch.Tensor:
+    touching = force[force != 0]
+    return touching if len(touching) else torch.zeros(1)
+
+
+def _add_gif(writer: SummaryWriter, tag: str, data: bytes, step: int) -> None:
+    # SummaryWriter.add_video needs moviepy to encode what is already encoded here.
+    from tensorboard.compat.proto.summary_pb2 import Summary
+
+    image = Summary.Image(encoded_image_string=data)
+    writer._get_file_writer().add_summary(Summary(value=[Summary.Value(tag=tag, image=image)]), step)

@@ -1,0 +1,204 @@
+"""The training loop, from top to bottom: curriculum, collect, update, log, save."""
+
+from __future__ import annotations
+
+import signal
+import time
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+import torch
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from torch import Tensor
+from torchrl.collectors import Collector
+from torchrl.envs import TransformedEnv
+
+from forcegrasp.config import TrainConfig
+from forcegrasp.controllers.policy import make_policy
+from forcegrasp.curriculum import CurriculumHook, LinearSchedule
+from forcegrasp.env import build_env
+from forcegrasp.env.episodes import summarise
+from forcegrasp.runs.run_dir import RunDir
+from forcegrasp.train.logging import TrainingLog
+from forcegrasp.train.ppo import PPO, make_value
+
+
+class Trainer:
+    """Everything that a training consists of; all of its state can be saved and restored.
+
+    Args:
+      config: the whole configuration.
+
+    Raises:
+      ConfigError: if an option is out of its range.
+    """
+
+    def __init__(self, config: TrainConfig) -> None:
+        self.config = config
+        self.frames = self.batches = 0
+        torch.set_num_threads(1)  # the physics needs the cores
+        torch.manual_seed(config.seed)
+        self.shuffle = torch.Generator().manual_seed(config.seed)
+        self.env: TransformedEnv = build_env(
+            config.ppo.grasps,
+            physics=config.physics,
+            grasp=config.grasp,
+            sensors=config.sensors,
+            observation=config.observation,
+            action=config.action,
+            reward=config.reward,
+            seed=config.seed,
+        )
+        schedule = LinearSchedule(config.curriculum, config.grasp, config.reward, config.ppo.total_frames)
+        self.curriculum = CurriculumHook(schedule, self.env)
+        size = self.env.observation_spec["observation"].shape[-1]
+        self.policy = make_policy(size, config.ppo.hidden, config.ppo.log_std)
+        self.value = make_value(size, config.ppo)
+        self.ppo = PPO(self.policy, self.value, config.ppo)
+
+    def state(self) -> tuple[dict[str, Tensor], dict[str, Any]]:
+        """All that changes while training, as tensors and as JSON."""
+        tensors = {f"policy.{k}": v for k, v in self.policy.state_dict().items()}
+        tensors |= {f"value.{k}": v for k, v in self.value.state_dict().items()}
+        for index, moments in self.ppo.optimizer.state_dict()["state"].items():
+            tensors |= {f"optimizer.{index}.{k}": v for k, v in moments.items()}
+        tensors |= {f"env.{k}": v for k, v in self.env.transform.state_dict().items() if "_extra_state" in k}
+        tensors |= {"rng.torch": torch.get_rng_state(), "rng.shuffle": self.shuffle.get_state()}
+        facts = {
+            "batches": self.batches,
+            "rng_grasps": self.env.base_env.rng.bit_generator.state,
+            "curriculum": self.curriculum.schedule(self.frames).scalars(),
+        }
+        return {k: v.detach().contiguous().clone() for k, v in tensors.items()}, facts
+
+    def restore(self, tensors: dict[str, Tensor], facts: dict[str, Any]) -> None:
+        """The inverse of :meth:`state`."""
+
+        def part(name: str) -> dict[str, Tensor]:
+            return {k.removeprefix(name): v for k, v in tensors.items() if k.startswith(name)}
+
+        self.policy.load_state_dict(part("policy."))
+        self.value.load_state_dict(part("value."))
+        optimizer = self.ppo.optimizer.state_dict()
+        for key, value in part("optimizer.").items():
+            index, moment = key.split(".")
+            optimizer["state"].setdefault(int(index), {})[moment] = value
+        self.ppo.optimizer.load_state_dict(optimizer)
+        for key, value in part("env.").items():
+            module = self.env.transform.get_submodule(key.removesuffix("_extra_state").rstrip("."))
+            module.set_extra_state(value)
+        self.frames, self.batches = facts["frames"], facts["batches"]
+        self.env.base_env.rng.bit_generator.state = facts["rng_grasps"]
+        self.shuffle.set_state(tensors["rng.shuffle"])
+        torch.set_rng_state(tensors["rng.torch"])
+
+
+def train(config: TrainConfig, run: RunDir, resume: bool = False) -> bool:
+    """Trains until ``ppo.total_frames``; saves into the run directory. Returns False if it was interrupted.
+
+    Ctrl-C (or SIGTERM) ends after the batch at work, with a checkpoint; a second one ends at once.
+
+    Raises:
+      ConfigError, CheckpointError, PhysicsError: with what to do about it.
+    """
+    trainer = Trainer(config)
+    total = config.ppo.total_frames
+    per_batch = config.ppo.grasps * config.grasp.steps
+    # Whole episodes from a fresh reset: batches don't share state, which is what makes a resumed run bit-identical.
+    collector = Collector(
+        trainer.env,
+        trainer.policy,
+        frames_per_batch=per_batch,
+        total_frames=-1,
+        reset_at_each_iter=True,
+        track_traj_ids=False,
+        auto_register_policy_transforms=False,
+    )
+    if resume:
+        trainer.restore(*run.load())
+    log = TrainingLog(run, config, trainer.frames)
+    batches = iter(collector)
+    with _stop_signals() as stop, _progress(total, trainer.frames) as progress:
+        while trainer.frames < total and not stop:
+            started = time.perf_counter()
+            values = trainer.curriculum.apply(trainer.frames)
+            batch = next(batches)
+            collected = time.perf_counter()
+            figures = {name: float(value.mean()) for name, value in summarise(batch, config.sensors.contact_threshold_n).items()}
+            rate = trainer.ppo.set_progress(trainer.frames / total)
+            losses = trainer.ppo.update(batch, trainer.shuffle)
+            ended = time.perf_counter()
+
+            trainer.frames += batch.numel()
+            trainer.batches += 1
+            terms = batch["next", "reward_terms"]
+            groups = {
+                "episode": {"return": float(batch["next", "reward"].sum((1, 2)).mean()), **figures},
+                "reward": {name: float(terms[name].mean()) for name in sorted(terms.keys())},
+                "ppo": {**losses, "learning_rate": rate, "action_std": float(batch["scale"].mean())},
+                "curriculum": values.scalars(),
+                "speed": {
+                    "frames_per_s": batch.numel() / (ended - started),
+                    "collect_frames_per_s": batch.numel() / (collected - started),
+                    "update_share": (ended - collected) / (ended - started),
+                },
+            }
+            log.batch(trainer.batches, trainer.frames, groups, batch)
+            every = config.log
+            if every.video_every and trainer.batches % every.video_every == 0:
+                log.video(batch[0], trainer.frames)
+            if trainer.batches % every.checkpoint_every == 0 or trainer.frames >= total or stop:
+                run.save(trainer.frames, *trainer.state(), keep=every.keep)
+            progress(trainer.frames, figures)
+    if not stop and config.log.figures_every:
+        log.traces(batch[:6], trainer.frames)
+    if not stop and config.log.video_every:
+        log.video(batch[0], trainer.frames)
+    log.close()
+    return trainer.frames >= total
+
+
+@contextmanager
+def _stop_signals():
+    """Yields a list that is not empty once the user asked to stop."""
+    asked: list[int] = []
+
+    def ask(number: int, _frame: Any) -> None:
+        if asked:
+            raise KeyboardInterrupt
+        asked.append(number)
+
+    try:
+        before = {number: signal.signal(number, ask) for number in (signal.SIGINT, signal.SIGTERM)}
+    except ValueError:  # not the main thread, as in some sweep launchers: they have their own way to stop a job
+        before = {}
+    try:
+        yield asked
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+@contextmanager
+def _progress(total: int, done: int):
+    """Yields a function that shows progress: ``(frames, episode figures)``."""
+    columns = [
+        TextColumn("training"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("frames · force reward {task.fields[reward]:5.1f} of 150 · object moved {task.fields[moved]:.2f} mm ·"),
+        TimeRemainingColumn(),
+    ]
+    with Progress(*columns) as bar:
+        task = bar.add_task("training", total=total, completed=done, reward=np.nan, moved=np.nan)
+
+        def show(frames: int, figures: dict[str, float]) -> None:
+            bar.update(
+                task,
+                completed=min(frames, total),
+                reward=figures["force_reward_normalised"],
+                moved=figures["displacement_until_grasped_mm"],
+            )
+
+        yield show

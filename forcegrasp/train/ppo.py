@@ -1,0 +1,123 @@
+"""What PPO optimises: the value network, the loss, and one pass of updates over a batch."""
+
+from __future__ import annotations
+
+import torch
+from tensordict import TensorDictBase
+from tensordict.nn import TensorDictModule, TensorDictModuleBase
+from torch import Tensor, nn
+from torchrl.modules import MLP
+from torchrl.objectives import ClipPPOLoss
+from torchrl.objectives.value import GAE
+
+from forcegrasp.config import PPOConfig
+
+# Middle and half width of kappa, b2, radius, offset and goal force: brings the true parameters to about [-1, 1].
+_MIDDLE = (0.5, -9.5, 0.025, 0.0, 0.5)
+_HALF = (0.5, 3.5, 0.010, 0.012, 0.5)
+
+
+class Value(nn.Module):
+    """State value. Its output is scaled by the horizon 1 / (1 − γ), so that the network's own stays about 1."""
+
+    def __init__(self, observation_size: int, hidden: list[int], discount: float, privileged: bool) -> None:
+        super().__init__()
+        extra = len(_MIDDLE) + 5 if privileged else 0
+        self.net = MLP(in_features=observation_size + extra, out_features=1, num_cells=list(hidden), activation_class=nn.Tanh)
+        self.horizon = 1 / max(1 - discount, 1e-3)
+        self.register_buffer("middle", torch.tensor(_MIDDLE), persistent=False)
+        self.register_buffer("half_width", torch.tensor(_HALF), persistent=False)
+
+    def forward(
+        self,
+        observation: Tensor,
+        parameters: Tensor | None = None,
+        force: Tensor | None = None,
+        position: Tensor | None = None,
+        object_position: Tensor | None = None,
+    ) -> Tensor:
+        if parameters is not None:
+            # true gap between each finger and the object's surface, in centimetres
+            side = torch.tensor([-1.0, 1.0])
+            gap = (position - side * object_position - parameters[..., 2:3]) * 100
+            true = (parameters - self.middle) / self.half_width
+            moved = (object_position - parameters[..., 3:4]) * 1000
+            observation = torch.cat([observation, true, force, gap, moved], dim=-1)
+        return self.horizon * self.net(observation)
+
+
+PRIVILEGED = ["grasp_parameters", "force", "joint_position", "object_position"]
+
+
+def make_value(observation_size: int, config: PPOConfig) -> TensorDictModule:
+    """The value network: reads ``observation`` (and the true state, if privileged), writes ``state_value``."""
+    privileged = config.critic == "privileged"
+    net = Value(observation_size, config.hidden, config.discount, privileged)
+    return TensorDictModule(net, in_keys=["observation", *(PRIVILEGED if privileged else [])], out_keys=["state_value"])
+
+
+class PPO:
+    """Clipped PPO with generalised advantages, on batches of whole episodes.
+
+    Args:
+      policy, value: the networks.
+      config: every number of the algorithm.
+    """
+
+    def __init__(self, policy: TensorDictModuleBase, value: TensorDictModule, config: PPOConfig) -> None:
+        self.config, self.policy, self.value = config, policy, value
+        self.advantage = GAE(gamma=config.discount, lmbda=config.gae_lambda, value_network=value)
+        self.loss = ClipPPOLoss(
+            policy,
+            value,
+            clip_epsilon=config.clip,
+            entropy_bonus=config.entropy_weight > 0,
+            entropy_coeff=config.entropy_weight,
+            critic_coeff=config.value_weight,
+            loss_critic_type="l2",
+            normalize_advantage=False,
+        )
+        self.optimizer = torch.optim.Adam(
+            [*policy.parameters(), *value.parameters()], lr=config.learning_rate, eps=1e-5, fused=True
+        )
+
+    def set_progress(self, share: float) -> float:
+        """Lowers the learning rate linearly; ``share`` of the training is over. Returns the rate."""
+        rate = self.config.learning_rate * (1 - (1 - self.config.learning_rate_end) * min(max(share, 0.0), 1.0))
+        for group in self.optimizer.param_groups:
+            group["lr"] = rate
+        return rate
+
+    def update(self, batch: TensorDictBase, generator: torch.Generator) -> dict[str, float]:
+        """Improves both networks on a batch ``(n, T)`` of whole episodes; returns the mean of each diagnostic."""
+        with torch.no_grad():
+            self.advantage(batch)
+        advantage = batch.get("advantage")
+        batch.set("advantage", (advantage - advantage.mean()) / (advantage.std() + 1e-8))
+        # value errors in units of the horizon, else they dwarf everything else
+        keys = {*self.loss.in_keys, "advantage", "value_target", "state_value"} - {"reward", "done", "terminated"}
+        flat = batch.select(*[k for k in keys if not isinstance(k, tuple)], strict=False).reshape(-1).contiguous()
+        size = min(self.config.minibatch, flat.shape[0])
+        sums: dict[str, float] = {}
+        count = 0
+        for _ in range(self.config.epochs):
+            order = torch.randperm(flat.shape[0], generator=generator)
+            for ids in order.split(size):
+                losses = self.loss(flat[ids])
+                objective = losses["loss_objective"] + losses["loss_critic"] / self.horizon**2
+                if "loss_entropy" in losses.keys():
+                    objective = objective + losses["loss_entropy"]
+                self.optimizer.zero_grad(set_to_none=True)
+                objective.backward()
+                for net in (self.policy, self.value):
+                    nn.utils.clip_grad_norm_(net.parameters(), self.config.max_grad_norm)
+                self.optimizer.step()
+                count += 1
+                for name in ("loss_objective", "loss_critic", "kl_approx", "clip_fraction", "ESS"):
+                    if name in losses.keys():
+                        sums[name] = sums.get(name, 0.0) + losses[name].detach()
+        return {name: float(total) / count for name, total in sums.items()}
+
+    @property
+    def horizon(self) -> float:
+        return self.value.module.horizon

@@ -1,0 +1,34 @@
+"""Denormalises actions, u = clip(a, −1, 1) · Δq_max (paper, Sec. 4)."""
+
+from __future__ import annotations
+
+import torch
+from tensordict.utils import NestedKey
+from torch import Tensor
+from torchrl.data import Bounded, Composite
+from torchrl.envs.transforms import Transform
+
+
+class ActionScale(Transform):
+    """Turns the policy's action in [−1, 1] into a position delta.
+
+    Args:
+      max_delta: Δq_max, metres.
+      delta_key: what the environment takes, metres, ``(*B, 2)``.
+      action_key: what the policy gives, ``(*B, 2)``. It is stored as the policy gave it.
+    """
+
+    def __init__(self, max_delta: float, delta_key: NestedKey = "joint_delta", action_key: NestedKey = "action") -> None:
+        super().__init__(in_keys_inv=[delta_key], out_keys_inv=[action_key])
+        self.max_delta = max_delta
+
+    def _inv_apply_transform(self, action: Tensor) -> Tensor:
+        return action.clamp(-1, 1) * self.max_delta
+
+    def transform_input_spec(self, input_spec: Composite) -> Composite:
+        input_spec = input_spec.clone()
+        actions = input_spec["full_action_spec"]
+        delta = actions[self.in_keys_inv[0]]
+        del actions[self.in_keys_inv[0]]
+        actions[self.out_keys_inv[0]] = Bounded(-torch.ones(()), torch.ones(()), shape=delta.shape, dtype=delta.dtype)
+        return input_spec

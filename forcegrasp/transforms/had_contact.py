@@ -1,0 +1,45 @@
+"""Contact memory, h(t) = c(t) ∨ h(t−1) with c = f > f_θ and h(0) = 0 (paper, eqs. 5-6 of the appendix)."""
+
+from __future__ import annotations
+
+import torch
+from tensordict import TensorDictBase
+from tensordict.utils import NestedKey
+from torchrl.data import Binary, Composite
+from torchrl.envs.transforms import Transform
+
+
+class HadContact(Transform):
+    """Writes, per finger, 1 once the force has exceeded the threshold in this episode, else 0.
+
+    The memory lives in the tensordict: h(t+1) is written from f(t+1) and h(t), so partial resets and batched envs need
+    no bookkeeping.
+
+    Args:
+      threshold: f_θ, newtons.
+      in_key: measured force, newtons, ``(*B, 2)``.
+      out_key: the flags, float 0 or 1, ``(*B, 2)``.
+    """
+
+    def __init__(
+        self, threshold: float, in_key: NestedKey = "sensed_force", out_key: NestedKey = "had_contact"
+    ) -> None:
+        super().__init__(in_keys=[in_key], out_keys=[out_key])
+        self.threshold = threshold
+
+    def _step(self, tensordict: TensorDictBase, next_tensordict: TensorDictBase) -> TensorDictBase:
+        force = next_tensordict.get(self.in_keys[0])
+        contact = (force > self.threshold).to(force.dtype)
+        next_tensordict.set(self.out_keys[0], torch.maximum(contact, tensordict.get(self.out_keys[0])))
+        return next_tensordict
+
+    def _reset(self, tensordict: TensorDictBase, tensordict_reset: TensorDictBase) -> TensorDictBase:
+        return tensordict_reset.set(self.out_keys[0], torch.zeros_like(tensordict_reset.get(self.in_keys[0])))
+
+    def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
+        raise RuntimeError("HadContact needs the step before: append it to an environment, it can't work on single frames")
+
+    def transform_observation_spec(self, observation_spec: Composite) -> Composite:
+        force = observation_spec[self.in_keys[0]]
+        observation_spec[self.out_keys[0]] = Binary(shape=force.shape, dtype=force.dtype)
+        return observation_spec

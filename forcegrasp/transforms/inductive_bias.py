@@ -1,0 +1,61 @@
+"""The inductive bias φ that scales actions by the phase of the grasp (paper, eq. 6)."""
+
+from __future__ import annotations
+
+import torch
+from tensordict import TensorDictBase
+from tensordict.utils import NestedKey
+from torch import Tensor
+from torchrl.envs.transforms import Transform
+
+
+def contact_bias(had_contact: Tensor, force_error: Tensor, goal_force: Tensor, one: float, floor: float) -> Tensor:
+    """φ of each finger (paper, eq. 6).
+
+    1 before the finger's first contact; ``one`` for a finger that waits for the other; with both in contact
+    max(floor, 1 − |Δf| / f_goal).
+
+    Args:
+      had_contact: h, 0 or 1, ``(*B, 2)``.
+      force_error: Δf, newtons, ``(*B, 2)``.
+      goal_force: f_goal, newtons, ``(*B, 1)``.
+
+    Returns:
+      ``(*B, 2)``, in [0, 1].
+    """
+    touched = had_contact > 0.5
+    both = touched.all(-1, keepdim=True)
+    near_goal = (1 - force_error.abs() / goal_force).clamp_min(floor)
+    waiting = torch.where(touched, one, 1.0)
+    return torch.where(both, near_goal, waiting)
+
+
+class InductiveBias(Transform):
+    """Multiplies the position delta by φ, from contact memory and force error of the same step.
+
+    Only what the environment receives is scaled: the stored action stays the policy's own, so its log-probability
+    stays valid. Append it before :class:`ActionScale`: inverses run last-appended first.
+
+    Args:
+      one: φ of a finger that waits for the other.
+      floor: smallest φ with both fingers in contact.
+      delta_key: the quantity to scale, ``(*B, 2)``.
+    """
+
+    def __init__(
+        self,
+        one: float = 0.1,
+        floor: float = 0.9,
+        delta_key: NestedKey = "joint_delta",
+        had_contact_key: NestedKey = "had_contact",
+        force_error_key: NestedKey = "force_error",
+        goal_key: NestedKey = "goal_force",
+    ) -> None:
+        super().__init__(in_keys_inv=[delta_key], out_keys_inv=[delta_key])
+        self.one, self.floor = one, floor
+        self.state_keys = (had_contact_key, force_error_key, goal_key)
+
+    def _inv_call(self, tensordict: TensorDictBase) -> TensorDictBase:
+        had_contact, force_error, goal = (tensordict.get(key) for key in self.state_keys)
+        phi = contact_bias(had_contact, force_error, goal, self.one, self.floor)
+        return tensordict.set(self.in_keys_inv[0], tensordict.get(self.out_keys_inv[0]) * phi)

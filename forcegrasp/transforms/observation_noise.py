@@ -1,0 +1,62 @@
+"""Sensor noise, o = s + σ ε (paper, Sec. 4)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import torch
+from tensordict import TensorDictBase
+from tensordict.utils import NestedKey
+from torchrl.data import Composite
+from torchrl.envs.transforms import Transform
+
+
+class ObservationNoise(Transform):
+    """Adds Gaussian noise of a fixed standard deviation to each entry, and writes the result beside the truth.
+
+    The transform owns its generator, because seeding an environment does not reach transforms: seed it with
+    :meth:`set_seed`, differently in each worker. The generator's state is part of ``state_dict()``.
+
+    Args:
+      in_keys: the true quantities, ``(*B, d)``.
+      out_keys: where the readings go.
+      std: one standard deviation per key, in that key's unit; 0 copies the value.
+      seed: seed of the generator.
+    """
+
+    def __init__(
+        self, in_keys: Sequence[NestedKey], out_keys: Sequence[NestedKey], std: Sequence[float], seed: int = 0
+    ) -> None:
+        if not len(in_keys) == len(out_keys) == len(std):
+            raise ValueError(f"needs one out_key and one std per in_key; got {in_keys}, {out_keys}, {std}")
+        super().__init__(in_keys=in_keys, out_keys=out_keys)
+        self.std = [float(s) for s in std]
+        self.generator = torch.Generator()
+        self.set_seed(seed)
+
+    def set_seed(self, seed: int) -> None:
+        """Restarts the noise."""
+        self.generator.manual_seed(seed)
+
+    def _call(self, next_tensordict: TensorDictBase) -> TensorDictBase:
+        for in_key, out_key, std in zip(self.in_keys, self.out_keys, self.std, strict=True):
+            value = next_tensordict.get(in_key)
+            noise = torch.randn(value.shape, generator=self.generator, dtype=value.dtype)
+            next_tensordict.set(out_key, value + std * noise.to(value.device))
+        return next_tensordict
+
+    forward = _call
+
+    def _reset(self, tensordict: TensorDictBase, tensordict_reset: TensorDictBase) -> TensorDictBase:
+        return self._call(tensordict_reset)
+
+    def transform_observation_spec(self, observation_spec: Composite) -> Composite:
+        for in_key, out_key in zip(self.in_keys, self.out_keys, strict=True):
+            observation_spec[out_key] = observation_spec[in_key].clone()
+        return observation_spec
+
+    def get_extra_state(self) -> torch.Tensor:
+        return self.generator.get_state()
+
+    def set_extra_state(self, state: torch.Tensor) -> None:
+        self.generator.set_state(state)
