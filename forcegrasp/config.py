@@ -56,7 +56,12 @@ class GraspConfig:
         [0.015, 0.035], "object radius; the paper's w_o", unit="m", source="paper, Table 2", low=0.0121, high=0.04
     )
     offset_m: list[float] = option(
-        [-0.04, 0.04], "object offset along the grasp axis, o_y", unit="m", source="paper, Table 2", low=-0.045, high=0.045
+        [-0.04, 0.04],
+        "object offset along the grasp axis, o_y",
+        unit="m",
+        source="paper, Table 2",
+        low=-0.045,
+        high=0.045,
     )
     deformation_m: float = option(
         0.012, "largest object deformation d_p, both sides together", unit="m", source="authors' code", low=0, high=0.03
@@ -72,7 +77,9 @@ class GraspConfig:
 class SensorConfig:
     """What the controller can measure."""
 
-    position_std_m: float = option(2.7e-5, "noise of the finger positions, σ_q", unit="m", source="paper", low=0, high=0.01)
+    position_std_m: float = option(
+        2.7e-5, "noise of the finger positions, σ_q", unit="m", source="paper", low=0, high=0.01
+    )
     force_std_n: float = option(0.013, "noise of the fingertip forces, σ_f", unit="N", source="paper", low=0, high=1)
     contact_threshold_n: float = option(
         0.05, "force above which a finger is in contact, f_θ", unit="N", source="authors' code", low=0, high=5
@@ -95,7 +102,9 @@ class ActionConfig:
 
     max_delta_m: float = option(0.003, "largest position delta Δq_max", unit="m", source="paper", low=1e-5, high=0.045)
     inductive_bias: bool = option(True, "scale actions by φ of the contact state", source="paper, eq. 6")
-    bias_one_contact: float = option(0.1, "φ of a finger that waits for the other", source="paper, eq. 6", low=0, high=1)
+    bias_one_contact: float = option(
+        0.1, "φ of a finger that waits for the other", source="paper, eq. 6", low=0, high=1
+    )
     bias_floor: float = option(0.9, "smallest φ with both fingers in contact", source="paper, eq. 6", low=0, high=1)
 
 
@@ -128,7 +137,11 @@ class CurriculumConfig:
 
     enabled: bool = option(True, "anneal; if not, training starts at the final values")
     end_fraction: float = option(
-        1 / 3, "share of the training frames after which all is at its final value", source="authors' code", low=0, high=1
+        1 / 3,
+        "share of the training frames after which all is at its final value",
+        source="authors' code",
+        low=0,
+        high=1,
     )
     object_weight: float = option(0.0, "α₂ at the start", source="paper, Table 2", low=0, high=1000)
     speed_threshold_m: float = option(
@@ -146,7 +159,9 @@ class CurriculumConfig:
 class PPOConfig:
     """Proximal policy optimisation (Schulman et al. 2017)."""
 
-    total_frames: int = option(4_500_000, "control steps to train for, over all grasps", source="authors' code", low=1, high=10**12)
+    total_frames: int = option(
+        4_500_000, "control steps to train for, over all grasps", source="authors' code", low=1, high=10**12
+    )
     grasps: int = option(256, "grasps simulated at once", low=1, high=100_000)
     epochs: int = option(10, "passes over each batch", low=1, high=1000)
     minibatch: int = option(2048, "frames per gradient step", low=1, high=10**9)
@@ -157,14 +172,16 @@ class PPOConfig:
     clip: float = option(0.2, "largest change of the probability ratio", source="authors' code", low=0.001, high=1)
     entropy_weight: float = option(0.0, "weight of the entropy bonus", source="authors' code", low=0, high=10)
     value_weight: float = option(0.5, "weight of the value loss", source="authors' code", low=0, high=100)
-    max_grad_norm: float = option(0.5, "gradients are scaled down to this norm", source="authors' code", low=0, high=1000)
+    max_grad_norm: float = option(
+        0.5, "gradients are scaled down to this norm", source="authors' code", low=0, high=1000
+    )
     hidden: list[int] = option(
         [50, 50], "width of each hidden layer, policy and value alike", source="authors' code", low=1, high=10_000
     )
     log_std: float = option(-0.5, "logarithm of the policy's initial standard deviation", low=-10, high=2)
     critic: str = option(
-        "observation",
-        "what the value network sees: the policy's observation, or also the grasp's true state (privileged)",
+        "privileged",
+        "what the value network sees while training: the policy's observation, or also the grasp's true state",
         choices=("observation", "privileged"),
     )
 
@@ -204,7 +221,9 @@ class EvaluateConfig:
         ["force_pi"], "what to compare: run directories, or controllers by name", source="paper, Fig. 2"
     )
     out: str = option("", "where to write; runs/evaluate_TIME if empty")
-    kappas: int = option(11, "softness values, evenly spaced over grasp.kappa", source="paper, Sec. 5", low=1, high=1001)
+    kappas: int = option(
+        11, "softness values, evenly spaced over grasp.kappa", source="paper, Sec. 5", low=1, high=1001
+    )
     trials: int = option(50, "grasps per softness value and policy; the paper had 200", low=2, high=1_000_000)
     seed: int = option(1000, "seed of the grasps; the same grasps for every policy", low=0, high=2**31 - 1)
     physics: PhysicsConfig = field(default_factory=PhysicsConfig)

@@ -54,7 +54,9 @@ def groups(verb: str) -> dict[str, list[str]]:
     found = {}
     for folder in sorted(files("forcegrasp.conf").iterdir(), key=lambda f: f.name):
         if folder.is_dir() and f"- {folder.name}:" in text:
-            found[folder.name] = sorted(f.name.removesuffix(".yaml") for f in folder.iterdir() if f.name.endswith(".yaml"))
+            found[folder.name] = sorted(
+                f.name.removesuffix(".yaml") for f in folder.iterdir() if f.name.endswith(".yaml")
+            )
     return found
 
 
@@ -110,7 +112,11 @@ def help_text(verb: str, purpose: str, notes: str = "") -> str:
             lines += ["", head or "general"]
         meta = entry.metadata
         shown = str(default).replace("'", "").replace(" ", "")
-        detail = meta["doc"] + (f" [{meta['unit']}]" if meta["unit"] else "") + (f" ({meta['source']})" if meta["source"] else "")
+        detail = (
+            meta["doc"]
+            + (f" [{meta['unit']}]" if meta["unit"] else "")
+            + (f" ({meta['source']})" if meta["source"] else "")
+        )
         option = f"  {name}={shown}"
         lines.append(f"{option}\n{'':<6}{detail}")
     return "\n".join(lines) + "\n"

@@ -29,7 +29,9 @@ def main(arguments: list[str]) -> int:
     overrides = [a for a in arguments if a not in resume and a not in multirun]
     if resume:
         if overrides or multirun or len(resume) > 1:
-            raise ConfigError(f"resume= goes on with the run's own configuration; drop {' '.join(overrides + multirun) or 'one'}")
+            raise ConfigError(
+                f"resume= goes on with the run's own configuration; drop {' '.join(overrides + multirun) or 'one'}"
+            )
         return _resume(Path(resume[0].partition("=")[2]))
     for single in _single_runs(overrides) if multirun else [overrides]:
         compose("train", single)  # refuses bad input before anything is written
@@ -106,7 +108,9 @@ def _train(config, run, resume: bool) -> int:
 
     print(f"run directory: {run.path}")
     if train(config, run, resume):
-        print(f"trained. Compare it with the hand-written controller: forcegrasp evaluate policies=[{run.path},force_pi]")
+        print(
+            f"trained. Compare it with the hand-written controller: forcegrasp evaluate policies=[{run.path},force_pi]"
+        )
         return 0
     print(f"stopped and saved; go on with: forcegrasp train resume={run.path}")
     return 130

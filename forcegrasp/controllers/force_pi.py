@@ -18,8 +18,8 @@ class ForcePI(TensorDictModuleBase):
     errors divided by the assumed stiffness k enter a PI law and both fingers get half of its position delta:
     Δq = −½ Σ_i (K_p e_i + K_i I_i), e_i = Δf_i / k, where the one integral I runs on over both fingers' errors.
 
-    The integral lives in the tensordict (``force_integral``, metre seconds, ``(*B, 1)``); an environment carries it once
-    :meth:`make_tensordict_primer` is appended to it.
+    The integral lives in the tensordict (``force_integral``, metre seconds, ``(*B, 1)``); an environment carries it
+    once :meth:`make_tensordict_primer` is appended to it.
 
     Args:
       max_delta_m: Δq_max that the environment scales actions by, metres.
@@ -27,9 +27,6 @@ class ForcePI(TensorDictModuleBase):
       kp, ki: K_p (1) and K_i (1/s).
       closing_m: position delta while closing, metres per step: 0.02 m/s · 40 ms · 5 (authors' code).
     """
-
-    in_keys = ["had_contact", "force_error", "force_integral"]
-    out_keys = ["action", ("next", "force_integral")]
 
     def __init__(
         self,
@@ -40,6 +37,8 @@ class ForcePI(TensorDictModuleBase):
         closing_m: float = 0.004,
     ) -> None:
         super().__init__()
+        self.in_keys = ["had_contact", "force_error", "force_integral"]
+        self.out_keys = ["action", ("next", "force_integral")]
         self.max_delta_m, self.stiffness, self.kp, self.ki, self.closing_m = max_delta_m, stiffness, kp, ki, closing_m
 
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:

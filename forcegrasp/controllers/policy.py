@@ -18,9 +18,7 @@ def make_policy(observation_size: int, hidden: list[int], log_std: float, action
       hidden: width of each hidden layer.
       log_std: logarithm of the initial standard deviation.
     """
-    net = MLP(
-        in_features=observation_size, out_features=action_size, num_cells=list(hidden), activation_class=nn.Tanh
-    )
+    net = MLP(in_features=observation_size, out_features=action_size, num_cells=list(hidden), activation_class=nn.Tanh)
     nn.init.orthogonal_(net[-1].weight, gain=0.01)
     nn.init.zeros_(net[-1].bias)
     scale = AddStateIndependentNormalScale(action_size, init_value=log_std)

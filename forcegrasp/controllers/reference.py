@@ -16,11 +16,9 @@ class Constant(TensorDictModuleBase):
       value: the action of both fingers, in [−1, 1]; −1 closes at full speed.
     """
 
-    in_keys = ["had_contact"]
-    out_keys = ["action"]
-
     def __init__(self, value: float) -> None:
         super().__init__()
+        self.in_keys, self.out_keys = ["had_contact"], ["action"]
         self.value = value
 
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
@@ -34,8 +32,9 @@ class Informed(TensorDictModuleBase):
     simulator, hence a = −f_goal / (0.30 N · f_α).
     """
 
-    in_keys = ["had_contact", "goal_force", "grasp_parameters"]
-    out_keys = ["action"]
+    def __init__(self) -> None:
+        super().__init__()
+        self.in_keys, self.out_keys = ["had_contact", "goal_force", "grasp_parameters"], ["action"]
 
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
         touched, goal, parameters = (tensordict.get(key) for key in self.in_keys)

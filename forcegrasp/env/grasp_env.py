@@ -34,8 +34,8 @@ OBSERVATIONS = {
 class GraspEnv(EnvBase):
     """``n`` grasps at once. Action: ``joint_delta``, u = Δq_des in metres, ``(n, 2)``; see :data:`OBSERVATIONS`.
 
-    The reward is α₁ r_force + α₂ r_obj of paper eq. 10, from the true state; r_act needs the policy's own actions and is
-    added by :class:`~forcegrasp.transforms.ActionChangePenalty`. An episode is truncated, never terminated.
+    The reward is α₁ r_force + α₂ r_obj of paper eq. 10, from the true state; r_act needs the policy's own actions and
+    is added by :class:`~forcegrasp.transforms.ActionChangePenalty`. An episode is truncated, never terminated.
 
     Args:
       n: number of grasps, the batch size.
@@ -70,16 +70,16 @@ class GraspEnv(EnvBase):
         self._make_specs(n)
 
     def _make_specs(self, n: int) -> None:
-        self.action_spec = Composite(joint_delta=Bounded(-OPEN_M, OPEN_M, shape=(n, 2), dtype=torch.float32), shape=(n,))
+        self.action_spec = Composite(
+            joint_delta=Bounded(-OPEN_M, OPEN_M, shape=(n, 2), dtype=torch.float32), shape=(n,)
+        )
         self.observation_spec = Composite(shape=(n,))
         for key, (size, _) in OBSERVATIONS.items():
             self.observation_spec[key] = Unbounded(shape=(n, size), dtype=torch.float32)
         self.observation_spec["reward_terms"].shape = (n,)
         self.reward_spec = Unbounded(shape=(n, 1), dtype=torch.float32)
         flag = Categorical(2, shape=(n, 1), dtype=torch.bool)
-        self.full_done_spec = Composite(
-            done=flag.clone(), terminated=flag.clone(), truncated=flag.clone(), shape=(n,)
-        )
+        self.full_done_spec = Composite(done=flag.clone(), terminated=flag.clone(), truncated=flag.clone(), shape=(n,))
 
     def _set_seed(self, seed: int | None) -> None:
         self.rng = np.random.default_rng(seed)

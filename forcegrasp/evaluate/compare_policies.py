@@ -24,12 +24,13 @@ from forcegrasp.evaluate.plots import force_traces, reward_boxes
 from forcegrasp.evaluate.rollouts import kappa_grid, roll_out
 from forcegrasp.runs.policy import load_policy
 
+#: Figures that are printed: name, heading (escaped for rich), digits.
 TABLE = (
-    ("force_reward_normalised", "force reward,\nnormalised form", 1),
-    ("force_reward_paper", "force reward,\npaper's form", 1),
-    ("displacement_until_grasped_mm", "object moved until\nboth touch [mm]", 3),
-    ("displacement_total_mm", "object moved\nin all [mm]", 3),
-    ("fast_steps", "steps over\nthe threshold", 2),
+    ("force_reward_normalised", "force reward of 150,\nnormalised form", 1),
+    ("force_reward_paper", "force reward of 150,\npaper's form", 1),
+    ("displacement_until_grasped_mm", "object moved until\nboth touch, mm", 3),
+    ("displacement_total_mm", "object moved\nin all, mm", 3),
+    ("fast_steps", "steps over the\nspeed threshold", 2),
 )
 
 
@@ -82,13 +83,13 @@ def evaluate(config: EvaluateConfig, out: Path, console: Console | None = None) 
         episodes = roll_out(
             contestant.policy,
             grasps,
+            config.grasp,
+            config.seed,
             physics=config.physics,
-            grasp=config.grasp,
             sensors=config.sensors,
             reward=config.reward,
             action=contestant.action,
             observation=contestant.observation,
-            seed=config.seed,
         )
         summary = summarise(episodes, config.sensors.contact_threshold_n)
         figures[contestant.name] = {k: v.double().numpy().reshape(len(kappas), -1) for k, v in summary.items()}
@@ -144,23 +145,29 @@ def _write_trials(path: Path, grasps: np.ndarray, figures: dict[str, dict[str, n
 
 
 def _print(report: dict, console: Console) -> None:
-    table = Table(title="mean ± standard deviation over all grasps [95 % interval of the mean]")
-    table.add_column("policy")
-    for _, heading, _ in TABLE:
-        table.add_column(heading, justify="right")
-    for name, figures in report["policies"].items():
-        cells = [figures[figure] | {"digits": digits} for figure, _, digits in TABLE]
+    """Two tables that fit a narrow terminal: all grasps together, and by softness."""
+    policies = report["policies"]
+    table = Table(title="mean over all grasps ± standard deviation [95 % interval of the mean]")
+    table.add_column("figure")
+    for name in policies:
+        table.add_column(name, justify="right", overflow="fold")
+    for figure, heading, digits in TABLE:
+        cells = (values[figure] for values in policies.values())
         table.add_row(
-            name,
-            *("{mean:.{digits}f} ± {std:.{digits}f}\n[{low:.{digits}f}, {high:.{digits}f}]".format(**c) for c in cells),
+            heading,
+            *(
+                f"{c['mean']:.{digits}f} ± {c['std']:.{digits}f}\n[{c['low']:.{digits}f}, {c['high']:.{digits}f}]"
+                for c in cells
+            ),
         )
     console.print(table)
     for figure, heading, digits in TABLE[:3]:
-        table = Table(title=f"{' '.join(heading.split())}, mean by softness κ [half width of its 95 % interval]")
-        table.add_column("policy")
-        for kappa in report["kappas"]:
-            table.add_column(f"{kappa:.2g}", justify="right")
-        for name, figures in report["policies"].items():
-            cells = figures[figure]["by_kappa"]
-            table.add_row(name, *(f"{c['mean']:.{digits}f}\n±{(c['high'] - c['low']) / 2:.{digits}f}" for c in cells))
+        table = Table(title=f"{' '.join(heading.split())}: mean ± half of its 95 % interval")
+        table.add_column("κ", justify="right")
+        for name in policies:
+            table.add_column(name, justify="right", overflow="fold")
+        for index, kappa in enumerate(report["kappas"]):
+            cells = [values[figure]["by_kappa"][index] for values in policies.values()]
+            spans = (f"{c['mean']:.{digits}f} ± {(c['high'] - c['low']) / 2:.{digits}f}" for c in cells)
+            table.add_row(f"{kappa:.3g}", *spans)
         console.print(table)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import Any
 
 import numpy as np
 import torch
@@ -10,7 +11,7 @@ from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 from torchrl.envs.utils import ExplorationType, set_exploration_type
 
-from forcegrasp.config import ActionConfig, GraspConfig, ObservationConfig, PhysicsConfig, RewardConfig, SensorConfig
+from forcegrasp.config import GraspConfig
 from forcegrasp.env import build_env
 from forcegrasp.physics import FixedGrasps, GraspParameters, GraspSampler
 
@@ -33,38 +34,28 @@ def kappa_grid(grasp: GraspConfig, kappas: int, trials: int, seed: int) -> Grasp
 
 
 def roll_out(
-    policy: TensorDictModuleBase,
-    grasps: GraspParameters,
-    *,
-    physics: PhysicsConfig,
-    grasp: GraspConfig,
-    sensors: SensorConfig,
-    reward: RewardConfig,
-    action: ActionConfig,
-    observation: ObservationConfig | None = None,
-    seed: int = 0,
+    policy: TensorDictModuleBase, grasps: GraspParameters, grasp: GraspConfig, seed: int = 0, **parts: Any
 ) -> TensorDictBase:
     """Runs one deterministic episode of every grasp and returns them whole, batch ``(n, T)``.
+
+    Args:
+      policy: reads and writes tensordicts; a policy with a state brings its ``make_tensordict_primer()``.
+      grasps: what to grasp.
+      grasp: tells the length of an episode.
+      seed: seed of the sensor noise.
+      **parts: the rest of the environment's configuration, see :func:`~forcegrasp.env.build_env`.
 
     Raises:
       PhysicsError: if a grasp diverged.
     """
-    parts = []
+    episodes = []
     for first in range(0, len(grasps), BATCH):
         chunk = grasps[np.arange(first, min(first + BATCH, len(grasps)))]
-        env = build_env(
-            len(chunk),
-            physics=physics,
-            grasp=grasp,
-            sensors=sensors,
-            observation=observation,
-            action=action,
-            reward=reward,
-            sampler=FixedGrasps(chunk),
-            seed=seed + first,
-        )
+        env = build_env(len(chunk), grasp=grasp, sampler=FixedGrasps(chunk), seed=seed + first, **parts)
         if hasattr(policy, "make_tensordict_primer"):
             env.append_transform(policy.make_tensordict_primer())
         with torch.no_grad(), set_exploration_type(ExplorationType.DETERMINISTIC):
-            parts.append(env.rollout(grasp.steps, policy, break_when_any_done=False).exclude("observation", ("next", "observation")))
-    return torch.cat(parts)
+            rollout = env.rollout(grasp.steps, policy, break_when_any_done=False)
+        # the stacked observation is most of the memory, and nobody looks at it afterwards
+        episodes.append(rollout.exclude("observation", ("next", "observation")))
+    return torch.cat(episodes)

@@ -19,7 +19,7 @@ WIDTH, HEIGHT = 400, 320
 _BACKENDS = {"linux": ("egl", "osmesa"), "darwin": ("cgl",)}
 
 
-class NoRenderer(Exception):
+class NoRendererError(Exception):
     """This machine can't render; the message says what would help."""
 
 
@@ -32,7 +32,7 @@ def grasp_video(episode: TensorDictBase, tier: str, every: int = 2) -> bytes:
       every: control steps per picture.
 
     Raises:
-      NoRenderer: where there is no OpenGL.
+      NoRendererError: where there is no OpenGL.
     """
     from forcegrasp.evaluate.plots import draw_episode, figure_pixels
 
@@ -52,7 +52,7 @@ def grasp_video(episode: TensorDictBase, tier: str, every: int = 2) -> bytes:
             subprocess.run(command, env=environment, cwd=folder, capture_output=True, check=False)
             if target.exists():
                 return target.read_bytes()
-    raise NoRenderer("no OpenGL without a display; install libegl1 or libosmesa6 (Debian's names) to get videos")
+    raise NoRendererError("no OpenGL without a display; install libegl1 or libosmesa6 (Debian's names) to get videos")
 
 
 def _render(source: Path, target: Path, tier: str, every: int) -> None:

@@ -38,7 +38,9 @@ def write(path: Path, tensors: dict[str, Tensor], facts: dict[str, Any]) -> None
         os.replace(part, path)
     except OSError as error:
         part.unlink(missing_ok=True)
-        raise CheckpointError(f"{path}: could not save the checkpoint ({error.strerror}); free space or set hydra.run.dir") from error
+        raise CheckpointError(
+            f"{path}: could not save the checkpoint ({error.strerror}); free space or set hydra.run.dir"
+        ) from error
 
 
 def read(path: Path) -> tuple[dict[str, Tensor], dict[str, Any]]:
@@ -50,12 +52,14 @@ def read(path: Path) -> tuple[dict[str, Tensor], dict[str, Any]]:
     try:
         with safe_open(path, framework="pt") as file:
             header = file.metadata() or {}
-            tensors = {name: file.get_tensor(name) for name in file.keys()}
+            tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
         facts = json.loads(header["facts"])
     except (OSError, SafetensorError, KeyError, ValueError) as error:
         raise CheckpointError(f"{path}: not a readable checkpoint ({error}); remove it to use an older one") from error
     if header.get("sha256") != _digest(tensors, header["facts"]):
-        raise CheckpointError(f"{path}: checksum differs, the file was changed or damaged; remove it to use an older one")
+        raise CheckpointError(
+            f"{path}: checksum differs, the file was changed or damaged; remove it to use an older one"
+        )
     return tensors, facts
 
 

@@ -21,7 +21,9 @@ def load_policy(path: Path | str) -> tuple[TensorDictModuleBase, TrainConfig]:
     run = RunDir.open(path)
     config = run.config()
     tensors, _ = run.load()
-    policy = make_policy(2 * len(config.observation.parts) * config.observation.frames, config.ppo.hidden, config.ppo.log_std)
+    policy = make_policy(
+        2 * len(config.observation.parts) * config.observation.frames, config.ppo.hidden, config.ppo.log_std
+    )
     weights = {name.removeprefix("policy."): t for name, t in tensors.items() if name.startswith("policy.")}
     try:
         policy.load_state_dict(weights)

@@ -51,7 +51,9 @@ class RunDir:
         """
         run = cls(path)
         if run.config_path.exists():
-            raise CheckpointError(f"{run.path}: already holds a run; continue it with resume={run.path}, or name another")
+            raise CheckpointError(
+                f"{run.path}: already holds a run; continue it with resume={run.path}, or name another"
+            )
         try:
             for folder in (run.checkpoints, run.tensorboard, run.figures):
                 folder.mkdir(parents=True, exist_ok=True)
@@ -72,7 +74,9 @@ class RunDir:
         if not run.path.is_dir():
             raise CheckpointError(f"{run.path}: no such run directory")
         if not run.config_path.is_file():
-            raise CheckpointError(f"{run.path}: not a run directory (no config.yaml); a run is what forcegrasp train wrote")
+            raise CheckpointError(
+                f"{run.path}: not a run directory (no config.yaml); a run is what forcegrasp train wrote"
+            )
         return run
 
     def config(self) -> TrainConfig:
@@ -166,8 +170,11 @@ def _git_hash() -> str | None:
     root = Path(__file__).parents[2]
     if not (root / ".git").exists():
         return None
+
+    def git(*arguments: str) -> str:
+        return subprocess.run(["git", *arguments], cwd=root, capture_output=True, text=True, check=True).stdout.strip()
+
     try:
-        run = lambda *args: subprocess.run(["git", *args], cwd=root, capture_output=True, text=True, check=True).stdout
-        return run("rev-parse", "HEAD").strip() + ("+" if run("status", "--porcelain").strip() else "")
+        return git("rev-parse", "HEAD") + ("+" if git("status", "--porcelain") else "")
     except (OSError, subprocess.CalledProcessError):
         return None

@@ -11,7 +11,7 @@ from torch.utils.tensorboard import SummaryWriter
 
 from forcegrasp.config import TrainConfig
 from forcegrasp.evaluate.plots import force_traces
-from forcegrasp.evaluate.video import NoRenderer, grasp_video
+from forcegrasp.evaluate.video import NoRendererError, grasp_video
 from forcegrasp.runs.run_dir import RunDir
 
 #: Episodes drawn in a figure of force traces.
@@ -62,7 +62,7 @@ class TrainingLog:
         path = self.run.figures / f"grasp_{frames:012d}.gif"
         try:
             data = grasp_video(episode, self.config.physics.tier)
-        except NoRenderer as error:
+        except NoRendererError as error:
             print(f"forcegrasp: no video: {error}", file=sys.stderr)
             return None
         path.write_bytes(data)

@@ -125,7 +125,10 @@ def train(config: TrainConfig, run: RunDir, resume: bool = False) -> bool:
             values = trainer.curriculum.apply(trainer.frames)
             batch = next(batches)
             collected = time.perf_counter()
-            figures = {name: float(value.mean()) for name, value in summarise(batch, config.sensors.contact_threshold_n).items()}
+            figures = {
+                name: float(value.mean())
+                for name, value in summarise(batch, config.sensors.contact_threshold_n).items()
+            }
             rate = trainer.ppo.set_progress(trainer.frames / total)
             losses = trainer.ppo.update(batch, trainer.shuffle)
             ended = time.perf_counter()
@@ -187,7 +190,9 @@ def _progress(total: int, done: int):
         TextColumn("training"),
         BarColumn(),
         MofNCompleteColumn(),
-        TextColumn("frames · force reward {task.fields[reward]:5.1f} of 150 · object moved {task.fields[moved]:.2f} mm ·"),
+        TextColumn(
+            "frames · force reward {task.fields[reward]:5.1f} of 150 · object moved {task.fields[moved]:.2f} mm ·"
+        ),
         TimeRemainingColumn(),
     ]
     with Progress(*columns) as bar:

@@ -23,7 +23,9 @@ class Value(nn.Module):
     def __init__(self, observation_size: int, hidden: list[int], discount: float, privileged: bool) -> None:
         super().__init__()
         extra = len(_MIDDLE) + 5 if privileged else 0
-        self.net = MLP(in_features=observation_size + extra, out_features=1, num_cells=list(hidden), activation_class=nn.Tanh)
+        self.net = MLP(
+            in_features=observation_size + extra, out_features=1, num_cells=list(hidden), activation_class=nn.Tanh
+        )
         self.horizon = 1 / max(1 - discount, 1e-3)
         self.register_buffer("middle", torch.tensor(_MIDDLE), persistent=False)
         self.register_buffer("half_width", torch.tensor(_HALF), persistent=False)
@@ -105,7 +107,7 @@ class PPO:
             for ids in order.split(size):
                 losses = self.loss(flat[ids])
                 objective = losses["loss_objective"] + losses["loss_critic"] / self.horizon**2
-                if "loss_entropy" in losses.keys():
+                if "loss_entropy" in losses:
                     objective = objective + losses["loss_entropy"]
                 self.optimizer.zero_grad(set_to_none=True)
                 objective.backward()
@@ -114,7 +116,7 @@ class PPO:
                 self.optimizer.step()
                 count += 1
                 for name in ("loss_objective", "loss_critic", "kl_approx", "clip_fraction", "ESS"):
-                    if name in losses.keys():
+                    if name in losses:
                         sums[name] = sums.get(name, 0.0) + losses[name].detach()
         return {name: float(total) / count for name, total in sums.items()}
 

@@ -18,7 +18,9 @@ class ActionScale(Transform):
       action_key: what the policy gives, ``(*B, 2)``. It is stored as the policy gave it.
     """
 
-    def __init__(self, max_delta: float, delta_key: NestedKey = "joint_delta", action_key: NestedKey = "action") -> None:
+    def __init__(
+        self, max_delta: float, delta_key: NestedKey = "joint_delta", action_key: NestedKey = "action"
+    ) -> None:
         super().__init__(in_keys_inv=[delta_key], out_keys_inv=[action_key])
         self.max_delta = max_delta
 

@@ -37,7 +37,9 @@ class HadContact(Transform):
         return tensordict_reset.set(self.out_keys[0], torch.zeros_like(tensordict_reset.get(self.in_keys[0])))
 
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
-        raise RuntimeError("HadContact needs the step before: append it to an environment, it can't work on single frames")
+        raise RuntimeError(
+            "HadContact needs the step before: append it to an environment, it can't work on single frames"
+        )
 
     def transform_observation_spec(self, observation_spec: Composite) -> Composite:
         force = observation_spec[self.in_keys[0]]

@@ -31,7 +31,9 @@ class LastAction(Transform):
         return tensordict_reset.set(self.out_keys[0], torch.zeros_like(tensordict_reset.get(self.in_keys[0])))
 
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
-        raise RuntimeError("LastAction needs the step before: append it to an environment, it can't work on single frames")
+        raise RuntimeError(
+            "LastAction needs the step before: append it to an environment, it can't work on single frames"
+        )
 
     def transform_observation_spec(self, observation_spec: Composite) -> Composite:
         like = observation_spec[self.in_keys[0]]
