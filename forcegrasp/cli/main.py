@@ -51,6 +51,9 @@ def main(arguments: list[str] | None = None) -> int:
     except ForcegraspError as error:
         print(f"forcegrasp: {error}", file=sys.stderr)
         return 2
+    except OSError as error:
+        print(f"forcegrasp: {error.filename or 'file system'}: {error.strerror or error}", file=sys.stderr)
+        return 2
     except KeyboardInterrupt:
         print("forcegrasp: interrupted", file=sys.stderr)
         return 130

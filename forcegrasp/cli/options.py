@@ -19,11 +19,17 @@ def compose(verb: str, overrides: list[str]) -> Any:
     Raises:
       ConfigError: if an option is unknown, of the wrong type, or out of its range.
     """
+    return compose_run(verb, overrides)[0]
+
+
+def compose_run(verb: str, overrides: list[str]) -> tuple[Any, str]:
+    """Like :func:`compose`, and also returns where Hydra would put the run (``hydra.run.dir``)."""
     from hydra import compose as hydra_compose
     from hydra import initialize_config_module
     from hydra.core.global_hydra import GlobalHydra
+    from hydra.core.hydra_config import HydraConfig
     from hydra.errors import HydraException
-    from omegaconf import OmegaConf
+    from omegaconf import OmegaConf, open_dict
     from omegaconf.errors import OmegaConfBaseException
 
     register_schemas()
@@ -32,12 +38,16 @@ def compose(verb: str, overrides: list[str]) -> Any:
     GlobalHydra.instance().clear()
     try:
         with initialize_config_module("forcegrasp.conf", version_base="1.3"):
-            composed = hydra_compose(verb, overrides=overrides)
+            composed = hydra_compose(verb, overrides=overrides, return_hydra_config=True)
+        HydraConfig.instance().set_config(composed)
+        run_dir = str(composed.hydra.run.dir)
+        with open_dict(composed):
+            del composed.hydra
         config = OmegaConf.to_object(composed)
     except (HydraException, OmegaConfBaseException) as error:
         raise ConfigError(_one_line(error)) from error
     validate(config)
-    return config
+    return config, run_dir
 
 
 def register_schemas() -> None:

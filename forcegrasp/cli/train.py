@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from pathlib import Path
 
-from forcegrasp.cli.options import compose, help_text, register_schemas
-from forcegrasp.errors import ConfigError, ForcegraspError
+from forcegrasp.cli.options import compose, compose_run, help_text
+from forcegrasp.errors import ConfigError
 
 PURPOSE = "learn a grasp-force policy with PPO"
 NOTES = """
@@ -33,9 +34,45 @@ def main(arguments: list[str]) -> int:
                 f"resume= goes on with the run's own configuration; drop {' '.join(overrides + multirun) or 'one'}"
             )
         return _resume(Path(resume[0].partition("=")[2]))
-    for single in _single_runs(overrides) if multirun else [overrides]:
+    return _sweep(overrides) if multirun else _run(overrides)
+
+
+def _run(overrides: list[str]) -> int:
+    config, run_dir = compose_run("train", overrides)
+
+    from forcegrasp.runs.run_dir import RunDir
+
+    return _train(config, RunDir.create(run_dir, config, overrides), resume=False)
+
+
+def _sweep(overrides: list[str]) -> int:
+    for single in _single_runs(overrides):
         compose("train", single)  # refuses bad input before anything is written
-    return _start(overrides, bool(multirun))
+    import hydra
+    from hydra.core.global_hydra import GlobalHydra
+    from omegaconf import DictConfig
+
+    GlobalHydra.instance().clear()
+    os.environ["HYDRA_FULL_ERROR"] = "1"  # exceptions reach the caller, who says it in one line
+
+    @hydra.main(version_base="1.3", config_path="pkg://forcegrasp.conf", config_name="train")
+    def job(composed: DictConfig) -> int:
+        return _sweep_job(composed)
+
+    sys.argv = ["forcegrasp train", "-m", *overrides]
+    job()
+    return 0
+
+
+def _sweep_job(composed) -> int:
+    from hydra.core.hydra_config import HydraConfig
+    from omegaconf import OmegaConf
+
+    from forcegrasp.runs.run_dir import RunDir
+
+    hydra, config = HydraConfig.get(), OmegaConf.to_object(composed)
+    run = RunDir.create(hydra.runtime.output_dir, config, list(hydra.overrides.task))
+    return _train(config, run, resume=False)
 
 
 def _single_runs(overrides: list[str]) -> list[list[str]]:
@@ -58,38 +95,6 @@ def _single_runs(overrides: list[str]) -> list[list[str]]:
     for index, values in enumerate(swept):
         runs += [fixed + first[:index] + [value] + first[index + 1 :] for value in values[1:]]
     return runs
-
-
-def _start(overrides: list[str], multirun: bool) -> int:
-    import hydra
-    from omegaconf import DictConfig
-
-    register_schemas()
-    outcomes: list[int | ForcegraspError] = []
-
-    @hydra.main(version_base="1.3", config_path="pkg://forcegrasp.conf", config_name="train")
-    def job(composed: DictConfig) -> None:
-        outcomes.append(_run_job(composed))
-
-    sys.argv = ["forcegrasp train", *(["-m"] if multirun else []), *overrides]
-    job()
-    return max(outcomes, default=0)
-
-
-def _run_job(composed) -> int:
-    from hydra.core.hydra_config import HydraConfig
-    from omegaconf import OmegaConf
-
-    from forcegrasp.runs.run_dir import RunDir
-
-    config = OmegaConf.to_object(composed)
-    hydra = HydraConfig.get()
-    try:
-        run = RunDir.create(hydra.runtime.output_dir, config, list(hydra.overrides.task))
-        return _train(config, run, resume=False)
-    except ForcegraspError as error:
-        print(f"forcegrasp: {error}", file=sys.stderr)
-        return 2
 
 
 def _resume(path: Path) -> int:

@@ -28,7 +28,8 @@ def write(path: Path, tensors: dict[str, Tensor], facts: dict[str, Any]) -> None
       CheckpointError: if the disk is full or not writable; an older file of that name is left as it was.
     """
     text = json.dumps(facts, sort_keys=True)
-    data = save(tensors, metadata={"facts": text, "sha256": _digest(tensors, text)})
+    # One entry: safetensors writes several in random order, and equal checkpoints should be equal files.
+    data = save(tensors, metadata={"forcegrasp": json.dumps({"facts": text, "sha256": _digest(tensors, text)})})
     part = path.with_suffix(".part")
     try:
         with open(part, "wb") as file:
@@ -51,12 +52,12 @@ def read(path: Path) -> tuple[dict[str, Tensor], dict[str, Any]]:
     """
     try:
         with safe_open(path, framework="pt") as file:
-            header = file.metadata() or {}
+            header = json.loads((file.metadata() or {})["forcegrasp"])
             tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
-        facts = json.loads(header["facts"])
+        facts, digest = json.loads(header["facts"]), header["sha256"]
     except (OSError, SafetensorError, KeyError, ValueError) as error:
         raise CheckpointError(f"{path}: not a readable checkpoint ({error}); remove it to use an older one") from error
-    if header.get("sha256") != _digest(tensors, header["facts"]):
+    if digest != _digest(tensors, header["facts"]):
         raise CheckpointError(
             f"{path}: checksum differs, the file was changed or damaged; remove it to use an older one"
         )
