@@ -179,6 +179,10 @@ class PPOConfig:
         [50, 50], "width of each hidden layer, policy and value alike", source="authors' code", low=1, high=10_000
     )
     log_std: float = option(-0.5, "logarithm of the policy's initial standard deviation", low=-10, high=2)
+    initial_action: float = option(
+        -0.5, "the policy's mean action at the start: closing, lest training never meets the object", low=-1, high=1
+    )
+    mirrored: bool = option(True, "one policy network for both fingers, each from its own side; else one for the pair")
     critic: str = option(
         "privileged",
         "what the value network sees while training: the policy's observation, or also the grasp's true state",
@@ -192,7 +196,7 @@ class LogConfig:
 
     histograms_every: int = option(5, "batches between histograms of actions and forces", low=0, high=10**9)
     figures_every: int = option(20, "batches between figures of force traces", low=0, high=10**9)
-    video_every: int = option(0, "batches between videos; one is made at the end if not 0", low=0, high=10**9)
+    video_every: int = option(40, "batches between videos; one is made at the end, too", low=0, high=10**9)
     checkpoint_every: int = option(10, "batches between checkpoints", low=1, high=10**9)
     keep: int = option(3, "newest checkpoints kept", low=1, high=10**6)
 

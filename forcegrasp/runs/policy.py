@@ -21,9 +21,8 @@ def load_policy(path: Path | str) -> tuple[TensorDictModuleBase, TrainConfig]:
     run = RunDir.open(path)
     config = run.config()
     tensors, _ = run.load()
-    policy = make_policy(
-        2 * len(config.observation.parts) * config.observation.frames, config.ppo.hidden, config.ppo.log_std
-    )
+    size = 2 * len(config.observation.parts) * config.observation.frames
+    policy = make_policy(size, config.ppo)
     weights = {name.removeprefix("policy."): t for name, t in tensors.items() if name.startswith("policy.")}
     try:
         policy.load_state_dict(weights)

@@ -23,6 +23,7 @@ class TrainingLog:
 
     def __init__(self, run: RunDir, config: TrainConfig, frames: int) -> None:
         self.run, self.config = run, config
+        self._told_no_renderer = False
         run.drop_metrics_after(frames)
         self.writer = SummaryWriter(str(run.tensorboard), purge_step=frames + 1 if frames else None)
         if not frames:
@@ -63,7 +64,9 @@ class TrainingLog:
         try:
             data = grasp_video(episode, self.config.physics.tier)
         except NoRendererError as error:
-            print(f"forcegrasp: no video: {error}", file=sys.stderr)
+            if not self._told_no_renderer:
+                print(f"forcegrasp: no video: {error}", file=sys.stderr)
+            self._told_no_renderer = True
             return None
         path.write_bytes(data)
         _add_gif(self.writer, "grasps/video", data, frames)

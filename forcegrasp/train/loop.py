@@ -21,7 +21,7 @@ from forcegrasp.env import build_env
 from forcegrasp.env.episodes import summarise
 from forcegrasp.runs.run_dir import RunDir
 from forcegrasp.train.logging import TrainingLog
-from forcegrasp.train.ppo import PPO, make_value
+from forcegrasp.train.ppo import PPO, entropy, make_value
 
 
 class Trainer:
@@ -53,7 +53,7 @@ class Trainer:
         schedule = LinearSchedule(config.curriculum, config.grasp, config.reward, config.ppo.total_frames)
         self.curriculum = CurriculumHook(schedule, self.env)
         size = self.env.observation_spec["observation"].shape[-1]
-        self.policy = make_policy(size, config.ppo.hidden, config.ppo.log_std)
+        self.policy = make_policy(size, config.ppo)
         self.value = make_value(size, config.ppo)
         self.ppo = PPO(self.policy, self.value, config.ppo)
 
@@ -139,7 +139,12 @@ def train(config: TrainConfig, run: RunDir, resume: bool = False) -> bool:
             groups = {
                 "episode": {"return": float(batch["next", "reward"].sum((1, 2)).mean()), **figures},
                 "reward": {name: float(terms[name].mean()) for name in sorted(terms.keys())},
-                "ppo": {**losses, "learning_rate": rate, "action_std": float(batch["scale"].mean())},
+                "ppo": {
+                    **losses,
+                    "learning_rate": rate,
+                    "action_std": float(batch["scale"].mean()),
+                    "entropy": float(entropy(batch["scale"])),
+                },
                 "curriculum": values.scalars(),
                 "speed": {
                     "frames_per_s": batch.numel() / (ended - started),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import torch
 from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModule, TensorDictModuleBase
@@ -48,6 +50,8 @@ class Value(nn.Module):
         return self.horizon * self.net(observation)
 
 
+#: What an update reports, by the names of torchrl's loss.
+DIAGNOSTICS = ("loss_objective", "loss_critic", "kl_approx", "clip_fraction", "ESS")
 PRIVILEGED = ["grasp_parameters", "force", "joint_position", "object_position"]
 
 
@@ -56,6 +60,11 @@ def make_value(observation_size: int, config: PPOConfig) -> TensorDictModule:
     privileged = config.critic == "privileged"
     net = Value(observation_size, config.hidden, config.discount, privileged)
     return TensorDictModule(net, in_keys=["observation", *(PRIVILEGED if privileged else [])], out_keys=["state_value"])
+
+
+def entropy(scale: Tensor) -> Tensor:
+    """Mean differential entropy of the policy's Gaussian, in nats, from its standard deviations ``(*B, 2)``."""
+    return (scale.log() + 0.5 * math.log(2 * math.pi * math.e)).sum(-1).mean()
 
 
 class PPO:
@@ -94,31 +103,26 @@ class PPO:
         """Improves both networks on a batch ``(n, T)`` of whole episodes; returns the mean of each diagnostic."""
         with torch.no_grad():
             self.advantage(batch)
-        advantage = batch.get("advantage")
-        batch.set("advantage", (advantage - advantage.mean()) / (advantage.std() + 1e-8))
-        # value errors in units of the horizon, else they dwarf everything else
-        keys = {*self.loss.in_keys, "advantage", "value_target", "state_value"} - {"reward", "done", "terminated"}
-        flat = batch.select(*[k for k in keys if not isinstance(k, tuple)], strict=False).reshape(-1).contiguous()
-        size = min(self.config.minibatch, flat.shape[0])
-        sums: dict[str, float] = {}
-        count = 0
+        frames = batch.select(*self.value.in_keys, "action", "action_log_prob", "advantage", "value_target").reshape(-1)
+        advantage = frames["advantage"]
+        frames["advantage"] = (advantage - advantage.mean()) / (advantage.std() + 1e-8)
+        sums = dict.fromkeys(DIAGNOSTICS, torch.zeros(()))
+        updates = 0
         for _ in range(self.config.epochs):
-            order = torch.randperm(flat.shape[0], generator=generator)
-            for ids in order.split(size):
-                losses = self.loss(flat[ids])
+            for ids in torch.randperm(len(frames), generator=generator).split(self.config.minibatch):
+                losses = self.loss(frames[ids])
+                # value errors in units of the horizon: in units of reward they would drown the policy's
                 objective = losses["loss_objective"] + losses["loss_critic"] / self.horizon**2
-                if "loss_entropy" in losses:
+                if self.config.entropy_weight:
                     objective = objective + losses["loss_entropy"]
                 self.optimizer.zero_grad(set_to_none=True)
                 objective.backward()
                 for net in (self.policy, self.value):
                     nn.utils.clip_grad_norm_(net.parameters(), self.config.max_grad_norm)
                 self.optimizer.step()
-                count += 1
-                for name in ("loss_objective", "loss_critic", "kl_approx", "clip_fraction", "ESS"):
-                    if name in losses:
-                        sums[name] = sums.get(name, 0.0) + losses[name].detach()
-        return {name: float(total) / count for name, total in sums.items()}
+                updates += 1
+                sums = {name: total + losses[name].detach() for name, total in sums.items()}
+        return {name: float(total) / updates for name, total in sums.items()}
 
     @property
     def horizon(self) -> float:
