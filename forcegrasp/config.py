@@ -101,21 +101,21 @@ class ActionConfig:
     """What the policy commands."""
 
     max_delta_m: float = option(0.003, "largest position delta Δq_max", unit="m", source="paper", low=1e-5, high=0.045)
-    inductive_bias: bool = option(True, "scale actions by φ of the contact state", source="paper, eq. 6")
+    inductive_bias: bool = option(True, "scale actions by φ of the contact state", source="paper, eq. 7")
     bias_one_contact: float = option(
-        0.1, "φ of a finger that waits for the other", source="paper, eq. 6", low=0, high=1
+        0.1, "φ of a finger that waits for the other", source="paper, eq. 7", low=0, high=1
     )
-    bias_floor: float = option(0.9, "smallest φ with both fingers in contact", source="paper, eq. 6", low=0, high=1)
+    bias_floor: float = option(0.9, "smallest φ with both fingers in contact", source="paper, eq. 7", low=0, high=1)
 
 
 @dataclass
 class RewardConfig:
-    """r = α₁ r_force + α₂ r_obj + α₃ r_act (paper, eqs. 7-10)."""
+    """r = α₁ r_force + α₂ r_obj + α₃ r_act (paper, eqs. 8-11)."""
 
     form: str = option(
         "paper",
         "r_force = 1 - tanh(Σ|Δf|) (paper) or 1 - tanh(Σ|Δf| / f_goal) (goal_normalised, authors' code)",
-        source="paper, eq. 7",
+        source="paper, eq. 8",
         choices=("paper", "goal_normalised"),
     )
     force_weight: float = option(1.0, "α₁", source="authors' code", low=0, high=1000)
@@ -182,7 +182,7 @@ class PPOConfig:
     initial_action: float = option(
         -0.5, "the policy's mean action at the start: closing, lest training never meets the object", low=-1, high=1
     )
-    mirrored: bool = option(True, "one policy network for both fingers, each from its own side; else one for the pair")
+    mirrored: bool = option(True, "average the policy with its mirror image, so that it treats both fingers alike")
     critic: str = option(
         "privileged",
         "what the value network sees while training: the policy's observation, or also the grasp's true state",

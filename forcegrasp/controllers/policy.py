@@ -12,13 +12,14 @@ from forcegrasp.config import PPOConfig
 FINGERS = 2
 
 
-class MirroredFingers(nn.Module):
-    """One network for both fingers. The left one sees the observation as it is, the right one with sides swapped.
+class Mirrored(nn.Module):
+    """Averages a network with its own mirror image: with left and right swapped at its input and back at its output.
 
-    The gripper is its own mirror image; a policy that is too can't push the object steadily to one side.
+    The gripper is its own mirror image. A policy that is too treats both fingers alike, and can't push the
+    object steadily to one side.
 
     Args:
-      net: ``(*B, observation) -> (*B, 1)``, one finger's action from its own view.
+      net: ``(*B, 2k) -> (*B, 2)``, where inputs and outputs are pairs (left, right).
     """
 
     def __init__(self, net: nn.Module) -> None:
@@ -26,9 +27,10 @@ class MirroredFingers(nn.Module):
         self.net = net
 
     def forward(self, observation: Tensor) -> Tensor:
-        """Every part of the observation is a pair (left, right), ``(*B, 2k)``; returns both actions, ``(*B, 2)``."""
+        """Both actions, ``(*B, 2)``."""
         swapped = observation.unflatten(-1, (-1, FINGERS)).flip(-1).flatten(-2)
-        return self.net(torch.stack([observation, swapped], dim=-2)).squeeze(-1)
+        own, mirrored = self.net(torch.stack([observation, swapped])).unbind(0)
+        return (own + mirrored.flip(-1)) / 2
 
 
 def make_policy(observation_size: int, config: PPOConfig) -> ProbabilisticActor:
@@ -39,15 +41,14 @@ def make_policy(observation_size: int, config: PPOConfig) -> ProbabilisticActor:
 
     Args:
       observation_size: length of the stacked observation.
-      config: size of the network, initial mean and deviation, and whether it is :class:`MirroredFingers`.
+      config: size of the network, initial mean and deviation, and whether it is :class:`Mirrored`.
     """
-    outputs = 1 if config.mirrored else FINGERS
     net = MLP(
-        in_features=observation_size, out_features=outputs, num_cells=list(config.hidden), activation_class=nn.Tanh
+        in_features=observation_size, out_features=FINGERS, num_cells=list(config.hidden), activation_class=nn.Tanh
     )
     nn.init.orthogonal_(net[-1].weight, gain=0.01)
     nn.init.constant_(net[-1].bias, config.initial_action)
-    mean = MirroredFingers(net) if config.mirrored else net
+    mean = Mirrored(net) if config.mirrored else net
     scale = AddStateIndependentNormalScale(FINGERS, init_value=config.log_std)
     return ProbabilisticActor(
         TensorDictModule(nn.Sequential(mean, scale), in_keys=["observation"], out_keys=["loc", "scale"]),

@@ -15,6 +15,7 @@ from forcegrasp.config import (
     PhysicsConfig,
     RewardConfig,
     SensorConfig,
+    validate,
 )
 from forcegrasp.env.grasp_env import GraspEnv
 from forcegrasp.physics import GraspParameters
@@ -61,6 +62,8 @@ def build_env(
     """
     sensors, observation = sensors or SensorConfig(), observation or ObservationConfig()
     action, reward = action or ActionConfig(), reward or RewardConfig()
+    for name, part in (("sensors", sensors), ("observation", observation), ("action", action)):
+        validate(part, f"{name}.")
     transforms = [
         ObservationNoise(
             in_keys=["joint_position", "force"],

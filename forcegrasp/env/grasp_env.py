@@ -11,7 +11,7 @@ from tensordict import TensorDict, TensorDictBase
 from torchrl.data import Bounded, Categorical, Composite, Unbounded
 from torchrl.envs import EnvBase
 
-from forcegrasp.config import GraspConfig, PhysicsConfig, RewardConfig
+from forcegrasp.config import GraspConfig, PhysicsConfig, RewardConfig, validate
 from forcegrasp.env.reward import force_reward, normalised_force_reward, object_penalty
 from forcegrasp.physics import GraspParameters, GraspSampler, GraspSimulator
 from forcegrasp.physics.sampling import OPEN_M
@@ -34,7 +34,7 @@ OBSERVATIONS = {
 class GraspEnv(EnvBase):
     """``n`` grasps at once. Action: ``joint_delta``, u = Δq_des in metres, ``(n, 2)``; see :data:`OBSERVATIONS`.
 
-    The reward is α₁ r_force + α₂ r_obj of paper eq. 10, from the true state; r_act needs the policy's own actions and
+    The reward is α₁ r_force + α₂ r_obj of paper eq. 11, from the true state; r_act needs the policy's own actions and
     is added by :class:`~forcegrasp.transforms.ActionChangePenalty`. An episode is truncated, never terminated.
 
     Args:
@@ -62,10 +62,11 @@ class GraspEnv(EnvBase):
         super().__init__(device="cpu", batch_size=torch.Size([n]))
         physics, grasp = physics or PhysicsConfig(), grasp or GraspConfig()
         self.reward_config = dataclasses.replace(reward or RewardConfig())
+        for name, part in (("physics", physics), ("grasp", grasp), ("reward", self.reward_config)):
+            validate(part, f"{name}.")
         self.sampler = sampler or GraspSampler(grasp)
         self.episode_steps = grasp.steps
         self.simulator = GraspSimulator(n, physics.tier, physics.threads)
-        self._age = np.zeros(n, dtype=np.int64)
         self.set_seed(seed)
         self._make_specs(n)
 
@@ -88,12 +89,10 @@ class GraspEnv(EnvBase):
         mask = None if tensordict is None else tensordict.get("_reset", None)
         ids = np.arange(self.simulator.n) if mask is None else np.flatnonzero(mask.numpy().reshape(-1))
         self.simulator.reset(self.sampler(self.rng, ids), ids)
-        self._age[ids] = 0
         return self._state().update(self._done())
 
     def _step(self, tensordict: TensorDictBase) -> TensorDictBase:
         self.simulator.step(tensordict.get("joint_delta").numpy().astype(np.float64))
-        self._age += 1
         state, config = self._state(), self.reward_config
         terms = state.get("reward_terms")
         force = terms.get("force_paper" if config.form == "paper" else "force_normalised")
@@ -129,7 +128,7 @@ class GraspEnv(EnvBase):
         )
 
     def _done(self) -> TensorDict:
-        truncated = torch.from_numpy(self._age >= self.episode_steps).unsqueeze(-1)
+        truncated = torch.from_numpy(self.simulator.steps >= self.episode_steps).unsqueeze(-1)
         return TensorDict(
             {"done": truncated, "truncated": truncated.clone(), "terminated": torch.zeros_like(truncated)},
             batch_size=self.batch_size,

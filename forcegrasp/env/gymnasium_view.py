@@ -16,7 +16,8 @@ from forcegrasp.env.build import build_env, seed_env
 class GraspGymnasiumEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     """Observation: the stacked o(t), ``(30,)`` by default. Action: ``(2,)`` in [−1, 1], scaled to position deltas.
 
-    ``info`` holds the true state of the grasp (see :data:`forcegrasp.env.grasp_env.OBSERVATIONS`).
+    ``info`` holds the true state of the grasp (see :data:`forcegrasp.env.grasp_env.OBSERVATIONS`;
+    nested names are joined by a dot).
 
     Args:
       seed: seed until :meth:`reset` is given one.
@@ -52,5 +53,5 @@ class GraspGymnasiumEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         return observation, float(after["reward"]), bool(after["terminated"]), bool(after["truncated"]), info
 
     def _observe(self, state: TensorDictBase) -> tuple[np.ndarray, dict]:
-        info = {key: value[0].numpy().copy() for key, value in state.items() if isinstance(value, torch.Tensor)}
+        info = {key: value[0].numpy().copy() for key, value in state.flatten_keys(".").items()}
         return info.pop("observation"), info

@@ -7,7 +7,7 @@ from torch import Tensor
 
 
 def force_reward(force_error: Tensor) -> Tensor:
-    """r_force = 1 − tanh(Σ_i |Δf_i|) (paper, eq. 7).
+    """r_force = 1 − tanh(Σ_i |Δf_i|) (paper, eq. 8).
 
     Args:
       force_error: Δf = f_goal − f of both fingers, newtons, ``(*B, 2)``.
@@ -32,7 +32,7 @@ def normalised_force_reward(force_error: Tensor, goal_force: Tensor) -> Tensor:
 
 
 def object_penalty(object_speed: Tensor, threshold: float) -> Tensor:
-    """r_obj = −1 where the object moves faster than the threshold, else 0 (paper, eq. 8).
+    """r_obj = −1 where the object moves faster than the threshold, else 0 (paper, eq. 9).
 
     Args:
       object_speed: metres per control step, ``(*B, 1)``.

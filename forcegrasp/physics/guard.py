@@ -16,13 +16,20 @@ _BAD = {
 }
 
 
-def check(warnings: np.ndarray, parameters: GraspParameters, step: int) -> None:
+def silence_log() -> None:
+    """Keeps MuJoCo from dropping MUJOCO_LOG.TXT into the working directory: warnings are raised as errors instead."""
+    log = mujoco.MjLogConfig.get()
+    log.logto_file = log.logto_console = False
+    log.set()
+
+
+def check(warnings: np.ndarray, parameters: GraspParameters, steps: np.ndarray) -> None:
     """Raises if any grasp diverged.
 
     Args:
       warnings: MuJoCo's warning counters, shape ``(n, number of warnings)``, all 0 in a sound simulation.
       parameters: the n grasps.
-      step: control step, for the message.
+      steps: control steps each grasp has done, for the message, ``(n,)``.
 
     Raises:
       PhysicsError: names the first grasp that diverged, what went wrong, and its parameters.
@@ -33,6 +40,6 @@ def check(warnings: np.ndarray, parameters: GraspParameters, step: int) -> None:
     kind = int(np.flatnonzero(warnings[grasp])[0])
     what = _BAD.get(mujoco.mjtWarning(kind), mujoco.mjtWarning(kind).name)
     raise PhysicsError(
-        f"grasp {grasp} diverged at control step {step} (bad {what}): {parameters.describe(grasp)};"
+        f"grasp {grasp} diverged at control step {steps[grasp]} (bad {what}): {parameters.describe(grasp)};"
         " narrow the ranges of `grasp` or set physics.tier=reference"
     )

@@ -31,16 +31,16 @@ class GraspSampler:
     """
 
     def __init__(self, config: GraspConfig) -> None:
-        self.config = dataclasses.replace(config)
-        smallest = config.radius_m[0]
-        if config.deformation_m >= smallest:
-            raise ConfigError(
-                f"grasp.deformation_m={config.deformation_m:g} must be below the smallest grasp.radius_m={smallest:g}"
-                " (paper, eq. 3): make the object larger or the deformation smaller"
-            )
+        self.config = config
+        self.set_ranges(config.radius_m, config.offset_m)
 
     def set_ranges(self, radius_m: list[float], offset_m: list[float]) -> None:
         """Narrows or widens the object ranges, as the curriculum does."""
+        if self.config.deformation_m >= radius_m[0]:
+            raise ConfigError(
+                f"grasp.deformation_m={self.config.deformation_m:g} must be below the smallest grasp.radius_m="
+                f"{radius_m[0]:g} (paper, eq. 3): make the object larger or the deformation smaller"
+            )
         self.config = dataclasses.replace(self.config, radius_m=list(radius_m), offset_m=list(offset_m))
 
     def __call__(self, rng: np.random.Generator, ids: np.ndarray) -> GraspParameters:

@@ -30,9 +30,10 @@ class GraspSimulator:
     """
 
     def __init__(self, n: int, tier: str = "reference", threads: int = 0) -> None:
+        guard.silence_log()
         self.model = model = build_model(tier)
         self.n = n
-        self.step_count = 0
+        self.steps = np.zeros(n, dtype=np.int64)  #: control steps since the grasp was reset, ``(n,)``
         self.parameters = GraspParameters(*np.broadcast_to(np.array([[0.5], [-9.0], [0.025], [0.0], [0.1]]), (5, n)))
         self.commanded_position = np.full((n, 2), OPEN_M)  #: q_des of the last step, metres, ``(n, 2)``
         self.object_speed = np.zeros(n)  #: |o_y(t) − o_y(t−1)|, metres per control step, ``(n,)``
@@ -70,7 +71,7 @@ class GraspSimulator:
 
         Args:
           parameters: one set per grasp that is reset.
-          ids: the slots to reset; all of them by default.
+          ids: the slots to reset, in ascending order; all of them by default.
         """
         ids = np.arange(self.n) if ids is None else np.asarray(ids)
         if len(parameters) != len(ids):
@@ -88,8 +89,7 @@ class GraspSimulator:
         self._batch.forward(ids)
         self.commanded_position[ids] = OPEN_M
         self.object_speed[ids] = 0.0
-        if len(ids) == self.n:
-            self.step_count = 0
+        self.steps[ids] = 0
 
     def step(self, joint_delta: np.ndarray) -> None:
         """Commands ``q_des = q + u`` to both fingers and simulates one control step (paper, eq. 4).
@@ -112,8 +112,8 @@ class GraspSimulator:
         np.clip(position, 0.0, OPEN_M, out=self.commanded_position)
         self._ctrl[:] = self.commanded_position
         self._batch.step(nstep=self._substeps)
-        guard.check(self._batch.warning, self.parameters, self.step_count)
-        self.step_count += 1
+        guard.check(self._batch.warning[..., 1], self.parameters, self.steps)
+        self.steps += 1
         self.object_speed = np.abs(self.object_position - before)
 
     def scene(self, grasp: int) -> tuple[mujoco.MjModel, mujoco.MjData]:
@@ -125,29 +125,21 @@ class GraspSimulator:
 
 
 class _ObjectFields:
-    """Writes a grasp's parameters into the fields that MuJoCo compiled for the nominal object, to the same bits."""
+    """Writes a grasp's parameters into the fields that MuJoCo compiled for the nominal object, to the same bits.
+
+    Bounding boxes, radii and inverse weights follow from these: :meth:`Batch.set_const` does it.
+    """
 
     def __init__(self, batch: Batch) -> None:
         model = batch.model
-        body = model.body("object").id
-        geoms = [model.geom("object").id]
-        self._sphere = None
-        if mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, "object_pads") >= 0:
-            self._sphere = model.geom("object_pads").id
-            geoms.append(self._sphere)
-        self._body, self._geoms, self._cylinder = body, geoms, geoms[0]
-        first = model.body_bvhadr[body]
-        self._boxes = range(first, first + model.body_bvhnum[body])
-        self._sphere_boxes = [i for i in self._boxes if model.bvh_nodeid[i] == self._sphere]
-        self._mass = model.body_mass[body]
-        self._half_length = model.geom_size[self._cylinder, 1]
+        self._body = model.body("object").id
+        self._geoms = np.flatnonzero(model.geom_bodyid == self._body)
+        self._mass, self._length = model.body_mass[self._body], 2 * model.geom("object").size[1]
         self._size, self._solimp = batch.expand("geom_size"), batch.expand("geom_solimp")
-        self._aabb, self._rbound = batch.expand("geom_aabb"), batch.expand("geom_rbound")
-        self._bvh, self._inertia = batch.expand("bvh_aabb"), batch.expand("body_inertia")
-        self._bias = batch.expand("actuator_biasprm")
+        self._inertia, self._bias = batch.expand("body_inertia"), batch.expand("actuator_biasprm")
 
     def write(self, ids: np.ndarray, parameters: GraspParameters) -> None:
-        radius, mass, length = parameters.radius_m, self._mass, 2 * self._half_length
+        radius, mass, length = parameters.radius_m, self._mass, self._length
         # The order of operations is the compiler's: the last bit of an inertia can move a contact point.
         self._inertia[ids, self._body, 0] = mass * (3 * radius * radius + length * length) / 12
         self._inertia[ids, self._body, 1] = self._inertia[ids, self._body, 0]
@@ -155,12 +147,4 @@ class _ObjectFields:
         for geom in self._geoms:
             self._size[ids, geom, 0] = radius
             self._solimp[ids, geom, 2] = parameters.rho_m
-            self._aabb[ids, geom, 3] = self._aabb[ids, geom, 4] = radius
-        self._rbound[ids, self._cylinder] = np.sqrt(radius * radius + self._half_length * self._half_length)
-        for box in self._boxes:
-            self._bvh[ids, box, 3] = self._bvh[ids, box, 4] = radius
-        if self._sphere is not None:
-            self._aabb[ids, self._sphere, 5] = self._rbound[ids, self._sphere] = radius
-            for box in self._sphere_boxes:
-                self._bvh[ids, box, 5] = radius
         self._bias[ids, :, 2] = parameters.b2[:, None]

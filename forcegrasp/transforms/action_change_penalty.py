@@ -1,4 +1,4 @@
-"""The smoothness term r_act = −Σ_i |a_i(t−1) − a_i(t)| (paper, eq. 9), added to the reward."""
+"""The smoothness term r_act = −Σ_i |a_i(t−1) − a_i(t)| (paper, eq. 10), added to the reward."""
 
 from __future__ import annotations
 
@@ -32,19 +32,24 @@ class ActionChangePenalty(Transform):
         self.last_action_key, self.term_key = last_action_key, out_key
 
     def _step(self, tensordict: TensorDictBase, next_tensordict: TensorDictBase) -> TensorDictBase:
-        before, now = tensordict.get(self.last_action_key), next_tensordict.get(self.last_action_key)
+        before, now = tensordict[self.last_action_key], next_tensordict[self.last_action_key]
         term = -(before - now).abs().sum(-1, keepdim=True)
         next_tensordict.set(self.term_key, term)
-        return next_tensordict.set(self.in_keys[0], next_tensordict.get(self.in_keys[0]) + self.weight * term)
+        return next_tensordict.set(self.in_keys[0], next_tensordict[self.in_keys[0]] + self.weight * term)
 
     def _reset(self, tensordict: TensorDictBase, tensordict_reset: TensorDictBase) -> TensorDictBase:
-        like = tensordict_reset.get(self.last_action_key)
+        like = tensordict_reset[self.last_action_key]
         return tensordict_reset.set(self.term_key, like.new_zeros((*like.shape[:-1], 1)))
 
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
         raise RuntimeError("ActionChangePenalty needs the step before: append it to an environment")
 
+    def transform_reward_spec(self, reward_spec: Composite) -> Composite:
+        like = reward_spec[self.in_keys[0]]
+        reward_spec[self.in_keys[0]] = Unbounded(shape=like.shape, dtype=like.dtype, device=like.device)
+        return reward_spec
+
     def transform_observation_spec(self, observation_spec: Composite) -> Composite:
         like = observation_spec[self.last_action_key]
-        observation_spec[self.term_key] = Unbounded(shape=(*like.shape[:-1], 1), dtype=like.dtype)
+        observation_spec[self.term_key] = Unbounded(shape=(*like.shape[:-1], 1), dtype=like.dtype, device=like.device)
         return observation_spec

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import torch
 from tensordict.utils import NestedKey
 from torch import Tensor
 from torchrl.data import Bounded, Composite
@@ -32,5 +31,5 @@ class ActionScale(Transform):
         actions = input_spec["full_action_spec"]
         delta = actions[self.in_keys_inv[0]]
         del actions[self.in_keys_inv[0]]
-        actions[self.out_keys_inv[0]] = Bounded(-torch.ones(()), torch.ones(()), shape=delta.shape, dtype=delta.dtype)
+        actions[self.out_keys_inv[0]] = Bounded(-1, 1, shape=delta.shape, dtype=delta.dtype, device=delta.device)
         return input_spec

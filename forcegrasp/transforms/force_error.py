@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from tensordict import TensorDictBase
 from tensordict.utils import NestedKey
-from torchrl.data import Composite
+from torchrl.data import Composite, Unbounded
 from torchrl.envs.transforms import Transform
 
 
@@ -26,7 +26,7 @@ class ForceError(Transform):
         super().__init__(in_keys=[goal_key, force_key], out_keys=[out_key])
 
     def _call(self, next_tensordict: TensorDictBase) -> TensorDictBase:
-        goal, force = (next_tensordict.get(key) for key in self.in_keys)
+        goal, force = (next_tensordict[key] for key in self.in_keys)
         return next_tensordict.set(self.out_keys[0], goal - force)
 
     forward = _call
@@ -35,5 +35,6 @@ class ForceError(Transform):
         return self._call(tensordict_reset)
 
     def transform_observation_spec(self, observation_spec: Composite) -> Composite:
-        observation_spec[self.out_keys[0]] = observation_spec[self.in_keys[1]].clone()
+        force = observation_spec[self.in_keys[1]]
+        observation_spec[self.out_keys[0]] = Unbounded(shape=force.shape, dtype=force.dtype, device=force.device)
         return observation_spec

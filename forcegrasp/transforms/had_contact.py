@@ -1,4 +1,4 @@
-"""Contact memory, h(t) = c(t) ∨ h(t−1) with c = f > f_θ and h(0) = 0 (paper, eqs. 5-6 of the appendix)."""
+"""Contact memory, h(t) = c(t) ∨ h(t−1) with c = f > f_θ and h(0) = 0 (paper, eqs. 5-6)."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ class HadContact(Transform):
         self.threshold = threshold
 
     def _step(self, tensordict: TensorDictBase, next_tensordict: TensorDictBase) -> TensorDictBase:
-        force = next_tensordict.get(self.in_keys[0])
+        force = next_tensordict[self.in_keys[0]]
         contact = (force > self.threshold).to(force.dtype)
-        next_tensordict.set(self.out_keys[0], torch.maximum(contact, tensordict.get(self.out_keys[0])))
+        next_tensordict.set(self.out_keys[0], torch.maximum(contact, tensordict[self.out_keys[0]]))
         return next_tensordict
 
     def _reset(self, tensordict: TensorDictBase, tensordict_reset: TensorDictBase) -> TensorDictBase:
-        return tensordict_reset.set(self.out_keys[0], torch.zeros_like(tensordict_reset.get(self.in_keys[0])))
+        return tensordict_reset.set(self.out_keys[0], torch.zeros_like(tensordict_reset[self.in_keys[0]]))
 
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
         raise RuntimeError(
@@ -43,5 +43,5 @@ class HadContact(Transform):
 
     def transform_observation_spec(self, observation_spec: Composite) -> Composite:
         force = observation_spec[self.in_keys[0]]
-        observation_spec[self.out_keys[0]] = Binary(shape=force.shape, dtype=force.dtype)
+        observation_spec[self.out_keys[0]] = Binary(shape=force.shape, dtype=force.dtype, device=force.device)
         return observation_spec

@@ -1,4 +1,4 @@
-"""The inductive bias φ that scales actions by the phase of the grasp (paper, eq. 6)."""
+"""The inductive bias φ that scales actions by the phase of the grasp (paper, eq. 7)."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from torchrl.envs.transforms import Transform
 
 
 def contact_bias(had_contact: Tensor, force_error: Tensor, goal_force: Tensor, one: float, floor: float) -> Tensor:
-    """φ of each finger (paper, eq. 6).
+    """φ of each finger (paper, eq. 7).
 
     1 before the finger's first contact; ``one`` for a finger that waits for the other; with both in contact
     max(floor, 1 − |Δf| / f_goal).
@@ -26,7 +26,7 @@ def contact_bias(had_contact: Tensor, force_error: Tensor, goal_force: Tensor, o
     touched = had_contact > 0.5
     both = touched.all(-1, keepdim=True)
     near_goal = (1 - force_error.abs() / goal_force).clamp_min(floor)
-    waiting = torch.where(touched, one, 1.0)
+    waiting = torch.where(touched, one, torch.ones_like(near_goal))
     return torch.where(both, near_goal, waiting)
 
 
@@ -56,6 +56,6 @@ class InductiveBias(Transform):
         self.state_keys = (had_contact_key, force_error_key, goal_key)
 
     def _inv_call(self, tensordict: TensorDictBase) -> TensorDictBase:
-        had_contact, force_error, goal = (tensordict.get(key) for key in self.state_keys)
+        had_contact, force_error, goal = (tensordict[key] for key in self.state_keys)
         phi = contact_bias(had_contact, force_error, goal, self.one, self.floor)
-        return tensordict.set(self.in_keys_inv[0], tensordict.get(self.out_keys_inv[0]) * phi)
+        return tensordict.set(self.in_keys_inv[0], tensordict[self.out_keys_inv[0]] * phi)

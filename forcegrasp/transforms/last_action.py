@@ -25,10 +25,11 @@ class LastAction(Transform):
         self.action_key = action_key
 
     def _step(self, tensordict: TensorDictBase, next_tensordict: TensorDictBase) -> TensorDictBase:
-        return next_tensordict.set(self.out_keys[0], tensordict.get(self.action_key).clamp(-1, 1))
+        like = next_tensordict[self.in_keys[0]]
+        return next_tensordict.set(self.out_keys[0], tensordict[self.action_key].clamp(-1, 1).to(like.dtype))
 
     def _reset(self, tensordict: TensorDictBase, tensordict_reset: TensorDictBase) -> TensorDictBase:
-        return tensordict_reset.set(self.out_keys[0], torch.zeros_like(tensordict_reset.get(self.in_keys[0])))
+        return tensordict_reset.set(self.out_keys[0], torch.zeros_like(tensordict_reset[self.in_keys[0]]))
 
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
         raise RuntimeError(
@@ -37,5 +38,5 @@ class LastAction(Transform):
 
     def transform_observation_spec(self, observation_spec: Composite) -> Composite:
         like = observation_spec[self.in_keys[0]]
-        observation_spec[self.out_keys[0]] = Bounded(-1, 1, shape=like.shape, dtype=like.dtype)
+        observation_spec[self.out_keys[0]] = Bounded(-1, 1, shape=like.shape, dtype=like.dtype, device=like.device)
         return observation_spec

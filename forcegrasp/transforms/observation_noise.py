@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import torch
 from tensordict import TensorDictBase
 from tensordict.utils import NestedKey
-from torchrl.data import Composite
+from torchrl.data import Composite, Unbounded
 from torchrl.envs.transforms import Transform
 
 
@@ -40,7 +40,7 @@ class ObservationNoise(Transform):
 
     def _call(self, next_tensordict: TensorDictBase) -> TensorDictBase:
         for in_key, out_key, std in zip(self.in_keys, self.out_keys, self.std, strict=True):
-            value = next_tensordict.get(in_key)
+            value = next_tensordict[in_key]
             noise = torch.randn(value.shape, generator=self.generator, dtype=value.dtype)
             next_tensordict.set(out_key, value + std * noise.to(value.device))
         return next_tensordict
@@ -52,8 +52,14 @@ class ObservationNoise(Transform):
 
     def transform_observation_spec(self, observation_spec: Composite) -> Composite:
         for in_key, out_key in zip(self.in_keys, self.out_keys, strict=True):
-            observation_spec[out_key] = observation_spec[in_key].clone()
+            true = observation_spec[in_key]
+            observation_spec[out_key] = Unbounded(shape=true.shape, dtype=true.dtype, device=true.device)
         return observation_spec
+
+    def clone(self):
+        other = super().clone()
+        other.generator = self.generator.clone_state()
+        return other
 
     def get_extra_state(self) -> torch.Tensor:
         return self.generator.get_state()

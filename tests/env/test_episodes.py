@@ -1,0 +1,95 @@
+"""Figures of whole episodes, against loops over steps."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+from tensordict import TensorDict
+
+from forcegrasp.env.episodes import FIGURES, summarise
+
+
+def _random_rollout(n: int, steps: int, seed: int) -> TensorDict:
+    """Random episodes; the first never touches, the second at once with both fingers, the third with one only."""
+    generator = torch.Generator().manual_seed(seed)
+
+    def uniform(*shape: int) -> torch.Tensor:
+        return torch.rand(*shape, generator=generator)
+
+    start = uniform(n, 1, 1) * 0.02 - 0.01
+    position = start + ((uniform(n, steps, 1) - 0.5) * 1e-3).cumsum(1)
+    before = torch.cat([start, position[:, :-1]], 1)
+    onset = (uniform(n, 1, 2) * 1.2 * steps).floor()
+    onset[0], onset[1], onset[2] = steps, 0, torch.tensor([steps, steps // 2])
+    # contact comes and goes after the onset, as it does for a bouncing finger
+    touching = (torch.arange(steps).view(1, -1, 1) >= onset) & (uniform(n, steps, 2) > 0.4)
+    touching |= torch.arange(steps).view(1, -1, 1) == onset
+    force = torch.where(touching, 0.05 + uniform(n, steps, 2), 0.05 * uniform(n, steps, 2))
+    terms = TensorDict(
+        {
+            "force_paper": uniform(n, steps, 1),
+            "force_normalised": uniform(n, steps, 1),
+            "object": -(uniform(n, steps, 1) > 0.7).float(),
+            "action": -uniform(n, steps, 1),
+        },
+        batch_size=(n, steps),
+    )
+    goal = (uniform(n, 1, 1) + 0.1).expand(n, steps, 1)
+    after = TensorDict(
+        {"force": force, "object_position": position, "goal_force": goal, "reward_terms": terms}, batch_size=(n, steps)
+    )
+    return TensorDict({"object_position": before, "next": after}, batch_size=(n, steps))
+
+
+def _slow(rollout: TensorDict, threshold: float, period: float) -> dict[str, np.ndarray]:
+    after = rollout["next"]
+    force, goal = after["force"].double().numpy(), after["goal_force"].double().numpy()
+    position = np.concatenate([rollout["object_position"][:, :1, 0], after["object_position"][..., 0]], axis=1)
+    position = position.astype(float)
+    terms = {key: value.double().numpy()[..., 0] for key, value in after["reward_terms"].items()}
+    n, steps = force.shape[:2]
+    figures: dict[str, list[float]] = {name: [] for name in FIGURES}
+    for i in range(n):
+        had = [False, False]
+        first = both = steps
+        grasped_at = position[i, -1]
+        for t in range(steps):
+            had = [h or f > threshold for h, f in zip(had, force[i, t], strict=True)]
+            if any(had) and first == steps:
+                first = t
+            if all(had) and both == steps:
+                both, grasped_at = t, position[i, t + 1]
+        last = range(max(0, steps - max(1, round(1 / period))), steps)
+        errors = [abs(goal[i, t, 0] - force[i, t, finger]) for t in last for finger in (0, 1)]
+        figures["force_reward_normalised"].append(sum(terms["force_normalised"][i]))
+        figures["force_reward_paper"].append(sum(terms["force_paper"][i]))
+        figures["displacement_until_grasped_mm"].append(1000 * abs(grasped_at - position[i, 0]))
+        figures["displacement_total_mm"].append(1000 * abs(position[i, -1] - position[i, 0]))
+        figures["fast_steps"].append(sum(terms["object"][i] < 0))
+        figures["action_change"].append(-sum(terms["action"][i]))
+        figures["first_contact_s"].append(first * period)
+        figures["both_contact_s"].append(both * period)
+        figures["final_force_error_n"].append(sum(errors) / len(errors))
+    return {name: np.array(values) for name, values in figures.items()}
+
+
+@pytest.mark.parametrize(("n", "steps", "period"), [(12, 60, 0.04), (7, 25, 0.04), (5, 10, 0.04), (4, 8, 2.0)])
+def test_figures_equal_a_loop_over_steps(n, steps, period):
+    rollout = _random_rollout(n, steps, seed=steps)
+    found, expected = summarise(rollout, 0.05, period), _slow(rollout, 0.05, period)
+    assert found.keys() == FIGURES.keys()
+    for name, values in expected.items():
+        assert found[name].shape == (n,), name
+        np.testing.assert_allclose(found[name], values, rtol=1e-5, atol=1e-5, err_msg=name)
+    first, both = found["first_contact_s"], found["both_contact_s"]
+    assert first[0] == both[0] == pytest.approx(steps * period)  # never
+    assert first[1] == both[1] == 0  # at once
+    assert first[2] < both[2] == pytest.approx(steps * period)  # one finger only
+
+
+def test_threshold_decides_what_counts_as_touching():
+    rollout = _random_rollout(6, 30, seed=0)
+    low, high = summarise(rollout, 0.05), summarise(rollout, 0.6)
+    assert (high["both_contact_s"] >= low["both_contact_s"]).all()
+    assert (high["both_contact_s"] > low["both_contact_s"]).any()

@@ -1,0 +1,98 @@
+"""The authors' simulator, episode by episode.
+
+The episodes may not be shipped: set FORCEGRASP_REFERENCE to their folder (``index.csv`` and one CSV per episode), or
+keep them in ``shared/reference`` beside the checkout.
+"""
+
+from __future__ import annotations
+
+import csv
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from forcegrasp.physics import GraspParameters, GraspSimulator
+
+FOLDER = Path(os.environ.get("FORCEGRASP_REFERENCE") or Path(__file__).parents[3] / "shared" / "reference")
+_INDEX_FILE = FOLDER / "index.csv"
+INDEX = list(csv.DictReader(_INDEX_FILE.read_text().splitlines())) if _INDEX_FILE.is_file() else []
+
+pytestmark = pytest.mark.skipif(not INDEX, reason=f"no reference episodes in {FOLDER}; set FORCEGRASP_REFERENCE")
+
+
+def _parameters() -> GraspParameters:
+    columns = ("kappa", "b2", "object_radius_m", "object_offset_m")
+    return GraspParameters(*(np.array([float(row[c]) for row in INDEX]) for c in columns), 0.1)
+
+
+@pytest.fixture(scope="session")
+def episodes() -> list[dict[str, np.ndarray]]:
+    """What the authors' simulator did: action, q, f of shape ``(T, 2)`` and y ``(T,)`` per episode."""
+    found = []
+    for row in INDEX:
+        table = np.genfromtxt(FOLDER / f"{row['name']}.csv", delimiter=",", names=True)
+        pairs = {"action": "action_{}", "q": "q_{}_m", "f": "f_{}_n"}
+        episode = {key: np.stack([table[name.format(side)] for side in "lr"], 1) for key, name in pairs.items()}
+        found.append(episode | {"y": table["object_y_m"]})
+    return found
+
+
+def _replay(tier: str, episodes: list[dict[str, np.ndarray]]) -> list[dict[str, np.ndarray]]:
+    """Simulated minus authors' values of every entry, all episodes simulated as one batch."""
+    actions = np.zeros((max(len(e["y"]) for e in episodes), len(episodes), 2))
+    for i, episode in enumerate(episodes):
+        actions[: len(episode["y"]), i] = episode["action"]
+    simulator = GraspSimulator(len(episodes), tier)
+    simulator.reset(_parameters())
+    q, f, y = [], [], []
+    for action in actions:
+        simulator.step(action * 0.003)
+        q.append(simulator.joint_position)
+        f.append(simulator.force)
+        y.append(simulator.object_position)
+    simulated = {"q": np.stack(q, 1), "f": np.stack(f, 1), "y": np.stack(y, 1)}
+    return [{key: simulated[key][i, : len(e["y"])] - e[key] for key in "qfy"} for i, e in enumerate(episodes)]
+
+
+@pytest.fixture(scope="session")
+def reference_deviations(episodes):
+    return _replay("reference", episodes)
+
+
+@pytest.fixture(scope="session")
+def fast_deviations(episodes):
+    return _replay("fast", episodes)
+
+
+@pytest.mark.parametrize("index", range(len(INDEX)), ids=[row["name"] for row in INDEX])
+def test_reference_tier_reproduces_the_episode(reference_deviations, index):
+    deviation = {key: np.abs(values) for key, values in reference_deviations[index].items()}
+    assert deviation["q"].max() <= 2e-6
+    assert deviation["f"].max() <= 0.03
+    assert deviation["f"].mean() <= 0.5e-3
+    assert deviation["y"].max() <= 2e-6
+
+
+@pytest.mark.parametrize("index", range(len(INDEX)), ids=[row["name"] for row in INDEX])
+def test_fast_tier_stays_within_sensor_noise(fast_deviations, index):
+    # The sensor's noise is 0.013 N. Measured worst episodes: mean 8.0 mN, mean of the last second 6.2 mN,
+    # finger 0.28 mm, object 0.074 mm.
+    deviation = fast_deviations[index]
+    assert np.abs(deviation["f"]).mean() <= 0.010
+    assert np.abs(deviation["f"][-25:].mean(axis=0)).max() <= 0.008
+    assert np.abs(deviation["q"]).max() <= 0.35e-3
+    assert np.abs(deviation["y"]).max() <= 0.1e-3
+
+
+def test_fast_tier_over_all_episodes(fast_deviations):
+    # Measured: mean 2.2 mN, 0.15 N for a moment while a hard object is struck.
+    assert np.mean([np.abs(d["f"]).mean() for d in fast_deviations]) <= 3e-3
+    assert max(np.abs(d["f"]).max() for d in fast_deviations) <= 0.2
+
+
+def test_softness_gives_the_authors_parameters():
+    parameters = _parameters()
+    np.testing.assert_allclose(parameters.rho_m, [float(row["rho_m"]) for row in INDEX], rtol=1e-8)
+    np.testing.assert_allclose(parameters.force_scale, [float(row["f_alpha"]) for row in INDEX], rtol=1e-8)
