@@ -72,6 +72,10 @@ class GraspConfig:
     )
     steps: int = option(150, "control steps of an episode, 40 ms each", source="authors' code", low=1, high=100_000)
 
+    def check(self, path: str) -> None:
+        """Refuses objects that could be squeezed flat."""
+        check_deformation(self.deformation_m, self.radius_m, f"{path}radius_m")
+
 
 @dataclass
 class SensorConfig:
@@ -216,6 +220,10 @@ class TrainConfig:
     ppo: PPOConfig = field(default_factory=PPOConfig)
     log: LogConfig = field(default_factory=LogConfig)
 
+    def check(self, path: str) -> None:
+        """Refuses a curriculum that starts with objects that could be squeezed flat."""
+        check_deformation(self.grasp.deformation_m, self.curriculum.radius_m, f"{path}curriculum.radius_m")
+
 
 @dataclass
 class EvaluateConfig:
@@ -233,7 +241,21 @@ class EvaluateConfig:
     physics: PhysicsConfig = field(default_factory=PhysicsConfig)
     grasp: GraspConfig = field(default_factory=GraspConfig)
     sensors: SensorConfig = field(default_factory=SensorConfig)
-    reward: RewardConfig = field(default_factory=RewardConfig)
+    speed_threshold_m: float = option(
+        5e-5, "object speed that counts as fast", unit="m per control step", source="paper, Table 2", low=0, high=1
+    )
+
+
+def check_deformation(deformation_m: float, radius_m: list[float], name: str) -> None:
+    """Raises ConfigError unless d_p < r for the smallest object (paper, eq. 3)."""
+    if deformation_m >= radius_m[0]:
+        raise ConfigError(
+            f"{name}={list(radius_m)}: the smallest radius must exceed grasp.deformation_m={deformation_m:g}"
+            " (paper, eq. 3): make the object larger or the deformation smaller"
+        )
+
+
+_ITEM_TYPES = {"list[float]": (int, float), "list[int]": (int,), "list[str]": (str,)}
 
 
 def validate(config: Any, path: str = "") -> None:
@@ -260,5 +282,9 @@ def validate(config: Any, path: str = "") -> None:
             number = isinstance(item, (int, float)) and not isinstance(item, bool)
             if number and not meta["low"] <= item <= meta["high"]:  # also refuses NaN
                 raise ConfigError(f"{name}={item}: must lie in [{meta['low']:g}, {meta['high']:g}] ({meta['doc']})")
+            if listed and (not isinstance(item, _ITEM_TYPES[str(entry.type)]) or isinstance(item, bool)):
+                raise ConfigError(f"{name}={value}: each item must be a {str(entry.type)[5:-1]} ({meta['doc']})")
         if listed and len(set(map(str, value))) < len(value) and meta["choices"]:
             raise ConfigError(f"{name}={value}: names a part twice")
+    if hasattr(config, "check"):
+        config.check(path)

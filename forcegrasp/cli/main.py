@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import os
 import sys
 import warnings
 
@@ -47,6 +48,8 @@ def main(arguments: list[str] | None = None) -> int:
         if verb not in VERBS:
             raise ForcegraspError(f"no verb {verb!r}{closest(verb, VERBS)}")
         _quieten()
+        if not {"-h", "--help"} & set(rest):
+            _import_mujoco()
         return importlib.import_module(f"forcegrasp.cli.{verb}").main(rest)
     except ForcegraspError as error:
         print(f"forcegrasp: {error}", file=sys.stderr)
@@ -68,6 +71,21 @@ def _quieten() -> None:
         ".*isinstance\\(treespec, LeafSpec\\).*",
     ):
         warnings.filterwarnings("ignore", message=message)
+
+
+def _import_mujoco() -> None:
+    """Imports MuJoCo without an OpenGL backend, which it would load at once, and fail where there is none.
+
+    Videos are rendered in a process of their own, which gets the user's choice of backend.
+    """
+    asked = os.environ.get("MUJOCO_GL")
+    os.environ["MUJOCO_GL"] = "disable"
+    try:
+        importlib.import_module("mujoco")
+    finally:
+        del os.environ["MUJOCO_GL"]
+        if asked is not None:
+            os.environ["MUJOCO_GL"] = asked
 
 
 if __name__ == "__main__":

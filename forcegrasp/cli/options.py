@@ -47,6 +47,8 @@ def compose_run(verb: str, overrides: list[str]) -> tuple[Any, str]:
     except (HydraException, OmegaConfBaseException) as error:
         raise ConfigError(_one_line(error)) from error
     validate(config)
+    if not run_dir.strip():
+        raise ConfigError("hydra.run.dir is empty: name a folder, or leave it out")
     return config, run_dir
 
 
@@ -82,19 +84,30 @@ def leaves(schema: type, prefix: str = "") -> Iterator[tuple[str, dataclasses.Fi
 
 
 def _check_key(verb: str, override: str) -> None:
+    """Refuses one override that is malformed, unknown, or has several values."""
+    from hydra.core.override_parser.overrides_parser import OverridesParser
+    from hydra.errors import HydraException
+
     key, equals, value = override.partition("=")
     if not equals:
         raise ConfigError(f"{override!r}: options are given as key=value, see forcegrasp {verb} --help")
     choices = groups(verb)
     known = [name for name, _, _ in leaves(SCHEMAS[verb])]
-    if key.startswith("hydra"):
-        return
+    if "_target" in override:
+        raise ConfigError(f"{override!r}: no option may name a Python object")
     if key in choices:
         for choice in value.split(","):
             if choice.strip() not in choices[key]:
                 raise ConfigError(f"no {key} named {choice.strip()!r}{closest(choice.strip(), choices[key])}")
-    elif key not in known:
+    elif key not in known and not key.startswith(("hydra.", "hydra/")):
         raise ConfigError(f"no option {key!r}{closest(key, [*known, *choices])}")
+    try:
+        parsed = OverridesParser.create().parse_override(override)
+    except HydraException as error:
+        raise ConfigError(f"{override!r}: can't be read ({str(error).splitlines()[0]})") from error
+    if parsed.is_sweep_override():
+        sweep = "; to run one after another, add -m" if verb == "train" else ""
+        raise ConfigError(f"{override!r}: several values; a list is written [a,b]{sweep}")
 
 
 def _one_line(error: Exception) -> str:

@@ -9,6 +9,8 @@ from pathlib import Path
 from forcegrasp.cli.options import compose, compose_run, help_text
 from forcegrasp.errors import ConfigError
 
+#: Exit status after Ctrl-C, as shells have it.
+INTERRUPTED = 130
 PURPOSE = "learn a grasp-force policy with PPO"
 NOTES = """
   -m / --multirun    run every combination of comma-separated values:
@@ -29,6 +31,8 @@ def main(arguments: list[str]) -> int:
     multirun = [a for a in arguments if a in ("-m", "--multirun")]
     overrides = [a for a in arguments if a not in resume and a not in multirun]
     if resume:
+        if resume[-1] == "resume=":
+            raise ConfigError("resume= needs a run directory, as forcegrasp train printed it")
         if overrides or multirun or len(resume) > 1:
             raise ConfigError(
                 f"resume= goes on with the run's own configuration; drop {' '.join(overrides + multirun) or 'one'}"
@@ -72,7 +76,10 @@ def _sweep_job(composed) -> int:
 
     hydra, config = HydraConfig.get(), OmegaConf.to_object(composed)
     run = RunDir.create(hydra.runtime.output_dir, config, list(hydra.overrides.task))
-    return _train(config, run, resume=False)
+    status = _train(config, run, resume=False)
+    if status == INTERRUPTED:
+        raise KeyboardInterrupt  # ends the sweep, not just this run
+    return status
 
 
 def _single_runs(overrides: list[str]) -> list[list[str]]:
@@ -118,4 +125,4 @@ def _train(config, run, resume: bool) -> int:
         )
         return 0
     print(f"stopped and saved; go on with: forcegrasp train resume={run.path}")
-    return 130
+    return INTERRUPTED

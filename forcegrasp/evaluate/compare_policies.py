@@ -16,7 +16,7 @@ from scipy.stats import bootstrap
 from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 
-from forcegrasp.config import ActionConfig, EvaluateConfig, ObservationConfig
+from forcegrasp.config import ActionConfig, EvaluateConfig, ObservationConfig, RewardConfig, TrainConfig
 from forcegrasp.controllers import CONTROLLERS, make_controller
 from forcegrasp.env.episodes import FIGURES, summarise
 from forcegrasp.errors import ConfigError
@@ -41,7 +41,7 @@ class Contestant:
     name: str
     policy: TensorDictModuleBase
     action: ActionConfig
-    observation: ObservationConfig | None
+    observation: ObservationConfig
 
 
 def load_contestants(names: list[str]) -> list[Contestant]:
@@ -50,17 +50,23 @@ def load_contestants(names: list[str]) -> list[Contestant]:
     Raises:
       ConfigError, CheckpointError: if one can't be loaded.
     """
-    contestants: list[Contestant] = []
-    for name in names:
-        if name in CONTROLLERS or not ("/" in name or Path(name).exists()):
-            found = Contestant(name, make_controller(name), ActionConfig(inductive_bias=False), None)
+    if not all(names):
+        raise ConfigError(f"policies={names}: a name is empty")
+    paths = {name: Path(name).resolve() for name in names}
+    contestants: dict[str, Contestant] = {}
+    for name, path in paths.items():
+        if name in CONTROLLERS or not ("/" in name or path.exists()):
+            label, policy, config = name, make_controller(name), TrainConfig(action=ActionConfig(inductive_bias=False))
         else:
+            same = [other for other in set(paths.values()) if other.name == path.name]
+            label = path.name if len(same) == 1 else f"{path.parent.name}_{path.name}"
             policy, config = load_policy(name)
-            found = Contestant(Path(name).resolve().name, policy, config.action, config.observation)
-        if any(found.name == other.name for other in contestants):
-            raise ConfigError(f"policies: {found.name} is named twice")
-        contestants.append(found)
-    return contestants
+        if label in contestants:
+            raise ConfigError(f"policies: {label} is named twice")
+        contestants[label] = Contestant(label, policy, config.action, config.observation)
+    if len(paths) < len(names):
+        raise ConfigError(f"policies={names}: one is named twice")
+    return list(contestants.values())
 
 
 def evaluate(config: EvaluateConfig, out: Path, console: Console | None = None) -> dict:
@@ -87,7 +93,7 @@ def evaluate(config: EvaluateConfig, out: Path, console: Console | None = None) 
             config.seed,
             physics=config.physics,
             sensors=config.sensors,
-            reward=config.reward,
+            reward=RewardConfig(speed_threshold_m=config.speed_threshold_m),
             action=contestant.action,
             observation=contestant.observation,
         )

@@ -13,7 +13,7 @@ from forcegrasp.physics.model import CONTROL_PERIOD_S
 matplotlib.use("Agg")
 LEFT, RIGHT, GOAL = "#0072b2", "#d55e00", "#444444"
 #: One colour per policy, in order (Okabe and Ito's palette, told apart by the colour-blind).
-PALETTE = ("#999999", "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#f0e442")
+PALETTE = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#999999", "#f0e442")
 
 
 def _draw_forces(axes: Axes, episode: TensorDictBase) -> None:
@@ -98,5 +98,5 @@ def reward_boxes(results: dict[str, np.ndarray], kappas: np.ndarray, ylabel: str
     axes.set_xlabel("softness κ (0 hard, 1 soft)")
     axes.set_ylabel(ylabel)
     axes.grid(axis="y", alpha=0.3)
-    axes.legend(handles, list(results), fontsize=9, loc="lower left", ncols=4)
+    axes.legend(handles, list(results), fontsize=9, loc="lower left", bbox_to_anchor=(0, 1), ncols=4, frameon=False)
     return figure

@@ -6,8 +6,7 @@ import dataclasses
 
 import numpy as np
 
-from forcegrasp.config import GraspConfig
-from forcegrasp.errors import ConfigError
+from forcegrasp.config import GraspConfig, check_deformation
 from forcegrasp.physics.parameters import MAX_FORCE_N, GraspParameters, force_scale_of_kappa
 
 #: Finger position when fully open, q_max. Metres (paper, Sec. 3).
@@ -36,11 +35,7 @@ class GraspSampler:
 
     def set_ranges(self, radius_m: list[float], offset_m: list[float]) -> None:
         """Narrows or widens the object ranges, as the curriculum does."""
-        if self.config.deformation_m >= radius_m[0]:
-            raise ConfigError(
-                f"grasp.deformation_m={self.config.deformation_m:g} must be below the smallest grasp.radius_m="
-                f"{radius_m[0]:g} (paper, eq. 3): make the object larger or the deformation smaller"
-            )
+        check_deformation(self.config.deformation_m, radius_m, "radius_m")
         self.config = dataclasses.replace(self.config, radius_m=list(radius_m), offset_m=list(offset_m))
 
     def __call__(self, rng: np.random.Generator, ids: np.ndarray) -> GraspParameters:

@@ -139,18 +139,18 @@ class RunDir:
             writer.writerow(row)
 
     def drop_metrics_after(self, frames: int) -> None:
-        """Removes rows that lie after a checkpoint, so that a resumed run does not log them twice."""
+        """Keeps the whole rows up to a checkpoint, so that a resumed run logs nothing twice and mends a torn line."""
         if not self.metrics_path.exists():
             return
         with open(self.metrics_path, newline="") as file:
-            reader = csv.DictReader(file)
-            rows, columns = [row for row in reader if int(row["frames"]) <= frames], reader.fieldnames or []
+            header, *lines = list(csv.reader(file.read().replace("\0", "").splitlines())) or [[]]
+        kept = [line for line in lines if len(line) == len(header) and line[0].isdigit() and int(line[0]) <= frames]
         part = self.metrics_path.with_suffix(".part")
         with open(part, "w", newline="") as file:
-            writer = csv.DictWriter(file, fieldnames=columns)
-            writer.writeheader()
-            writer.writerows(rows)
+            csv.writer(file).writerows([header, *kept])
         os.replace(part, self.metrics_path)
+        if not kept:  # the header may be torn, too; the next row writes it anew
+            self.metrics_path.unlink()
 
 
 def _provenance(config: TrainConfig, overrides: list[str]) -> dict[str, Any]:

@@ -1,0 +1,211 @@
+"""Common mistakes: one line that says what is wrong and what to do, exit status 2, and nothing written."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from forcegrasp.cli.main import main
+
+#: (arguments, what the line must tell). Train and evaluate are made quick, should they start after all.
+MISTAKES = [
+    # verbs
+    (["trian"], "did you mean train"),
+    (["eval"], "did you mean evaluate"),
+    (["seed=1"], "no verb 'seed=1'"),
+    (["--version=1"], "no verb"),
+    # presets
+    (["train", "experiment=no_id"], "did you mean no_ib"),
+    (["train", "experiment="], "known: ib, no_curriculum"),
+    (["train", "physics=quick"], "known: fast, reference"),
+    (["train", "reward=normalised"], "goal_normalised"),
+    (["train", "sensors=noisy"], "authors, paper"),
+    (["train", "+experiment=ib"], "experiment"),
+    (["train", "~experiment"], "experiment"),
+    (["evaluate", "experiment=ib"], "no option 'experiment'"),
+    # names of options
+    (["train", "ppo.learning_rat=1"], "did you mean ppo.learning_rate"),
+    (["train", "learning_rate=1"], "ppo.learning_rate"),
+    (["train", "gasp.kappa=[0,1]"], "grasp.kappa"),
+    (["train", "ppo=3"], "no option 'ppo'"),
+    (["train", "+ppo.new=1"], "no option"),
+    (["train", "++ppo.grasps=4"], "ppo.grasps"),
+    (["train", "~ppo.grasps"], "ppo.grasps"),
+    (["train", "Seed=1"], "did you mean seed"),
+    (["train", " seed=1"], "did you mean seed"),
+    (["evaluate", "policy=[force_pi]"], "did you mean policies"),
+    (["evaluate", "ppo.grasps=3"], "no option 'ppo.grasps'"),
+    (["evaluate", "resume=runs/x"], "no option 'resume'"),
+    # form
+    (["train", "seed"], "key=value"),
+    (["train", "experiment", "no_ib"], "key=value"),
+    (["train", "--experiment", "no_ib"], "key=value"),
+    (["train", "--seed=1"], "did you mean seed"),
+    (["train", ""], "key=value"),
+    (["train", "=1"], "no option ''"),
+    (["train", "seed==1"], "seed"),
+    (["train", "grasp.kappa=[0,1"], "kappa"),
+    (["evaluate", "force_pi"], "key=value"),
+    (["evaluate", "-m", "seed=1,2"], "key=value"),
+    # values
+    (["train", "ppo.grasps=-1"], "ppo.grasps=-1: must lie in [1, 100000]"),
+    (["train", "ppo.grasps=0"], "must lie in"),
+    (["train", "ppo.grasps=1.5"], "ppo.grasps"),
+    (["train", "ppo.grasps=many"], "Integer"),
+    (["train", "ppo.grasps="], "ppo.grasps"),
+    (["train", "seed=-1"], "seed=-1"),
+    (["train", "seed=true"], "seed"),
+    (["train", "seed=99999999999"], "seed=99999999999"),
+    (["train", "ppo.total_frames=-5"], "ppo.total_frames"),
+    (["train", "ppo.learning_rate=nan"], "ppo.learning_rate=nan"),
+    (["train", "ppo.learning_rate=null"], "ppo.learning_rate"),
+    (["train", "ppo.hidden=50"], "ppo.hidden"),
+    (["train", "ppo.hidden=[]"], "must not be empty"),
+    (["train", "ppo.hidden=[[8]]"], "ppo.hidden"),
+    (["train", "ppo.critic=all"], "one of observation, privileged"),
+    (["train", "action.inductive_bias=perhaps"], "action.inductive_bias"),
+    (["train", "grasp.kappa=[1,0]"], "low ≤ high"),
+    (["train", "grasp.kappa=0.5"], "grasp.kappa"),
+    (["train", "grasp.kappa=[0.5]"], "[low, high]"),
+    (["train", "grasp.kappa=[0,2]"], "must lie in [0, 1]"),
+    (["train", "grasp.kappa=[a,b]"], "grasp.kappa"),
+    (["train", "grasp.offset_m=[0.01,-0.01]"], "low ≤ high"),
+    (["train", "grasp.deformation_m=0.02"], "eq. 3"),
+    (["train", "curriculum.radius_m=[0.0125,0.02]", "grasp.deformation_m=0.014"], "curriculum.radius_m"),
+    (["train", "observation.parts=[]"], "must not be empty"),
+    (["train", "observation.parts=[forces]"], "must be one of position"),
+    (["train", "observation.parts=[force,force]"], "twice"),
+    (["train", "seed=${nope}"], "nope"),
+    (["train", "seed=0,1"], "-m"),
+    (["train", "experiment=ib,no_ib"], "-m"),
+    (["evaluate", "trials=1"], "trials=1: must lie in [2"),
+    (["evaluate", "kappas=0"], "kappas=0"),
+    (["evaluate", "grasp.radius_m=[0.03,0.02]"], "low ≤ high"),
+    (["evaluate", "grasp.deformation_m=0.02"], "eq. 3"),
+    # Hydra's own
+    (["train", "hydra.run.dri=x"], "hydra.run.dri"),
+    (["train", "hydra=3"], "hydra"),
+    (["train", "hydra/launcher=jobli"], "jobli"),
+    (["train", "hydra.run.dir="], "hydra.run.dir"),
+    # sweeps
+    (["train", "-m", "seed=0,x"], "seed=x"),
+    (["train", "-m", "experiment=ib,noib"], "did you mean no_ib"),
+    (["train", "-m", "ppo.grasps=4,0"], "ppo.grasps=0"),
+    (["train", "-m", "seed=range(0,3)", "ppo.grasps=0"], "ppo.grasps=0"),
+    (["train", "-m", "seed=0,1", "grasp.deformation_m=0.02"], "eq. 3"),
+    (["train", "--multirun", "sead=1,2"], "did you mean seed"),
+    (["train", "-m", "hydra/launcher=jobli"], "jobli"),
+    # runs and files
+    (["train", "resume=nowhere"], "nowhere: no such run directory"),
+    (["train", "resume="], "resume"),
+    (["train", "resume=empty"], "not a run directory"),
+    (["train", "resume=file"], "file"),
+    (["train", "resume=finished", "seed=3"], "drop seed=3"),
+    (["train", "resume=finished", "-m"], "drop -m"),
+    (["train", "resume=finished", "resume=finished"], "resume="),
+    (["train", "resume=other"], "another configuration"),
+    (["train", "resume=broken"], "config.yaml: not a valid configuration"),
+    (["train", "resume=damaged"], "damaged"),
+    (["train", "resume=started"], "no checkpoint yet"),
+    (["train", "hydra.run.dir=finished"], "already holds a run"),
+    (["train", "hydra.run.dir=file/run"], "could not make the run directory"),
+    (["train", "hydra.run.dir=file"], "could not make the run directory"),
+    (["evaluate", "policies=[]"], "must not be empty"),
+    (["evaluate", "policies="], "policies"),
+    (["evaluate", "policies=['']"], "polic"),
+    (["evaluate", "policies=[force_p]"], "did you mean force_pi"),
+    (["evaluate", "policies=[runs/nowhere]"], "no such run directory"),
+    (["evaluate", "policies=[empty]"], "not a run directory"),
+    (["evaluate", "policies=[force_pi,force_pi]"], "twice"),
+    (["evaluate", "policies=[finished,./finished/]"], "twice"),
+    (["evaluate", "policies=force_pi,close"], "policies"),
+    (["evaluate", "policies=force_pi"], "policies"),
+    (["evaluate", "policies=[force_pi"], "policies"),
+    (["evaluate", "policies=[other]"], "another configuration"),
+    (["evaluate", "policies=[damaged]"], "damaged"),
+    (["evaluate", "policies=[started]"], "no checkpoint yet"),
+    (["evaluate", "out=file"], "could not write"),
+    (["evaluate", "out=file/below"], "could not write"),
+]
+
+
+@pytest.fixture
+def folder(tmp_path, finished, monkeypatch) -> Path:
+    """A working directory with runs that are in order, and some that are not."""
+    (tmp_path / "empty").mkdir()
+    (tmp_path / "file").write_text("text")
+    for name in ("finished", "other", "broken", "damaged", "started"):
+        shutil.copytree(finished, tmp_path / name)
+    config = (tmp_path / "other" / "config.yaml").read_text()
+    (tmp_path / "other" / "config.yaml").write_text(config.replace("seed: 0", "seed: 1"))
+    (tmp_path / "broken" / "config.yaml").write_text("ppo: [")
+    for path in (tmp_path / "damaged" / "checkpoints").iterdir():
+        path.write_bytes(path.read_bytes()[:-1] + b"\x01")
+    for path in (tmp_path / "started" / "checkpoints").iterdir():
+        path.unlink()
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def contents(folder: Path) -> dict[Path, bytes | None]:
+    return {path: path.read_bytes() if path.is_file() else None for path in folder.rglob("*")}
+
+
+@pytest.mark.parametrize(("arguments", "told"), MISTAKES, ids=[" ".join(arguments) for arguments, _ in MISTAKES])
+def test_mistake(arguments, told, folder, tiny, capsys, monkeypatch):
+    monkeypatch.setattr(sys, "argv", sys.argv)  # Hydra's sweeps read and change both
+    monkeypatch.setenv("HYDRA_FULL_ERROR", "0")
+    verb, *rest = arguments
+    resuming = any("resume=" in argument for argument in rest)
+    before = contents(folder)
+    status = main([verb, *([] if resuming else tiny.get(verb, [])), *rest])
+    out, err = capsys.readouterr()
+    assert status == 2
+    assert err.startswith("forcegrasp: ")
+    assert err.count("\n") == 1
+    assert err.endswith("\n")
+    assert not out
+    assert told in err
+    assert "Traceback" not in err
+    assert "<class" not in err
+    assert contents(folder) == before
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [(["trian"], "train"), (["train", "ppo.grasps=0"], "ppo.grasps")],
+)
+def test_mistake_in_a_process_of_its_own(arguments, told, tmp_path):
+    command = [sys.executable, "-m", "forcegrasp.cli.main", *arguments]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert re.fullmatch(r"forcegrasp: .+\n", done.stderr)
+    assert told in done.stderr
+    assert not done.stdout
+    assert not list(tmp_path.iterdir())
+
+
+def test_full_disk_while_training(folder, tiny, capsys, monkeypatch):
+    def no_space(*args):
+        raise OSError(28, os.strerror(28))
+
+    monkeypatch.setattr(os, "fsync", no_space)
+    assert main(["train", *tiny["train"], "hydra.run.dir=full"]) == 2
+    err = capsys.readouterr().err
+    assert re.fullmatch(r"forcegrasp: .*full.*No space left on device.*\n", err)
+
+
+@pytest.mark.parametrize("backend", ["nonsense", "osmesa"])
+def test_setting_of_mujocos_renderer_does_not_matter(backend, tiny, tmp_path):
+    """Training renders in a process of its own, if at all."""
+    command = [sys.executable, "-m", "forcegrasp.cli.main", "train", *tiny["train"], "hydra.run.dir=run"]
+    environment = {**os.environ, "MUJOCO_GL": backend}
+    done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert not done.stderr

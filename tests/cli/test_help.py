@@ -1,0 +1,83 @@
+"""Help comes up at once, and names everything there is."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+import time
+
+import pytest
+
+from forcegrasp import __version__
+from forcegrasp.cli.main import VERBS, main
+from forcegrasp.cli.options import SCHEMAS, groups, leaves
+
+
+def printed(capsys, *arguments: str) -> str:
+    assert main(list(arguments)) == 0
+    captured = capsys.readouterr()
+    assert not captured.err
+    return captured.out
+
+
+@pytest.mark.parametrize("flag", ["--help", "-h", "help"])
+def test_help_names_every_verb(capsys, flag):
+    out = printed(capsys, flag)
+    for verb, purpose in VERBS.items():
+        assert re.search(rf"^ +{verb} +{re.escape(purpose)}$", out, re.MULTILINE)
+
+
+def test_no_verb_shows_the_same_help_and_fails(capsys):
+    help_text = printed(capsys, "--help")
+    assert main([]) == 2
+    assert help_text in "".join(capsys.readouterr())
+
+
+def test_version(capsys):
+    assert printed(capsys, "--version").strip() == __version__
+
+
+def test_every_verb_has_options():
+    assert set(SCHEMAS) == set(VERBS)
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["-h"], ["seed=1", "--help"]])
+@pytest.mark.parametrize("verb", VERBS)
+def test_help_of_a_verb_names_every_option_and_preset(capsys, verb, arguments):
+    out = printed(capsys, verb, *arguments)
+    for name, entry, default in leaves(SCHEMAS[verb]):
+        line = f"  {name}={str(default).replace(' ', '').replace(chr(39), '')}\n"
+        assert line in out
+        text = out.partition(line)[2].partition("\n")[0]
+        assert entry.metadata["doc"] in text
+        assert f"[{entry.metadata['unit']}]" in text or not entry.metadata["unit"]
+        assert entry.metadata["source"] in text
+        assert all(choice in out for choice in entry.metadata["choices"])
+    for group, choices in groups(verb).items():
+        assert f"  {group}={'|'.join(choices)}\n" in out
+
+
+def test_help_of_train_explains_what_is_no_option(capsys):
+    out = printed(capsys, "train", "--help")
+    for word in ("resume=", "--multirun", "hydra.run.dir=", "hydra/launcher=joblib"):
+        assert word in out
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["train", "--help"], ["evaluate", "--help"]])
+def test_help_is_quick(arguments):
+    """Because nothing heavy is imported for it."""
+    program = (
+        "import sys; from forcegrasp.cli.main import main; status = main(sys.argv[1:]);"
+        "heavy = {'torch', 'torchrl', 'mujoco', 'matplotlib', 'scipy', 'hydra'} & set(sys.modules);"
+        "sys.exit(status or ' '.join(heavy) or 0)"
+    )
+    seconds = []
+    for _ in range(3):  # the machine may be busy with something else
+        started = time.perf_counter()
+        done = subprocess.run([sys.executable, "-c", program, *arguments], capture_output=True, text=True, check=False)
+        seconds.append(time.perf_counter() - started)
+        assert done.returncode == 0, done.stderr
+        if seconds[-1] < 1:
+            break
+    assert min(seconds) < 1

@@ -1,0 +1,98 @@
+"""Sweeps: every combination becomes a run, the same as if it had been started alone."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import yaml
+
+from forcegrasp.cli.main import main
+from forcegrasp.runs.run_dir import RunDir
+
+
+@pytest.fixture(autouse=True)
+def own_folder(tmp_path, monkeypatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "argv", sys.argv)
+    monkeypatch.setenv("HYDRA_FULL_ERROR", "0")
+    return tmp_path
+
+
+def runs_in(folder: Path) -> dict[tuple[bool, int], RunDir]:
+    """(bias, seed) → run."""
+    found = {}
+    for path in sorted(folder.rglob("config.yaml")):
+        config = yaml.safe_load(path.read_text())
+        found[config["action"]["inductive_bias"], config["seed"]] = RunDir(path.parent)
+    return found
+
+
+def final(run: RunDir) -> bytes:
+    return max(run.checkpoints.iterdir()).read_bytes()
+
+
+def test_two_experiments_and_two_seeds_side_by_side(tiny, tmp_path):
+    command = ["train", "-m", "experiment=ib,no_ib", "seed=0,1", *tiny["train"], "hydra/launcher=joblib"]
+    done = subprocess.run(
+        [sys.executable, "-m", "forcegrasp.cli.main", *command, "hydra.launcher.n_jobs=2", "hydra.sweep.dir=sweep"],
+        env={**os.environ, "OMP_NUM_THREADS": "1"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert "Traceback" not in done.stderr
+    runs = runs_in(tmp_path / "sweep")
+    assert set(runs) == {(True, 0), (True, 1), (False, 0), (False, 1)}
+    assert sorted(run.path.name for run in runs.values()) == ["ib_s0_0", "ib_s1_1", "no_ib_s0_2", "no_ib_s1_3"]
+    assert len({final(run) for run in runs.values()}) == 4
+    # a process of the sweep trains several runs: the last one is as good as the first
+    assert main(["train", "experiment=no_ib", "seed=1", *tiny["train"], "hydra.run.dir=alone"]) == 0
+    assert final(runs[False, 1]) == final(RunDir("alone"))
+    assert {path.name for path in tmp_path.iterdir()} == {"sweep", "alone"}
+
+
+def test_one_after_the_other(tiny, tmp_path):
+    assert main(["train", "--multirun", "seed=3,4", *tiny["train"]]) == 0
+    (sweep,) = (tmp_path / "runs").iterdir()
+    assert set(runs_in(sweep)) == {(True, 3), (True, 4)}
+
+
+def test_ctrl_c_ends_the_sweep_and_not_just_one_run(tiny, monkeypatch, capsys):
+    started = []
+    monkeypatch.setattr("forcegrasp.train.loop.train", lambda config, *_: started.append(config.seed))
+    assert main(["train", "-m", "seed=0,1,2", *tiny["train"]]) == 130
+    assert started == [0]
+
+
+def test_a_failing_run_is_named_without_a_traceback(tiny, monkeypatch, capsys):
+    from forcegrasp.errors import PhysicsError
+
+    def diverge(*args):
+        raise PhysicsError("grasp 3 diverged")
+
+    monkeypatch.setattr("forcegrasp.train.loop.train", diverge)
+    assert main(["train", "-m", "seed=0,1", *tiny["train"]]) == 2
+    lines = capsys.readouterr().err.splitlines()
+    assert "seed=0" in lines[0]
+    assert lines[-1] == "forcegrasp: grasp 3 diverged"
+    assert len(lines) == 2
+
+
+def test_single_run_is_named_after_time_experiment_and_seed(tiny, tmp_path):
+    assert main(["train", "experiment=no_rand", "seed=5", *tiny["train"]]) == 0
+    (run,) = (tmp_path / "runs").iterdir()
+    assert run.name.endswith("_no_rand_s5")
+    assert {path.name for path in run.iterdir()} == {
+        "config.yaml",
+        "run.json",
+        "metrics.csv",
+        "checkpoints",
+        "tensorboard",
+        "figures",
+    }
+    assert {path.name for path in tmp_path.iterdir()} == {"runs"}

@@ -1,0 +1,252 @@
+"""Every option changes something: a tiny training or evaluation with it leaves other results behind than without it."""
+
+from __future__ import annotations
+
+import csv
+import dataclasses
+import io
+import json
+import warnings
+from pathlib import Path
+from typing import Any
+
+import pytest
+from PIL import Image
+from rich.console import Console
+
+from forcegrasp.cli.main import main
+from forcegrasp.cli.options import leaves
+from forcegrasp.config import EvaluateConfig, TrainConfig, validate
+from forcegrasp.evaluate.compare_policies import evaluate
+from forcegrasp.runs import checkpoint
+from forcegrasp.runs.run_dir import RunDir
+from forcegrasp.train.loop import Trainer, train
+
+# As small as can be, yet the fingers arrive, wait for each other and press, and the object moves.
+TINY_GRASP = {"grasp.steps": 45, "physics.tier": "fast", "physics.threads": 1}
+TINY_TRAINING = TINY_GRASP | {
+    "ppo.total_frames": 180,
+    "ppo.grasps": 2,
+    "ppo.epochs": 2,
+    "ppo.minibatch": 45,
+    "ppo.hidden": [8],
+    "ppo.initial_action": -1.0,
+    "ppo.log_std": -1.0,
+    "ppo.value_weight": 10.0,  # lest its gradient stays below the largest norm
+    "curriculum.end_fraction": 1.0,
+    "log.checkpoint_every": 1,
+    "log.histograms_every": 0,
+    "log.figures_every": 0,
+    "log.video_every": 0,
+}
+TINY_EVALUATION = TINY_GRASP | {"kappas": 2, "trials": 2}
+
+#: Option → another value than in the tiny training.
+TRAIN_CASES: dict[str, Any] = {
+    "seed": 1,
+    "physics.tier": "reference",
+    "physics.threads": 2,
+    "grasp.kappa": [0.0, 0.5],
+    "grasp.b2": [-9.0, -9.0],
+    "grasp.radius_m": [0.03, 0.035],
+    "grasp.offset_m": [0.001, 0.002],
+    "grasp.deformation_m": 0.008,
+    "grasp.goal_force_min_n": 0.1,
+    "grasp.goal_force_max": 0.8,
+    "grasp.steps": 44,
+    "sensors.position_std_m": 0.001,
+    "sensors.force_std_n": 0.1,
+    "sensors.contact_threshold_n": 0.2,
+    "observation.parts": ["position", "force"],
+    "observation.frames": 2,
+    "action.max_delta_m": 0.002,
+    "action.inductive_bias": False,
+    "action.bias_one_contact": 0.5,
+    "action.bias_floor": 0.5,
+    "reward.form": "goal_normalised",
+    "reward.force_weight": 2.0,
+    "reward.object_weight": 2.0,
+    "reward.action_weight": 1.0,
+    "reward.speed_threshold_m": 0.0,
+    "curriculum.enabled": False,
+    "curriculum.end_fraction": 0.75,
+    "curriculum.object_weight": 0.5,
+    "curriculum.speed_threshold_m": 0.0,
+    "curriculum.radius_m": [0.030, 0.035],
+    "curriculum.offset_m": [-0.002, -0.001],
+    "ppo.total_frames": 181,
+    "ppo.grasps": 3,
+    "ppo.epochs": 3,
+    "ppo.minibatch": 30,
+    "ppo.learning_rate": 1e-3,
+    "ppo.learning_rate_end": 0.5,
+    "ppo.discount": 0.9,
+    "ppo.gae_lambda": 0.5,
+    "ppo.clip": 0.001,
+    "ppo.entropy_weight": 0.1,
+    "ppo.value_weight": 1.0,
+    "ppo.max_grad_norm": 1e-3,
+    "ppo.hidden": [8, 8],
+    "ppo.log_std": -2.0,
+    "ppo.initial_action": -0.8,
+    "ppo.mirrored": False,
+    "ppo.critic": "observation",
+    "log.histograms_every": 1,
+    "log.figures_every": 1,
+    "log.video_every": 1,
+    "log.checkpoint_every": 2,
+    "log.keep": 1,
+}
+
+#: Option → another value than in the tiny evaluation.
+EVALUATE_CASES: dict[str, Any] = {
+    "policies": ["informed"],
+    "out": "elsewhere",
+    "kappas": 3,
+    "trials": 3,
+    "seed": 1,
+    "physics.tier": "reference",
+    "physics.threads": 2,
+    "grasp.kappa": [0.0, 0.5],
+    "grasp.b2": [-9.0, -9.0],
+    "grasp.radius_m": [0.03, 0.035],
+    "grasp.offset_m": [0.001, 0.002],
+    "grasp.deformation_m": 0.008,
+    "grasp.goal_force_min_n": 0.1,
+    "grasp.goal_force_max": 0.8,
+    "grasp.steps": 44,
+    "sensors.position_std_m": 0.001,
+    "sensors.force_std_n": 0.1,
+    "sensors.contact_threshold_n": 0.2,
+    "speed_threshold_m": 0.0,
+}
+
+
+def with_options(config, values: dict[str, Any]):
+    for name, value in values.items():
+        *path, last = name.split(".")
+        owner = config
+        for part in path:
+            owner = getattr(owner, part)
+        assert hasattr(owner, last), name
+        setattr(owner, last, value)
+    validate(config)
+    return config
+
+
+def tensorboard_tags(folder: Path) -> list[str]:
+    from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        events = EventAccumulator(str(folder)).Reload().Tags()
+    return sorted(tag for kind in ("scalars", "histograms", "images") for tag in events[kind])
+
+
+def trained(folder: Path, **values: Any) -> dict[str, Any]:
+    """What a tiny training leaves behind, less what merely repeats its configuration or tells its speed."""
+    config = with_options(TrainConfig(), TINY_TRAINING | values)
+    run = RunDir.create(folder, config, [])
+    assert train(config, run)
+    files = sorted(str(path.relative_to(folder)) for path in folder.rglob("*.*") if "tfevents" not in path.name)
+    tensors, _ = checkpoint.read(max(run.checkpoints.iterdir()))
+    weights = {name: tensor.tolist() for name, tensor in tensors.items() if name.startswith(("policy", "value"))}
+    with open(run.metrics_path, newline="") as file:
+        rows = [{k: v for k, v in row.items() if not k.startswith("speed/")} for row in csv.DictReader(file)]
+    threads = Trainer(config).env.base_env.simulator._batch.nthread
+    tags = tensorboard_tags(run.tensorboard)
+    return {"files": files, "weights": weights, "rows": rows, "threads": threads, "tags": tags}
+
+
+def evaluated(folder: Path, **values: Any) -> dict[str, Any]:
+    """What a tiny evaluation finds, less what merely repeats its configuration."""
+    report = evaluate(with_options(EvaluateConfig(), TINY_EVALUATION | values), folder, Console(file=io.StringIO()))
+    return {"policies": report["policies"], "trials": (folder / "trials.csv").read_text()}
+
+
+@pytest.fixture(autouse=True)
+def no_pictures(monkeypatch):
+    """Drawing takes most of the time, and rendering needs OpenGL."""
+    gif = io.BytesIO()
+    Image.new("P", (2, 2)).save(gif, "GIF")
+    monkeypatch.setattr("forcegrasp.train.logging.grasp_video", lambda *args, **kwargs: gif.getvalue())
+    monkeypatch.setattr("matplotlib.figure.Figure.savefig", lambda self, path, **kwargs: Path(path).touch())
+
+
+@pytest.fixture(scope="module")
+def run_path(tmp_path_factory) -> Path:
+    return tmp_path_factory.mktemp("train")
+
+
+@pytest.fixture(scope="module")
+def plain_training(run_path):
+    return trained(run_path)
+
+
+@pytest.fixture(scope="module")
+def learned(plain_training, run_path) -> dict[str, list[str]]:
+    """A policy that sees every reading, which the hand-written controllers do not."""
+    return {"policies": [str(run_path)]}
+
+
+@pytest.fixture(scope="module")
+def plain_evaluation(tmp_path_factory, learned):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("matplotlib.figure.Figure.savefig", lambda *args, **kwargs: None)
+        return evaluated(tmp_path_factory.mktemp("evaluate"), **learned)
+
+
+def test_every_option_of_train_has_a_case():
+    assert list(TRAIN_CASES) == [name for name, *_ in leaves(TrainConfig)]
+
+
+def test_every_option_of_evaluate_has_a_case():
+    assert list(EVALUATE_CASES) == [name for name, *_ in leaves(EvaluateConfig)]
+
+
+def test_the_same_training_leaves_the_same(tmp_path, plain_training):
+    assert trained(tmp_path) == plain_training
+
+
+def test_the_same_evaluation_finds_the_same(tmp_path, plain_evaluation, learned):
+    assert evaluated(tmp_path, **learned) == plain_evaluation
+
+
+@pytest.mark.parametrize("name", TRAIN_CASES)
+def test_option_of_train(name, tmp_path, plain_training):
+    different = trained(tmp_path, **{name: TRAIN_CASES[name]})
+    assert different != plain_training
+
+
+@pytest.mark.parametrize("name", [name for name in EVALUATE_CASES if name not in ("out", "physics.threads")])
+def test_option_of_evaluate(name, tmp_path, plain_evaluation, learned):
+    different = evaluated(tmp_path, **learned | {name: EVALUATE_CASES[name]})
+    assert different != plain_evaluation
+
+
+def test_threads_of_evaluate_reach_the_engine(tmp_path, monkeypatch):
+    from mujoco.batch import Batch
+
+    asked = []
+
+    def recording(model, n, threads):
+        asked.append(threads)
+        return Batch(model, n, threads)
+
+    monkeypatch.setattr("forcegrasp.physics.simulator.Batch", recording)
+    evaluated(tmp_path, **{"physics.threads": EVALUATE_CASES["physics.threads"]})
+    assert set(asked) == {2}
+
+
+def test_out_is_where_evaluate_writes(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    tiny = [f"{name}={value}" for name, value in TINY_EVALUATION.items()]
+    assert main(["evaluate", *tiny, f"out={EVALUATE_CASES['out']}"]) == 0
+    assert json.loads((tmp_path / EVALUATE_CASES["out"] / "evaluation.json").read_text())["trials"] == 2
+
+
+def test_every_section_is_a_dataclass_with_documented_options():
+    for schema in (TrainConfig, EvaluateConfig):
+        for name, entry, _ in leaves(schema):
+            assert entry.metadata["doc"], name
+        assert all(dataclasses.is_dataclass(value) or value is not None for value in vars(schema()).values())

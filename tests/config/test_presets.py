@@ -1,0 +1,158 @@
+"""Presets in conf/: every one composes, changes what its name says, and repeats no default."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+import yaml
+
+from forcegrasp.cli.options import SCHEMAS, compose, groups, leaves
+from forcegrasp.config import EvaluateConfig, TrainConfig
+
+CONF = Path(__file__).parents[2] / "conf"
+FILES = sorted(path for path in CONF.glob("*/*.yaml"))
+EXPERIMENTS = sorted(path.stem for path in CONF.glob("experiment/*.yaml"))
+CHOICES = [
+    (verb, path.parent.name, path.stem) for verb in SCHEMAS for path in FILES if path.parent.name in groups(verb)
+]
+
+
+def options(config) -> dict:
+    return {name: value for name, _, value in leaves(config)}
+
+
+def changed(before, after) -> dict:
+    """Options that differ, with their new value."""
+    old = options(before)
+    return {name: value for name, value in options(after).items() if value != old[name]}
+
+
+def train(*overrides: str) -> TrainConfig:
+    return compose("train", list(overrides))
+
+
+def default_choices(verb: str) -> dict[str, str]:
+    entries = yaml.safe_load((CONF / f"{verb}.yaml").read_text())["defaults"]
+    picked = {}
+    for entry in entries:
+        picked |= entry if isinstance(entry, dict) else {}
+    return {group: choice for group, choice in picked.items() if not group.startswith("override")}
+
+
+def named_options(path: Path) -> dict:
+    """Options that a preset's file names itself, by their full names."""
+    text = path.read_text()
+    prefix = "" if "@package _global_" in text else f"{path.parent.name}."
+    found: dict = {}
+
+    def walk(node: dict, head: str) -> None:
+        for key, value in node.items():
+            if isinstance(value, dict):
+                walk(value, f"{head}{key}.")
+            else:
+                found[f"{head}{key}"] = value
+
+    walk({key: value for key, value in yaml.safe_load(text).items() if key != "defaults"}, prefix)
+    return found
+
+
+@pytest.mark.parametrize(("verb", "schema"), SCHEMAS.items())
+def test_without_presets_the_dataclasses_speak(verb, schema):
+    assert compose(verb, []) == schema()
+
+
+def test_every_group_is_offered():
+    assert set(groups("train")) == {path.parent.name for path in FILES}
+    assert set(groups("evaluate")) == {"physics", "sensors"}
+
+
+@pytest.mark.parametrize(("verb", "group", "choice"), CHOICES)
+def test_preset_sets_what_its_file_says(verb, group, choice):
+    composed = options(compose(verb, [f"{group}={choice}"]))
+    named = named_options(CONF / group / f"{choice}.yaml")
+    assert {name: composed[name] for name in named} == named
+
+
+@pytest.mark.parametrize(("verb", "group", "choice"), CHOICES)
+def test_preset_changes_something_unless_it_is_the_default(verb, group, choice):
+    config = compose(verb, [f"{group}={choice}"])
+    assert bool(changed(SCHEMAS[verb](), config)) == (choice != default_choices(verb)[group])
+
+
+@pytest.mark.parametrize(("verb", "group", "choice"), CHOICES)
+def test_defaults_live_in_the_dataclasses(verb, group, choice):
+    # only the preset that a verb picks by itself may name a default: choosing it must mean something
+    if choice == default_choices(verb)[group]:
+        return
+    default = options(SCHEMAS[verb]())
+    repeated = [
+        name for name, value in named_options(CONF / group / f"{choice}.yaml").items() if default[name] == value
+    ]
+    assert not repeated
+
+
+@pytest.mark.parametrize("verb", SCHEMAS)
+def test_a_verbs_own_file_sets_no_option(verb):
+    assert set(yaml.safe_load((CONF / f"{verb}.yaml").read_text())) <= {"defaults", "hydra"}
+
+
+def test_no_ib_differs_from_ib_in_the_bias_alone():
+    assert changed(train("experiment=ib"), train("experiment=no_ib")) == {"action.inductive_bias": False}
+
+
+def test_no_rand_differs_from_no_ib_in_the_randomisation_alone():
+    assert changed(train("experiment=no_ib"), train("experiment=no_rand")) == {
+        "grasp.kappa": [0.5, 0.5],
+        "grasp.b2": [-9.0, -9.0],
+    }
+
+
+def test_no_curriculum_differs_from_ib_in_the_curriculum_alone():
+    assert changed(train("experiment=ib"), train("experiment=no_curriculum")) == {"curriculum.enabled": False}
+
+
+def test_recommended_differs_from_ib_in_reward_form_and_waiting():
+    assert changed(train("experiment=ib"), train("experiment=recommended")) == {
+        "reward.form": "goal_normalised",
+        "action.bias_one_contact": 0.0,
+    }
+
+
+@pytest.mark.parametrize(
+    ("overrides", "name", "value"),
+    [
+        (["experiment=recommended", "reward=paper"], "reward.form", "paper"),
+        (["reward=paper", "experiment=recommended"], "reward.form", "paper"),
+        (["experiment=recommended", "reward.form=paper"], "reward.form", "paper"),
+        (["action.inductive_bias=true", "experiment=no_ib"], "action.inductive_bias", True),
+        (["experiment=no_rand", "grasp.kappa=[0,1]"], "grasp.kappa", [0.0, 1.0]),
+        (["sensors=authors", "sensors.force_std_n=0.01"], "sensors.force_std_n", 0.01),
+        (["budget=quick", "ppo.total_frames=1000"], "ppo.total_frames", 1000),
+        (["physics=reference", "experiment=ib"], "physics.tier", "reference"),
+    ],
+)
+def test_what_is_given_explicitly_wins(overrides, name, value):
+    assert options(train(*overrides))[name] == value
+
+
+@pytest.mark.parametrize("experiment", EXPERIMENTS)
+def test_experiments_mix_with_every_other_preset(experiment):
+    others = {"budget": "quick", "physics": "reference", "reward": "goal_normalised", "sensors": "authors"}
+    assert {"experiment", *others} == set(groups("train"))
+    mixed = options(train(f"experiment={experiment}", *(f"{group}={choice}" for group, choice in others.items())))
+    for group, choice in others.items():
+        named = named_options(CONF / group / f"{choice}.yaml")
+        assert {name: mixed[name] for name in named} == named
+
+
+def test_training_is_fast_and_evaluation_faithful_by_default():
+    assert TrainConfig().physics.tier == "fast"
+    assert EvaluateConfig().physics.tier == "reference"
+
+
+def test_default_configs_share_no_lists():
+    one, other = TrainConfig(), TrainConfig()
+    one.grasp.kappa[0] = 0.9
+    one.ppo.hidden.append(3)
+    assert other == TrainConfig()

@@ -1,0 +1,181 @@
+"""What a configuration refuses: values out of bounds, unknown names, and anything that names code."""
+
+from __future__ import annotations
+
+import math
+import re
+from itertools import pairwise
+
+import pytest
+
+from forcegrasp.cli.options import SCHEMAS, compose, leaves
+from forcegrasp.config import validate
+from forcegrasp.errors import ConfigError
+
+LEAVES = [(verb, name, entry, default) for verb, schema in SCHEMAS.items() for name, entry, default in leaves(schema)]
+
+
+def is_number(value) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
+
+
+def first(default):
+    return default[0] if isinstance(default, list) else default
+
+
+def selected(condition) -> dict:
+    chosen = [leaf for leaf in LEAVES if condition(leaf[2].metadata, leaf[3])]
+    return {
+        "argnames": ("verb", "name", "meta", "default"),
+        "argvalues": [(verb, name, entry.metadata, default) for verb, name, entry, default in chosen],
+        "ids": [f"{verb}-{name}" for verb, name, *_ in chosen],
+    }
+
+
+NUMBERS = selected(lambda meta, default: is_number(first(default)))
+RANGES = selected(lambda meta, default: isinstance(default, list) and isinstance(default[0], float))
+LISTS = selected(lambda meta, default: isinstance(default, list))
+CHOICES = selected(lambda meta, default: meta["choices"])
+
+
+def with_option(verb: str, name: str, value):
+    config = SCHEMAS[verb]()
+    *path, last = name.split(".")
+    owner = config
+    for part in path:
+        owner = getattr(owner, part)
+    assert hasattr(owner, last)
+    setattr(owner, last, value)
+    if name == "grasp.deformation_m":  # objects it fits into, for its own bounds to be what counts
+        for part in (config.grasp, getattr(config, "curriculum", None)):
+            if part:
+                part.radius_m = [0.04, 0.04]
+    return config
+
+
+def refused(verb: str, name: str, value) -> str:
+    with pytest.raises(ConfigError, match=f"^{re.escape(name)}=") as caught:
+        validate(with_option(verb, name, value))
+    message = str(caught.value)
+    assert "\n" not in message
+    return message
+
+
+def like(default, number):
+    """``number`` in the place of the default: a number, or a list of as many."""
+    return [number] * len(default) if isinstance(default, list) else number
+
+
+@pytest.mark.parametrize(("verb", "schema"), SCHEMAS.items())
+def test_defaults_are_valid(verb, schema):
+    validate(schema())
+
+
+@pytest.mark.parametrize(**NUMBERS)
+def test_every_number_has_bounds_and_accepts_them(verb, name, meta, default):
+    assert math.isfinite(meta["low"])
+    assert math.isfinite(meta["high"])
+    for bound in (meta["low"], meta["high"]):
+        validate(with_option(verb, name, like(default, type(first(default))(bound))))
+
+
+@pytest.mark.parametrize(**NUMBERS)
+def test_numbers_out_of_bounds_are_refused(verb, name, meta, default):
+    low, high = meta["low"], meta["high"]
+    if isinstance(first(default), int):
+        below, above = int(low) - 1, int(high) + 1
+    else:
+        below, above = math.nextafter(low, -math.inf), math.nextafter(high, math.inf)
+    for value in (below, above, -math.inf, math.inf, math.nan):
+        message = refused(verb, name, like(default, value))
+        assert "must lie in" in message
+
+
+@pytest.mark.parametrize(**RANGES)
+def test_ranges_are_two_numbers_in_order(verb, name, meta, default):
+    low, high = meta["low"], meta["high"]
+    validate(with_option(verb, name, [low, high]))
+    validate(with_option(verb, name, [low, low]))
+    for value in ([high, low], [low], [low, low, high], []):
+        assert "[low, high]" in refused(verb, name, value)
+    for value in ([math.nan, high], [low, math.nan]):
+        refused(verb, name, value)
+
+
+@pytest.mark.parametrize(**LISTS)
+def test_lists_are_not_empty(verb, name, meta, default):
+    refused(verb, name, [])
+
+
+@pytest.mark.parametrize(**CHOICES)
+def test_choices_are_closed(verb, name, meta, default):
+    listed = isinstance(default, list)
+    for choice in meta["choices"]:
+        validate(with_option(verb, name, [choice] if listed else choice))
+        for wrong in (choice.upper(), choice + "s", ""):
+            message = refused(verb, name, [wrong] if listed else wrong)
+            assert all(choice in message for choice in meta["choices"])
+
+
+def test_observation_parts_come_once():
+    assert "twice" in refused("train", "observation.parts", ["force", "position", "force"])
+
+
+@pytest.mark.parametrize(
+    ("verb", "name"), [(verb, name) for verb, name, *_ in LEAVES], ids=lambda value: value if "." in value else None
+)
+def test_misspelt_option_is_refused_with_the_right_name(verb, name):
+    known = {known for known, *_ in leaves(SCHEMAS[verb])}
+    swapped = [name[:i] + b + a + name[i + 2 :] for i, (a, b) in enumerate(pairwise(name))]
+    for wrong in (f"{name}x", swapped[-1], swapped[0]):
+        if wrong in known:
+            continue
+        with pytest.raises(ConfigError) as caught:
+            compose(verb, [f"{wrong}=1"])
+        message = str(caught.value)
+        assert message.startswith(f"no option {wrong!r}")
+        assert re.search(rf"(\?|mean|or|known:|,) ?{re.escape(name)}\b", message)
+
+
+@pytest.mark.parametrize(
+    "override",
+    [
+        "_target_=builtins.print",
+        "+_target_=builtins.print",
+        "++_target_=builtins.print",
+        "ppo._target_=builtins.print",
+        "+ppo._target_=builtins.print",
+        "ppo={_target_: builtins.print}",
+        "+ppo.hidden._target_=builtins.print",
+        "ppo.hidden={_target_: builtins.print}",
+        "ppo.hidden=[{_target_: builtins.print}]",
+        "hydra.launcher._target_=builtins.print",
+        "hydra.sweeper._target_=builtins.print",
+        "hydra.callbacks={mine: {_target_: builtins.print}}",
+        "+hydra.callbacks.mine._target_=builtins.print",
+        "hydra.launcher={_target_: builtins.print}",
+    ],
+)
+def test_no_option_can_name_a_python_object(override):
+    with pytest.raises(ConfigError):
+        compose("train", [override])
+
+
+@pytest.mark.parametrize("value", ["1.5", "many", "true", "null", "[1]", "{a: 1}", ""])
+def test_wrong_types_are_refused(value):
+    with pytest.raises(ConfigError, match=r"ppo\.grasps"):
+        compose("train", [f"ppo.grasps={value}"])
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("ppo.hidden", "[[1]]"),
+        ("ppo.hidden", "[{a: 1}]"),
+        ("grasp.kappa", "[[0],[1]]"),
+        ("observation.parts", "[[force]]"),
+    ],
+)
+def test_lists_hold_no_lists(name, value):
+    with pytest.raises(ConfigError, match=re.escape(name)):
+        compose("train", [f"{name}={value}"])

@@ -1,0 +1,211 @@
+"""A resumed run equals the uninterrupted one to the last bit: weights, optimiser, generators and metrics."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+import pytest
+import torch
+
+from forcegrasp.cli.main import main
+from forcegrasp.errors import CheckpointError
+from forcegrasp.runs import checkpoint
+from forcegrasp.runs.run_dir import RunDir
+from forcegrasp.train.logging import TrainingLog
+from forcegrasp.train.loop import train
+
+
+class PowerCutError(Exception):
+    """Ends a training where it stands."""
+
+
+def power_cut() -> None:
+    raise PowerCutError
+
+
+def ctrl_c() -> None:
+    signal.raise_signal(signal.SIGINT)
+
+
+def terminate() -> None:
+    signal.raise_signal(signal.SIGTERM)
+
+
+@contextmanager
+def after_batch(number: int, action: Callable[[], None]) -> Iterator[None]:
+    """Calls the action once that batch has been logged, before it can be saved."""
+    log = TrainingLog.batch
+
+    def batch(self, count, *args):
+        log(self, count, *args)
+        if count == number:
+            action()
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(TrainingLog, "batch", batch)
+        yield
+
+
+def final(run: RunDir) -> bytes:
+    """The last checkpoint, as it is on the disk."""
+    return max(run.checkpoints.iterdir()).read_bytes()
+
+
+SECTIONS = {
+    "default": {"log": {"checkpoint_every": 2, "keep": 99}},
+    "other": {
+        "log": {"checkpoint_every": 2, "keep": 99},
+        "ppo": {"critic": "observation", "mirrored": False, "entropy_weight": 0.01, "grasps": 3, "total_frames": 450},
+        "observation": {"frames": 1},
+        "curriculum": {"end_fraction": 0.9},
+        "action": {"inductive_bias": False},
+    },
+}
+
+
+@pytest.fixture(scope="module", params=SECTIONS)
+def whole(request, tmp_path_factory, tiny, trained) -> RunDir:
+    """A run that nobody interrupted: five batches, checkpoints after 2, 4 and 5."""
+    return trained(tmp_path_factory.mktemp("whole") / "run", tiny(**SECTIONS[request.param]))
+
+
+@pytest.fixture
+def run(whole, tmp_path) -> RunDir:
+    return RunDir.create(tmp_path / "run", whole.config(), [])
+
+
+def resume(run: RunDir) -> bool:
+    torch.manual_seed(12345)  # what a new process would have, or not
+    return train(run.config(), run, resume=True)
+
+
+@pytest.fixture
+def equal(metrics) -> Callable[[RunDir, RunDir], bool]:
+    return lambda one, other: final(one) == final(other) and metrics(one) == metrics(other)
+
+
+@pytest.mark.parametrize("action", [ctrl_c, terminate])
+@pytest.mark.parametrize("number", [1, 2, 4])
+def test_after_a_signal(whole, run, equal, number, action):
+    handlers = [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)]
+    with after_batch(number, action):
+        assert not train(run.config(), run)
+    assert [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)] == handlers
+    assert run.load()[1]["batches"] == number
+    assert resume(run)
+    assert equal(run, whole)
+
+
+@pytest.mark.parametrize("number", [3, 4])
+def test_after_a_power_cut(whole, run, equal, metrics, number):
+    with after_batch(number, power_cut), pytest.raises(PowerCutError):
+        train(run.config(), run)
+    assert run.load()[1]["batches"] == 2
+    assert len(metrics(run)) == number
+    assert resume(run)
+    assert equal(run, whole)
+
+
+def test_after_many_interruptions(whole, run, equal):
+    with after_batch(1, ctrl_c):
+        train(run.config(), run)
+    with after_batch(2, ctrl_c):
+        assert not resume(run)
+    with after_batch(3, power_cut), pytest.raises(PowerCutError):
+        resume(run)
+    with after_batch(4, terminate):
+        assert not resume(run)
+    assert resume(run)
+    assert equal(run, whole)
+
+
+def test_with_the_newest_checkpoint_damaged(whole, run, equal):
+    with after_batch(4, ctrl_c):
+        train(run.config(), run)
+    newest = max(run.checkpoints.iterdir())
+    newest.write_bytes(newest.read_bytes()[:-1])
+    assert resume(run)
+    assert equal(run, whole)
+
+
+def test_second_ctrl_c_ends_at_once(run):
+    def twice():
+        ctrl_c()
+        ctrl_c()
+
+    with after_batch(2, twice), pytest.raises(KeyboardInterrupt):
+        train(run.config(), run)
+
+
+def test_interrupted_before_the_first_checkpoint(run):
+    with after_batch(1, power_cut), pytest.raises(PowerCutError):
+        train(run.config(), run)
+    with pytest.raises(CheckpointError, match="no checkpoint yet"):
+        resume(run)
+
+
+def test_same_seed_same_result(whole, run, equal):
+    train(run.config(), run)
+    assert equal(run, whole)
+
+
+def weights(run: RunDir) -> dict[str, torch.Tensor]:
+    return run.load()[0]
+
+
+def test_other_seed_other_result(tmp_path, tiny, trained):
+    one, other = (weights(trained(tmp_path / str(seed), tiny(seed=seed))) for seed in (0, 1))
+    learned = [name for name in one if name.endswith("weight")]
+    assert learned
+    assert not any(torch.equal(one[name], other[name]) for name in learned)
+
+
+def test_logs_and_threads_do_not_change_what_is_learned(tmp_path, tiny, trained):
+    chatty = {"histograms_every": 1, "figures_every": 2, "checkpoint_every": 1, "keep": 1}
+    one = weights(trained(tmp_path / "quiet", tiny()))
+    other = weights(trained(tmp_path / "chatty", tiny(log=chatty, physics={"threads": 2})))
+    assert one.keys() == other.keys()
+    assert all(torch.equal(one[name], other[name]) for name in one)
+
+
+def test_resuming_a_finished_run_leaves_it_alone(whole, capsys):
+    before = final(whole), whole.metrics_path.read_bytes()
+    assert main(["train", f"resume={whole.path}"]) == 0
+    assert "already trained" in capsys.readouterr().out
+    assert (final(whole), whole.metrics_path.read_bytes()) == before
+
+
+def test_command_line_after_ctrl_c(tmp_path, metrics):
+    """The whole way: a process is interrupted, says so, and another one goes on."""
+    options = ["ppo.total_frames=1600", "ppo.grasps=2", "grasp.steps=40", "physics.threads=1", "ppo.hidden=[8]"]
+    quiet = ["log.histograms_every=0", "log.figures_every=0", "log.video_every=0", "log.checkpoint_every=1000"]
+    command = ["train", *options, *quiet]
+    run, uninterrupted = RunDir(tmp_path / "run"), RunDir(tmp_path / "whole")
+    process = subprocess.Popen(
+        [sys.executable, "-m", "forcegrasp.cli.main", *command, f"hydra.run.dir={run.path}"],
+        env={**os.environ, "OMP_NUM_THREADS": "1"},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    deadline = time.monotonic() + 60
+    while not run.metrics_path.exists() and process.poll() is None and time.monotonic() < deadline:
+        time.sleep(0.02)
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=60)
+    assert process.returncode == 130, err
+    assert out.splitlines()[-1] == f"stopped and saved; go on with: forcegrasp train resume={run.path}"
+    assert not err
+    assert 1 <= len(metrics(run)) < 20
+    assert checkpoint.read(max(run.checkpoints.iterdir()))[1]["batches"] == len(metrics(run))
+
+    assert main(["train", f"resume={run.path}"]) == 0
+    assert main([*command, f"hydra.run.dir={uninterrupted.path}"]) == 0
+    assert final(run) == final(uninterrupted)
+    assert metrics(run) == metrics(uninterrupted)

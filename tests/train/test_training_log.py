@@ -1,0 +1,154 @@
+"""What a training shows: TensorBoard, metrics.csv and figures, and that their numbers are what they say."""
+
+from __future__ import annotations
+
+import io
+import warnings
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from forcegrasp.runs.run_dir import RunDir
+from forcegrasp.train.logging import TrainingLog
+from forcegrasp.train.loop import train
+
+
+def events(run: RunDir):
+    from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        everything = dict.fromkeys(("scalars", "histograms", "images", "tensors"), 0)
+        return EventAccumulator(str(run.tensorboard), size_guidance=everything).Reload()
+
+
+@pytest.fixture(scope="module")
+def config(tiny):
+    # long enough that the object is touched and moved
+    sections = {"grasp": {"steps": 50}, "ppo": {"total_frames": 500}, "curriculum": {"end_fraction": 0.5}}
+    weights = {"reward": {"force_weight": 1.5, "object_weight": 0.7, "action_weight": 0.3}}
+    return tiny(**sections, **weights, log={"histograms_every": 2, "figures_every": 2, "video_every": 3})
+
+
+@pytest.fixture(scope="module")
+def gif() -> bytes:
+    data = io.BytesIO()
+    Image.new("P", (2, 2)).save(data, "GIF")
+    return data.getvalue()
+
+
+@pytest.fixture(scope="module")
+def run(config, gif, tmp_path_factory, trained):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("forcegrasp.train.logging.grasp_video", lambda *args: gif)
+        return trained(tmp_path_factory.mktemp("log") / "run", config)
+
+
+def test_tensorboard_shows_every_group(run):
+    found = events(run)
+    tags = found.Tags()
+    assert {tag.split("/")[0] for tag in tags["scalars"]} == {"episode", "reward", "ppo", "curriculum", "speed"}
+    assert set(tags["histograms"]) == {"actions/policy", "forces/touching_n"}
+    assert set(tags["images"]) == {"grasps/force_traces", "grasps/video"}
+    assert "config/text_summary" in tags["tensors"]
+    expected = {
+        "episode/return",
+        "episode/force_reward_normalised",
+        "episode/force_reward_paper",
+        "episode/displacement_until_grasped_mm",
+        "reward/force_paper",
+        "reward/force_normalised",
+        "reward/object",
+        "reward/action",
+        "ppo/loss_objective",
+        "ppo/loss_critic",
+        "ppo/kl_approx",
+        "ppo/clip_fraction",
+        "ppo/learning_rate",
+        "ppo/entropy",
+        "curriculum/object_weight",
+        "curriculum/speed_threshold_m",
+        "speed/frames_per_s",
+    }
+    assert expected <= set(tags["scalars"])
+
+
+def test_metrics_are_tensorboards(run, metrics):
+    found, rows = events(run), metrics(run)
+    scalars = [tag for tag in found.Tags()["scalars"] if not tag.startswith("speed/")]
+    assert {"frames", *scalars} == set(rows[0])
+    for tag in scalars:
+        logged = [(event.step, event.value) for event in found.Scalars(tag)]
+        assert [step for step, _ in logged] == [row["frames"] for row in rows]
+        np.testing.assert_allclose([value for _, value in logged], [row[tag] for row in rows], rtol=1e-6)
+
+
+def test_parts_appear_as_often_as_asked(run):
+    found = events(run)
+    assert [event.step for event in found.Histograms("actions/policy")] == [200, 400]
+    # and at the end
+    assert [event.step for event in found.Images("grasps/force_traces")] == [200, 400, 500]
+    assert [event.step for event in found.Images("grasps/video")] == [300, 500]
+    assert sorted(path.name for path in run.figures.iterdir()) == [
+        "grasp_000000000300.gif",
+        "grasp_000000000500.gif",
+        "traces_000000000200.png",
+        "traces_000000000400.png",
+        "traces_000000000500.png",
+    ]
+    for path in run.figures.glob("*.png"):
+        with Image.open(path) as picture:
+            assert len(set(picture.convert("L").tobytes())) > 10
+
+
+def test_histogram_of_actions_is_what_the_gripper_gets(run):
+    histogram = events(run).Histograms("actions/policy")[0].histogram_value
+    assert histogram.num == 2 * 50 * 2
+    assert histogram.min >= -1
+    assert histogram.max <= 1
+
+
+def test_schedules_in_the_metrics(run, metrics, config):
+    rows = metrics(run)
+    before = np.array([0, 100, 200, 300, 400])
+    assert [row["frames"] for row in rows] == list(before + 100)
+    rate = config.ppo.learning_rate * np.interp(before, [0, 500], [1, config.ppo.learning_rate_end])
+    np.testing.assert_allclose([row["ppo/learning_rate"] for row in rows], rate, rtol=1e-9)
+    weight = np.interp(before, [0, 250], [config.curriculum.object_weight, config.reward.object_weight])
+    np.testing.assert_allclose([row["curriculum/object_weight"] for row in rows], weight, rtol=1e-9)
+    low = np.interp(before, [0, 250], [config.curriculum.offset_m[0], config.grasp.offset_m[0]])
+    np.testing.assert_allclose([row["curriculum/offset_low_m"] for row in rows], low, rtol=1e-9)
+
+
+def test_returns_are_the_sum_of_the_reward_terms(run, metrics, config):
+    rows = metrics(run)
+    assert any(row["reward/object"] < 0 for row in rows), "the object must have moved"
+    assert all(row["reward/action"] < 0 for row in rows)
+    for row in rows:
+        step = (
+            config.reward.force_weight * row["reward/force_paper"]
+            + row["curriculum/object_weight"] * row["reward/object"]
+            + config.reward.action_weight * row["reward/action"]
+        )
+        assert row["episode/return"] == pytest.approx(config.grasp.steps * step, rel=1e-4)
+        assert row["episode/force_reward_paper"] == pytest.approx(50 * row["reward/force_paper"], rel=1e-4)
+        assert row["episode/fast_steps"] == pytest.approx(-50 * row["reward/object"], rel=1e-4)
+
+
+def test_a_resumed_run_hides_what_it_repeats(tiny, tmp_path):
+    config = tiny(log={"checkpoint_every": 2})
+    run = RunDir.create(tmp_path / "run", config, [])
+    log = TrainingLog.batch
+
+    def batch(self, number, *args):
+        log(self, number, *args)
+        if number == 3:
+            raise ZeroDivisionError
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(TrainingLog, "batch", batch)
+        with pytest.raises(ZeroDivisionError):
+            train(config, run)
+    assert train(config, run, resume=True)
+    assert [event.step for event in events(run).Scalars("episode/return")] == [60, 120, 180, 240, 300]
