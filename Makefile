@@ -8,7 +8,7 @@ RUN := runs/latest_$(shell date +%Y-%m-%d_%H-%M-%S)
 
 train: setup
 	$(VENV)/bin/forcegrasp train experiment=recommended budget=quick hydra.run.dir=$(RUN)
-	$(VENV)/bin/forcegrasp evaluate policies=[$(RUN),force_pi,informed] out=$(RUN)/evaluation
+	$(VENV)/bin/forcegrasp evaluate 'policies=[$(RUN),force_pi,informed]' out=$(RUN)/evaluation
 
 test: setup
 	$(VENV)/bin/python -m pytest -q -n auto

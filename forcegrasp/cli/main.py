@@ -27,7 +27,7 @@ examples
   forcegrasp train experiment=no_ib budget=quick seed=1    an ablation, about five minutes
   forcegrasp train -m experiment=ib,no_ib,no_rand seed=0,1,2 hydra/launcher=joblib
   forcegrasp train resume=runs/RUN                         go on with an interrupted run
-  forcegrasp evaluate policies=[runs/RUN,force_pi]
+  forcegrasp evaluate 'policies=[runs/RUN,force_pi]'
 
 Every verb explains its options with --help. Exit status: 0 done, 2 bad input, 130 interrupted (and saved).
 """

@@ -47,9 +47,9 @@ def force_traces(episodes: TensorDictBase, title: str) -> Figure:
 
 
 def draw_episode(episode: TensorDictBase, width: int, height: int) -> Figure:
-    """One episode's forces, sized in pixels, for use beside a video. The axes span 0.16-0.96 × 0.14-0.92."""
+    """One episode's forces, sized in pixels, for use beside a video. The axes span 0.19-0.96 × 0.14-0.92."""
     figure = Figure(figsize=(width / 100, height / 100), dpi=100)
-    axes = figure.add_axes((0.16, 0.14, 0.80, 0.78))
+    axes = figure.add_axes((0.19, 0.14, 0.77, 0.78))
     _draw_forces(axes, episode)
     axes.set_xlabel("time [s]")
     axes.set_ylabel("force [N]")

@@ -66,7 +66,7 @@ def _render(source: Path, target: Path, tier: str, every: int) -> None:
     simulator = GraspSimulator(1, tier, threads=1)
     simulator.reset(GraspParameters.from_array(parameters))
     renderer = mujoco.Renderer(simulator.scene(0)[0], HEIGHT, WIDTH)
-    left, right = WIDTH * 1.16, WIDTH * 1.96  # the axes of draw_episode
+    left, right = WIDTH * 1.19, WIDTH * 1.96  # the axes of draw_episode
     pictures = []
     for step, command in enumerate(commands):
         simulator.command(command[None])

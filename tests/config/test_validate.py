@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import pytest
 
-from forcegrasp.cli.options import SCHEMAS, compose, leaves
+from forcegrasp.cli.options import SCHEMAS, compose, compose_run, leaves
 from forcegrasp.config import validate
 from forcegrasp.errors import ConfigError
 
@@ -159,6 +159,11 @@ def test_misspelt_option_is_refused_with_the_right_name(verb, name):
 def test_no_option_can_name_a_python_object(override):
     with pytest.raises(ConfigError):
         compose("train", [override])
+
+
+def test_a_folder_may_be_named_anything(tmp_path):
+    folder = str(tmp_path / "small_targets")
+    assert compose_run("train", [f"hydra.run.dir={folder}"])[1] == folder
 
 
 @pytest.mark.parametrize("value", ["1.5", "many", "true", "null", "[1]", "{a: 1}", ""])

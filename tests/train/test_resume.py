@@ -18,7 +18,7 @@ from forcegrasp.errors import CheckpointError
 from forcegrasp.runs import checkpoint
 from forcegrasp.runs.run_dir import RunDir
 from forcegrasp.train.logging import TrainingLog
-from forcegrasp.train.loop import train
+from forcegrasp.train.loop import Trainer, train
 
 
 class PowerCutError(Exception):
@@ -164,6 +164,28 @@ def test_other_seed_other_result(tmp_path, tiny, trained):
     learned = [name for name in one if name.endswith("weight")]
     assert learned
     assert not any(torch.equal(one[name], other[name]) for name in learned)
+
+
+def test_seed_decides_everything_random(tiny):
+    """Each stream on its own: first weights, order of frames, grasps, sensor noise and actions."""
+
+    def streams(seed: int) -> dict[str, torch.Tensor]:
+        trainer = Trainer(tiny(seed=seed))
+        first = {"weights": trainer.value.module.net[0].weight.detach().clone()}
+        first["order"] = torch.randperm(100, generator=trainer.shuffle)
+        start = trainer.env.reset()
+        noise = start["sensed_force"] - start["force"]
+        with torch.no_grad():
+            return first | {
+                "grasps": start["grasp_parameters"].clone(),
+                "noise": noise,
+                "actions": trainer.policy(start)["action"],
+            }
+
+    one, same, other = streams(3), streams(3), streams(4)
+    for name in one:
+        assert torch.equal(one[name], same[name]), name
+        assert not torch.equal(one[name], other[name]), name
 
 
 def test_logs_and_threads_do_not_change_what_is_learned(tmp_path, tiny, trained):
