@@ -49,7 +49,7 @@ def main(arguments: list[str] | None = None) -> int:
             raise ForcegraspError(f"no verb {verb!r}{closest(verb, VERBS)}")
         _quieten()
         if not {"-h", "--help"} & set(rest):
-            _import_mujoco()
+            import_mujoco()
         return importlib.import_module(f"forcegrasp.cli.{verb}").main(rest)
     except ForcegraspError as error:
         print(f"forcegrasp: {error}", file=sys.stderr)
@@ -73,7 +73,7 @@ def _quieten() -> None:
         warnings.filterwarnings("ignore", message=message)
 
 
-def _import_mujoco() -> None:
+def import_mujoco() -> None:
     """Imports MuJoCo without an OpenGL backend, which it would load at once, and fail where there is none.
 
     Videos are rendered in a process of their own, which gets the user's choice of backend.

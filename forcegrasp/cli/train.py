@@ -72,8 +72,10 @@ def _sweep_job(composed) -> int:
     from hydra.core.hydra_config import HydraConfig
     from omegaconf import OmegaConf
 
+    from forcegrasp.cli.main import import_mujoco
     from forcegrasp.runs.run_dir import RunDir
 
+    import_mujoco()  # a launcher may have started a process of its own
     hydra, config = HydraConfig.get(), OmegaConf.to_object(composed)
     run = RunDir.create(hydra.runtime.output_dir, config, list(hydra.overrides.task))
     status = _train(config, run, resume=False)

@@ -26,8 +26,8 @@ from forcegrasp.runs.policy import load_policy
 
 #: Figures that are printed: name, heading (escaped for rich), digits.
 TABLE = (
-    ("force_reward_normalised", "force reward of 150,\nnormalised form", 1),
-    ("force_reward_paper", "force reward of 150,\npaper's form", 1),
+    ("force_reward_normalised", "force reward,\nnormalised form", 1),
+    ("force_reward_paper", "force reward,\npaper's form", 1),
     ("displacement_until_grasped_mm", "object moved until\nboth touch, mm", 3),
     ("displacement_total_mm", "object moved\nin all, mm", 3),
     ("fast_steps", "steps over the\nspeed threshold", 2),
@@ -103,6 +103,7 @@ def evaluate(config: EvaluateConfig, out: Path, console: Console | None = None) 
     report = {
         "seed": config.seed,
         "trials": config.trials,
+        "steps": config.grasp.steps,
         "physics": config.physics.tier,
         "kappas": kappas.tolist(),
         "policies": {name: _summary(values, config.seed) for name, values in figures.items()},
@@ -110,7 +111,9 @@ def evaluate(config: EvaluateConfig, out: Path, console: Console | None = None) 
     (out / "evaluation.json").write_text(json.dumps(report, indent=1) + "\n")
     _write_trials(out / "trials.csv", grasps.as_array(), figures)
     boxes = {name: values["force_reward_normalised"] for name, values in figures.items()}
-    reward_boxes(boxes, kappas, "force reward of an episode (150 at best)").savefig(out / "force_reward.png", dpi=130)
+    reward_boxes(boxes, kappas, f"force reward of an episode ({config.grasp.steps} at best)").savefig(
+        out / "force_reward.png", dpi=130
+    )
     moved = {name: values["displacement_until_grasped_mm"] for name, values in figures.items()}
     reward_boxes(moved, kappas, "object moved until both touch [mm]").savefig(out / "displacement.png", dpi=130)
     _print(report, console)
@@ -153,7 +156,9 @@ def _write_trials(path: Path, grasps: np.ndarray, figures: dict[str, dict[str, n
 def _print(report: dict, console: Console) -> None:
     """Two tables that fit a narrow terminal: all grasps together, and by softness."""
     policies = report["policies"]
-    table = Table(title="mean over all grasps ± standard deviation [95 % interval of the mean]")
+    table = Table(
+        title=f"mean ± standard deviation [95 % interval of the mean] over episodes of {report['steps']} steps"
+    )
     table.add_column("figure")
     for name in policies:
         table.add_column(name, justify="right", overflow="fold")

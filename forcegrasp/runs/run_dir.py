@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import dataclasses
+import functools
 import hashlib
 import json
 import os
@@ -79,6 +80,11 @@ class RunDir:
             )
         return run
 
+    @functools.cached_property
+    def fingerprint(self) -> str:
+        """Of the configuration as it was when first asked for: editing the file must not spoil a run at work."""
+        return fingerprint(self.config())
+
     def config(self) -> TrainConfig:
         """The run's configuration.
 
@@ -101,7 +107,7 @@ class RunDir:
           CheckpointError: if it can't be written.
         """
         path = self.checkpoints / f"frames_{frames:012d}.safetensors"
-        checkpoint.write(path, tensors, {**facts, "frames": frames, "config": fingerprint(self.config())})
+        checkpoint.write(path, tensors, {**facts, "frames": frames, "config": self.fingerprint})
         for old in self._files()[:-keep]:
             old.unlink()
         return path
@@ -119,7 +125,7 @@ class RunDir:
             except CheckpointError as error:
                 first_error = first_error or error
                 continue
-            if facts.get("config") != fingerprint(self.config()):
+            if facts.get("config") != self.fingerprint:
                 raise CheckpointError(
                     f"{path}: was trained with another configuration than {self.config_path}; restore that file"
                 )

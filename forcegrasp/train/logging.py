@@ -60,12 +60,13 @@ class TrainingLog:
 
     def video(self, episode: TensorDictBase, frames: int) -> Path | None:
         """Renders one episode, as GIF and in TensorBoard; says so and goes on where nothing can render."""
+        if self._told_no_renderer:
+            return None
         path = self.run.figures / f"grasp_{frames:012d}.gif"
         try:
             data = grasp_video(episode, self.config.physics.tier)
         except NoRendererError as error:
-            if not self._told_no_renderer:
-                print(f"forcegrasp: no video: {error}", file=sys.stderr)
+            print(f"forcegrasp: no video: {error}", file=sys.stderr)
             self._told_no_renderer = True
             return None
         path.write_bytes(data)

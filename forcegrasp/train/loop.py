@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import torch
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from torch import Tensor
 from torchrl.collectors import Collector
 from torchrl.envs import TransformedEnv
@@ -119,7 +119,7 @@ def train(config: TrainConfig, run: RunDir, resume: bool = False) -> bool:
         trainer.restore(*run.load())
     log = TrainingLog(run, config, trainer.frames)
     batches = iter(collector)
-    with _stop_signals() as stop, _progress(total, trainer.frames) as progress:
+    with _stop_signals() as stop, _progress(total, trainer.frames, config.grasp.steps) as progress:
         while trainer.frames < total and not stop:
             started = time.perf_counter()
             values = trainer.curriculum.apply(trainer.frames)
@@ -189,19 +189,17 @@ def _stop_signals():
 
 
 @contextmanager
-def _progress(total: int, done: int):
+def _progress(total: int, done: int, steps: int):
     """Yields a function that shows progress: ``(frames, episode figures)``."""
     columns = [
-        TextColumn("training"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn(
-            "frames · force reward {task.fields[reward]:5.1f} of 150 · object moved {task.fields[moved]:.2f} mm ·"
-        ),
+        BarColumn(bar_width=16),
+        TextColumn("{task.percentage:3.0f} % of {task.total:,} frames"),
+        TextColumn("force reward {task.fields[reward]:.0f}/{task.fields[steps]}"),
+        TextColumn("moved {task.fields[moved]:.2f} mm"),
         TimeRemainingColumn(),
     ]
     with Progress(*columns) as bar:
-        task = bar.add_task("training", total=total, completed=done, reward=np.nan, moved=np.nan)
+        task = bar.add_task("training", total=total, completed=done, steps=steps, reward=np.nan, moved=np.nan)
 
         def show(frames: int, figures: dict[str, float]) -> None:
             bar.update(
