@@ -1,6 +1,6 @@
 """Where the time goes: raw engine → simulator → env → transformed env → collection → training, as ratios of one run.
 
-python tools/bench.py [--grasps 128] [--tier fast] [--threads 0] [--repeats 3] [--json FILE]
+python tools/bench.py [--grasps 256] [--tier fast] [--threads 0] [--repeats 3] [--json FILE]
 
 Every level simulates the same thing, whole episodes of grasps that close at full speed: contact is what costs time.
 The levels take turns, and the best of their repeats counts, so that whatever else the machine does hits all alike.
@@ -132,7 +132,7 @@ def _closed_simulator(n: int, physics: PhysicsConfig) -> GraspSimulator:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--grasps", type=int, default=128)
+    parser.add_argument("--grasps", type=int, default=256)
     parser.add_argument("--tier", choices=("fast", "reference"), default="fast")
     parser.add_argument("--threads", type=int, default=0)
     parser.add_argument("--repeats", type=int, default=3)
