@@ -171,7 +171,7 @@ class PPOConfig:
     minibatch: int = option(2048, "frames per gradient step", low=1, high=10**9)
     learning_rate: float = option(6e-4, "Adam's step size at the start", source="authors' code", low=0, high=1)
     learning_rate_end: float = option(0.05, "what is left of it at the end, linearly, as a fraction", low=0, high=1)
-    discount: float = option(0.99, "γ", source="authors' code", low=0, high=1)
+    discount: float = option(0.97, "γ; the authors had 0.99", low=0, high=1)
     gae_lambda: float = option(0.95, "λ of the advantage estimate", source="authors' code", low=0, high=1)
     clip: float = option(0.2, "largest change of the probability ratio", source="authors' code", low=0.001, high=1)
     entropy_weight: float = option(0.0, "weight of the entropy bonus", source="authors' code", low=0, high=10)

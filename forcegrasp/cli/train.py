@@ -122,9 +122,7 @@ def _train(config, run, resume: bool) -> int:
 
     print(f"run directory: {run.path}")
     if train(config, run, resume):
-        print(
-            f"trained. Compare it with the hand-written one: forcegrasp evaluate 'policies=[{run.path},force_pi]'"
-        )
+        print(f"trained. Compare it with the hand-written one: forcegrasp evaluate 'policies=[{run.path},force_pi]'")
         return 0
     print(f"stopped and saved; go on with: forcegrasp train resume={run.path}")
     return INTERRUPTED

@@ -20,7 +20,7 @@ from forcegrasp.config import ActionConfig, EvaluateConfig, ObservationConfig, R
 from forcegrasp.controllers import CONTROLLERS, make_controller
 from forcegrasp.env.episodes import FIGURES, summarise
 from forcegrasp.errors import ConfigError
-from forcegrasp.evaluate.plots import force_traces, reward_boxes
+from forcegrasp.evaluate.plots import force_traces, softness_boxes
 from forcegrasp.evaluate.rollouts import kappa_grid, roll_out
 from forcegrasp.runs.policy import load_policy
 
@@ -110,12 +110,14 @@ def evaluate(config: EvaluateConfig, out: Path, console: Console | None = None) 
     }
     (out / "evaluation.json").write_text(json.dumps(report, indent=1) + "\n")
     _write_trials(out / "trials.csv", grasps.as_array(), figures)
-    boxes = {name: values["force_reward_normalised"] for name, values in figures.items()}
-    reward_boxes(boxes, kappas, f"force reward of an episode ({config.grasp.steps} at best)").savefig(
+    rewards = {name: values["force_reward_normalised"] for name, values in figures.items()}
+    softness_boxes(rewards, kappas, f"force reward of an episode ({config.grasp.steps} at best)").savefig(
         out / "force_reward.png", dpi=130
     )
-    moved = {name: values["displacement_until_grasped_mm"] for name, values in figures.items()}
-    reward_boxes(moved, kappas, "object moved until both touch [mm]").savefig(out / "displacement.png", dpi=130)
+    moved = {name: np.maximum(values["displacement_until_grasped_mm"], 1e-3) for name, values in figures.items()}
+    softness_boxes(moved, kappas, "object moved until both touch [mm]", log=True).savefig(
+        out / "displacement.png", dpi=130
+    )
     _print(report, console)
     console.print(f"figures, trials and summary are in {out}", highlight=False)
     return report

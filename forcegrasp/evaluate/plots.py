@@ -67,13 +67,14 @@ def figure_pixels(figure: Figure) -> np.ndarray:
     return np.asarray(canvas.buffer_rgba())[..., :3].copy()
 
 
-def reward_boxes(results: dict[str, np.ndarray], kappas: np.ndarray, ylabel: str) -> Figure:
+def softness_boxes(results: dict[str, np.ndarray], kappas: np.ndarray, ylabel: str, log: bool = False) -> Figure:
     """Box plot of a figure per softness value and policy, as in the paper's Fig. 2 (left).
 
     Args:
       results: policy → values, ``(kappas, trials)``.
       kappas: softness values.
       ylabel: what the values are.
+      log: whether the values span orders of magnitude.
     """
     figure = Figure(figsize=(max(8, 0.9 * len(kappas)), 4.2), layout="constrained")
     axes = figure.subplots()
@@ -98,5 +99,7 @@ def reward_boxes(results: dict[str, np.ndarray], kappas: np.ndarray, ylabel: str
     axes.set_xlabel("softness κ (0 hard, 1 soft)")
     axes.set_ylabel(ylabel)
     axes.grid(axis="y", alpha=0.3)
+    if log:
+        axes.set_yscale("log")
     axes.legend(handles, list(results), fontsize=9, loc="lower left", bbox_to_anchor=(0, 1), ncols=4, frameon=False)
     return figure
