@@ -21,8 +21,6 @@ from rich.console import Console
 from rich.table import Table
 
 warnings.filterwarnings("ignore", category=DeprecationWarning)
-from torchrl.collectors import Collector  # noqa: E402
-
 from forcegrasp.config import GraspConfig, PhysicsConfig, TrainConfig  # noqa: E402
 from forcegrasp.controllers import Constant  # noqa: E402
 from forcegrasp.env import GraspEnv, build_env  # noqa: E402
@@ -91,26 +89,14 @@ def _closing_trainer(n: int, physics: PhysicsConfig) -> Trainer:
     return trainer
 
 
-def _collector(trainer: Trainer, n: int) -> Collector:
-    return Collector(
-        trainer.env,
-        trainer.policy,
-        frames_per_batch=n * STEPS,
-        total_frames=-1,
-        reset_at_each_iter=True,
-        track_traj_ids=False,
-        auto_register_policy_transforms=False,
-    )
-
-
 def collection(n: int, physics: PhysicsConfig) -> Callable[[], None]:
-    batches = iter(_collector(_closing_trainer(n, physics), n))
+    batches = iter(_closing_trainer(n, physics).collector())
     return lambda: next(batches)
 
 
 def training(n: int, physics: PhysicsConfig) -> Callable[[], None]:
     trainer = _closing_trainer(n, physics)
-    batches = iter(_collector(trainer, n))
+    batches = iter(trainer.collector())
     return lambda: trainer.ppo.update(next(batches), trainer.shuffle)
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import importlib
 import os
 import sys
-import warnings
 
 from forcegrasp import __version__
 from forcegrasp.errors import ForcegraspError, closest
@@ -47,7 +46,6 @@ def main(arguments: list[str] | None = None) -> int:
     try:
         if verb not in VERBS:
             raise ForcegraspError(f"no verb {verb!r}{closest(verb, VERBS)}")
-        _quieten()
         if not {"-h", "--help"} & set(rest):
             import_mujoco()
         return importlib.import_module(f"forcegrasp.cli.{verb}").main(rest)
@@ -60,17 +58,6 @@ def main(arguments: list[str] | None = None) -> int:
     except KeyboardInterrupt:
         print("forcegrasp: interrupted", file=sys.stderr)
         return 130
-
-
-def _quieten() -> None:
-    """Silences notices of libraries that a user can do nothing about, by their message."""
-    for message in (
-        ".*torchrl.*C\\+\\+.*",
-        ".*Failed to import torchrl C\\+\\+ binaries.*",
-        ".*`torch.jit.*` is deprecated.*",
-        ".*isinstance\\(treespec, LeafSpec\\).*",
-    ):
-        warnings.filterwarnings("ignore", message=message)
 
 
 def import_mujoco() -> None:

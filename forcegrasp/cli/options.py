@@ -35,8 +35,9 @@ def compose_run(verb: str, overrides: list[str]) -> tuple[Any, str]:
     from omegaconf.errors import OmegaConfBaseException
 
     register_schemas()
+    choices, known = groups(verb), [name for name, _, _ in leaves(SCHEMAS[verb])]
     for override in overrides:
-        _check_key(verb, override)
+        _check_override(verb, override, choices, known)
     GlobalHydra.instance().clear()
     try:
         with initialize_config_module("forcegrasp.conf", version_base="1.3"):
@@ -85,16 +86,26 @@ def leaves(schema: type, prefix: str = "") -> Iterator[tuple[str, dataclasses.Fi
             yield f"{prefix}{entry.name}", entry, value
 
 
-def _check_key(verb: str, override: str) -> None:
-    """Refuses one override that is malformed, unknown, or has several values."""
+def parse_override(override: str) -> Any:
+    """Returns Hydra's reading of one ``key=value``.
+
+    Raises:
+      ConfigError: if it can't be read.
+    """
     from hydra.core.override_parser.overrides_parser import OverridesParser
     from hydra.errors import HydraException
 
+    try:
+        return OverridesParser.create().parse_override(override)
+    except HydraException as error:
+        raise ConfigError(f"{override!r}: can't be read ({str(error).splitlines()[0]})") from error
+
+
+def _check_override(verb: str, override: str, choices: dict[str, list[str]], known: list[str]) -> None:
+    """Refuses one override that is malformed, unknown, or has several values."""
     key, equals, value = override.partition("=")
     if not equals:
         raise ConfigError(f"{override!r}: options are given as key=value, see forcegrasp {verb} --help")
-    choices = groups(verb)
-    known = [name for name, _, _ in leaves(SCHEMAS[verb])]
     if OBJECT_KEY in key or ("{" in value and OBJECT_KEY in value):
         raise ConfigError(f"{override!r}: no option may name a Python object")
     if key in choices:
@@ -103,11 +114,7 @@ def _check_key(verb: str, override: str) -> None:
                 raise ConfigError(f"no {key} named {choice.strip()!r}{closest(choice.strip(), choices[key])}")
     elif key not in known and not key.startswith(("hydra.", "hydra/")):
         raise ConfigError(f"no option {key!r}{closest(key, [*known, *choices])}")
-    try:
-        parsed = OverridesParser.create().parse_override(override)
-    except HydraException as error:
-        raise ConfigError(f"{override!r}: can't be read ({str(error).splitlines()[0]})") from error
-    if parsed.is_sweep_override():
+    if parse_override(override).is_sweep_override():
         sweep = "; to run one after another, add -m" if verb == "train" else ""
         raise ConfigError(f"{override!r}: several values; a list is written [a,b]{sweep}")
 

@@ -6,7 +6,7 @@ import os
 import sys
 from pathlib import Path
 
-from forcegrasp.cli.options import compose, compose_run, help_text
+from forcegrasp.cli.options import compose, compose_run, help_text, parse_override
 from forcegrasp.errors import ConfigError
 
 #: Exit status after Ctrl-C, as shells have it.
@@ -86,15 +86,9 @@ def _sweep_job(composed) -> int:
 
 def _single_runs(overrides: list[str]) -> list[list[str]]:
     """Checks a sweep's values one at a time: each override list has no sweep in it."""
-    from hydra.core.override_parser.overrides_parser import OverridesParser
-    from hydra.errors import HydraException
-
     fixed, swept = [], []
     for text in overrides:
-        try:
-            parsed = OverridesParser.create().parse_override(text)
-        except HydraException as error:
-            raise ConfigError(f"{text!r}: {str(error).splitlines()[0]}") from error
+        parsed = parse_override(text)
         if parsed.is_sweep_override() and parsed.is_discrete_sweep():
             swept.append([f"{parsed.get_key_element()}={value}" for value in parsed.sweep_string_iterator()])
         else:

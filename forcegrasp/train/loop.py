@@ -57,6 +57,21 @@ class Trainer:
         self.value = make_value(size, config.ppo)
         self.ppo = PPO(self.policy, self.value, config.ppo)
 
+    def collector(self) -> Collector:
+        """Endless batches of whole episodes from a fresh reset.
+
+        Batches don't share state, which is what makes a resumed run bit-identical.
+        """
+        return Collector(
+            self.env,
+            self.policy,
+            frames_per_batch=self.config.ppo.grasps * self.config.grasp.steps,
+            total_frames=-1,
+            reset_at_each_iter=True,
+            track_traj_ids=False,
+            auto_register_policy_transforms=False,
+        )
+
     def state(self) -> tuple[dict[str, Tensor], dict[str, Any]]:
         """All that changes while training, as tensors and as JSON."""
         tensors = {f"policy.{k}": v for k, v in self.policy.state_dict().items()}
@@ -104,17 +119,7 @@ def train(config: TrainConfig, run: RunDir, resume: bool = False) -> bool:
     """
     trainer = Trainer(config)
     total = config.ppo.total_frames
-    per_batch = config.ppo.grasps * config.grasp.steps
-    # Whole episodes from a fresh reset: batches don't share state, which is what makes a resumed run bit-identical.
-    collector = Collector(
-        trainer.env,
-        trainer.policy,
-        frames_per_batch=per_batch,
-        total_frames=-1,
-        reset_at_each_iter=True,
-        track_traj_ids=False,
-        auto_register_policy_transforms=False,
-    )
+    collector = trainer.collector()
     if resume:
         trainer.restore(*run.load())
     log = TrainingLog(run, config, trainer.frames)

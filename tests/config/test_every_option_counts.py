@@ -41,9 +41,8 @@ TINY_TRAINING = TINY_GRASP | {
 }
 TINY_EVALUATION = TINY_GRASP | {"kappas": 2, "trials": 2}
 
-#: Option → another value than in the tiny training.
-TRAIN_CASES: dict[str, Any] = {
-    "seed": 1,
+#: Option → another value than in the tiny training and the tiny evaluation.
+SHARED_CASES: dict[str, Any] = {
     "physics.tier": "reference",
     "physics.threads": 2,
     "grasp.kappa": [0.0, 0.5],
@@ -57,6 +56,12 @@ TRAIN_CASES: dict[str, Any] = {
     "sensors.position_std_m": 0.001,
     "sensors.force_std_n": 0.1,
     "sensors.contact_threshold_n": 0.2,
+}
+
+#: The same, for the options of training alone.
+TRAIN_CASES: dict[str, Any] = {
+    "seed": 1,
+    **SHARED_CASES,
     "observation.parts": ["position", "force"],
     "observation.frames": 2,
     "action.max_delta_m": 0.002,
@@ -98,26 +103,14 @@ TRAIN_CASES: dict[str, Any] = {
     "log.keep": 1,
 }
 
-#: Option → another value than in the tiny evaluation.
+#: The same, for the options of evaluation alone.
 EVALUATE_CASES: dict[str, Any] = {
     "policies": ["informed"],
     "out": "elsewhere",
     "kappas": 3,
     "trials": 3,
     "seed": 1,
-    "physics.tier": "reference",
-    "physics.threads": 2,
-    "grasp.kappa": [0.0, 0.5],
-    "grasp.b2": [-9.0, -9.0],
-    "grasp.radius_m": [0.03, 0.035],
-    "grasp.offset_m": [0.001, 0.002],
-    "grasp.deformation_m": 0.008,
-    "grasp.goal_force_min_n": 0.1,
-    "grasp.goal_force_max": 0.8,
-    "grasp.steps": 44,
-    "sensors.position_std_m": 0.001,
-    "sensors.force_std_n": 0.1,
-    "sensors.contact_threshold_n": 0.2,
+    **SHARED_CASES,
     "speed_threshold_m": 0.0,
 }
 
