@@ -146,7 +146,7 @@ def trained(folder: Path, **values: Any) -> dict[str, Any]:
     weights = {name: tensor.tolist() for name, tensor in tensors.items() if name.startswith(("policy", "value"))}
     with open(run.metrics_path, newline="") as file:
         rows = [{k: v for k, v in row.items() if not k.startswith("speed/")} for row in csv.DictReader(file)]
-    threads = Trainer(config).env.base_env.simulator._batch.nthread
+    threads = Trainer(config).env.base_env.simulator.plant.batch.nthread
     tags = tensorboard_tags(run.tensorboard)
     return {"files": files, "weights": weights, "rows": rows, "threads": threads, "tags": tags}
 
@@ -226,7 +226,7 @@ def test_threads_of_evaluate_reach_the_engine(tmp_path, monkeypatch):
         asked.append(threads)
         return Batch(model, n, threads)
 
-    monkeypatch.setattr("forcegrasp.physics.simulator.Batch", recording)
+    monkeypatch.setattr("forcegrasp.physics.plant.Batch", recording)
     evaluated(tmp_path, **{"physics.threads": EVALUATE_CASES["physics.threads"]})
     assert set(asked) == {2}
 

@@ -39,22 +39,22 @@ def test_bad_command(simulator, grasp):
 
 @pytest.mark.parametrize(("field", "value"), [("qpos", np.nan), ("qpos", 1e12), ("qvel", np.nan), ("qvel", 1e12)])
 def test_bad_state(simulator, field, value):
-    simulator._batch.bind(field)[2, -1] = value
+    simulator.plant.batch.bind(field)[2, -1] = value
     _expect(simulator, 2, {"qpos": "bad positions", "qvel": "bad velocities"}[field])
 
 
 def test_bad_acceleration(simulator):
-    simulator._batch.bind("xfrc_applied")[1, simulator.model.body("object").id] = 1e14
+    simulator.plant.batch.bind("xfrc_applied")[1, simulator.model.body("object").id] = 1e14
     _expect(simulator, 1, "bad accelerations")
 
 
 def test_the_first_of_several_is_named(simulator):
-    simulator._batch.bind("qpos")[[1, 3], -1] = np.nan
+    simulator.plant.batch.bind("qpos")[[1, 3], -1] = np.nan
     _expect(simulator, 1, "bad positions")
 
 
 def test_error_stands_until_the_grasp_is_reset(simulator, draw):
-    simulator._batch.bind("qpos")[2, -1] = np.nan
+    simulator.plant.batch.bind("qpos")[2, -1] = np.nan
     for _ in range(2):
         with pytest.raises(PhysicsError, match="grasp 2"):
             simulator.step(np.zeros((4, 2)))

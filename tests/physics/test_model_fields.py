@@ -10,7 +10,8 @@ import pytest
 
 from forcegrasp.errors import ConfigError
 from forcegrasp.physics import GraspSimulator
-from forcegrasp.physics.model import _simplify, build_model
+from forcegrasp.physics.gripper import _simplify
+from forcegrasp.physics.model import build_model
 
 TIERS = ("reference", "fast")
 
@@ -23,7 +24,7 @@ def _compile(tier: str, radius: float, rho: float, b2: float) -> mujoco.MjModel:
     for actuator in spec.actuators:
         actuator.biasprm[2] = b2
     if tier == "fast":
-        _simplify(spec)
+        _simplify(spec, "object")
     return spec.compile()
 
 

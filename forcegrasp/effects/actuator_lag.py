@@ -1,0 +1,31 @@
+"""The actuator follows its command with a first-order lag."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from forcegrasp.effects.base import Effect, Parameter, first_order_weight
+
+
+class ActuatorLag(Effect):
+    """A filter between the command and the servo."""
+
+    name = "actuator_lag"
+    stage = "actuator"
+    symptom = "like a delay, but rounded: steps in the command arrive as exponentials"
+    formula = "τ du'/dt = u − u'"
+    source = "first-order lag; MuJoCo's `dyntype=filterexact` does the same for one value per model"
+    look_alikes = ("command_delay", "rate_limit")
+    separates = "fast steps: a lagged response has no corner"
+    parameters = (Parameter("time_constant_s", "time constant τ", "s", 0.0, 0.5, 0.05, trials=(0.01, 0.04, 0.12)),)
+
+    def reset(self, which: np.ndarray) -> None:
+        if not hasattr(self, "_held"):
+            self._held = np.zeros((len(self.values), 2))
+        self._held[which] = np.nan
+
+    def command(self, command: np.ndarray, fresh: np.ndarray) -> np.ndarray:
+        held = np.where(np.isnan(self._held), self.position, self._held)
+        weight = first_order_weight(self.dt, self["time_constant_s"])
+        self._held = np.where(weight == 1, command, held + weight * (command - held))
+        return self._held

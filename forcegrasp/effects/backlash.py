@@ -1,0 +1,49 @@
+"""Lost motion between motor and pad."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from forcegrasp.effects.base import Effect, Parameter
+
+
+class Backlash(Effect):
+    """After each reversal the motor crosses a gap before the pad follows.
+
+    ``play``: the pad stays where it is while the motor crosses; the encoder sits at the motor. ``loose``: the same,
+    but an object in the grasp pushes the pad against the motor, so that nothing is lost under load. ``command``: the
+    gap lies before the encoder.
+    """
+
+    name = "backlash"
+    stage = "transmission"
+    symptom = "motion is lost after each reversal, however small the load; contact comes late"
+    formula = "p ← clip(p, m − g/2, m + g/2)"
+    source = "play operator (Krasnosel'skii and Pokrovskii 1989)"
+    look_alikes = ("force_deadzone", "adhesion", "coulomb_friction")
+    separates = "pauses, reversals and partial releases in contact, at several speeds"
+    parameters = (Parameter("gap_m", "lost motion g", "m", 0.0, 0.006, 0.0006, trials=(1e-4, 3e-4, 1e-3, 2e-3)),)
+    variants = ("play", "loose", "command")
+
+    def reset(self, which: np.ndarray) -> None:
+        if not hasattr(self, "_pad"):
+            self._pad = np.zeros((len(self.values), 2))
+        self._pad[which] = np.nan
+
+    def command(self, command: np.ndarray, fresh: np.ndarray) -> np.ndarray:
+        return self._follow(command) if self.variant == "command" else command
+
+    def act(self) -> None:
+        if self.variant == "command":
+            return
+        motor = self.position
+        pad = self._follow(motor)
+        if self.variant == "loose":
+            self._pad = pad = np.where(self.pad_force > 0, motor + self["gap_m"] / 2, pad)
+        self.plant.pad_shift_m[self.rows] += pad - motor
+
+    def _follow(self, motor: np.ndarray) -> np.ndarray:
+        half = self["gap_m"] / 2
+        before = np.where(np.isnan(self._pad), motor, self._pad)
+        self._pad = np.where(half == 0, motor, np.clip(before, motor - half, motor + half))
+        return self._pad

@@ -1,0 +1,194 @@
+"""What every physical effect has in common: its description, its parameters, and the places where it can act."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from forcegrasp.physics.plant import Plant
+
+#: Stages in the order in which they act.
+STAGES = ("command", "actuator", "transmission", "contact", "object", "sensor")
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A number that sets the size of an effect."""
+
+    name: str
+    doc: str
+    unit: str
+    low: float  #: smallest value that makes sense
+    high: float
+    typical: float  #: a size worth noticing; `record` uses it
+    null: float = 0.0  #: value at which the effect is not there at all; may be infinite
+    logarithmic: bool = False  #: fitted by its logarithm
+    trials: tuple[float, ...] = ()  #: sizes that a diagnosis tries
+
+
+class Effect:
+    """One physical effect on some rows (simulated grasps) of a plant. Subclasses override the hooks of their stage.
+
+    Hooks are called once per physics step with the rows of this effect only, and return what replaces their argument.
+    Arrays are float64 of shape ``(rows, 2)``, left and right finger, SI units; forces that press are positive.
+
+    Args:
+      values: parameter values, ``(rows, len(parameters))``.
+      dt: physics step, seconds.
+      variant: which of the class's ``variants``; the first by default.
+
+    Raises:
+      ValueError: if ``values`` has another shape, or there is no such variant.
+    """
+
+    name: ClassVar[str]
+    stage: ClassVar[str]
+    symptom: ClassVar[str]  #: what a user sees
+    formula: ClassVar[str]
+    source: ClassVar[str]
+    look_alikes: ClassVar[tuple[str, ...]] = ()
+    separates: ClassVar[str] = ""  #: what tells it from its look-alikes
+    parameters: ClassVar[tuple[Parameter, ...]]
+    #: Ways in which the effect is known to occur; a diagnosis tries each under the one name.
+    variants: ClassVar[tuple[str, ...]] = ("",)
+    #: Position among the effects of the same stage; smaller acts first.
+    order: ClassVar[int] = 0
+
+    def __init__(self, values: np.ndarray, dt: float, variant: str = "") -> None:
+        self.values = np.asarray(values, float)
+        if self.values.ndim != 2 or self.values.shape[1] != len(self.parameters):
+            raise ValueError(f"{self.name} takes values of shape (rows, {len(self.parameters)})")
+        self.variant = variant or self.variants[0]
+        if self.variant not in self.variants:
+            raise ValueError(f"{self.name} has no variant {variant!r}: {', '.join(self.variants)}")
+        self.dt = dt
+        self.plant: Plant | None = None
+        self.rows = np.arange(len(self.values))
+        self.reset(self.rows)
+
+    def __getitem__(self, parameter: str) -> np.ndarray:
+        """A parameter as a column ``(rows, 1)``, to combine with arrays of both fingers."""
+        index = [p.name for p in self.parameters].index(parameter)
+        return self.values[:, index : index + 1]
+
+    def attach(self, plant: Plant, rows: np.ndarray) -> Effect:
+        """Puts the effect into a plant, on these rows of it."""
+        self.plant, self.rows = plant, np.asarray(rows)
+        return self
+
+    @property
+    def position(self) -> np.ndarray:
+        """True finger positions of the effect's rows, metres, ``(rows, 2)``."""
+        return self.plant.position[self.rows]
+
+    @property
+    def velocity(self) -> np.ndarray:
+        """True finger velocities of the effect's rows, m/s, ``(rows, 2)``; positive opens."""
+        return self.plant.velocity[self.rows]
+
+    @property
+    def pad_force(self) -> np.ndarray:
+        """Contact forces of the last physics step before any scale, newtons, ``(rows, 2)``."""
+        return self.plant.pad_force[self.rows]
+
+    # --- hooks -------------------------------------------------------------------------------------------------
+
+    def reset(self, which: np.ndarray) -> None:
+        """Forgets all memory of these of its rows (indices into the effect's own rows)."""
+
+    def change_model(self, plant: Plant, which: np.ndarray) -> None:
+        """Writes MuJoCo's per-simulation fields for these of its rows, after the base model was written."""
+
+    def command(self, command: np.ndarray, fresh: np.ndarray) -> np.ndarray:
+        """Commanded positions on their way to the actuator, metres. ``fresh`` ``(rows,)``: this is a new command."""
+        return command
+
+    def act(self) -> None:
+        """Adds to the plant's ``friction_n``, ``pad_shift_m``, ``finger_push_n`` or ``object_push_n`` of this step."""
+
+    def interaction(self, force: np.ndarray) -> np.ndarray:
+        """True force between pads and object, before any scale, newtons."""
+        return force
+
+    def read_force(self, force: np.ndarray) -> np.ndarray:
+        """What the force sensors say, newtons."""
+        return force
+
+    def read_position(self, position: np.ndarray) -> np.ndarray:
+        """What the encoders say, metres."""
+        return position
+
+    # --- what the class knows about itself -----------------------------------------------------------------------
+
+    @property
+    def rank(self) -> tuple[int, int]:
+        """Where it stands in the order in which effects act."""
+        return STAGES.index(self.stage), self.order
+
+    @classmethod
+    def null_values(cls) -> np.ndarray:
+        """Parameter values that leave every bit as it was, ``(parameters,)``."""
+        return np.array([p.null for p in cls.parameters])
+
+    @classmethod
+    def typical_values(cls) -> np.ndarray:
+        """Parameter values of a size worth noticing, ``(parameters,)``."""
+        return np.array([p.typical for p in cls.parameters])
+
+    @classmethod
+    def trials(cls) -> np.ndarray:
+        """Parameter values that a diagnosis tries, ``(trials, parameters)``: all combinations unless overridden."""
+        return np.array(list(itertools.product(*(p.trials for p in cls.parameters))))
+
+    @classmethod
+    def hooks(cls) -> set[str]:
+        """Names of the hooks that this effect overrides."""
+        names = ("change_model", "command", "act", "interaction", "read_force", "read_position")
+        return {name for name in names if getattr(cls, name) is not getattr(Effect, name)}
+
+    @classmethod
+    def reads_only(cls) -> bool:
+        """Whether it changes what is read and nothing that happens, so that no simulation is needed to try it."""
+        return cls.hooks() <= {"read_force", "read_position"}
+
+
+def first_order_weight(dt: float, time_constant: np.ndarray) -> np.ndarray:
+    """Share of the gap that a first-order lag closes in one step, 1 − exp(−dt/τ); 1 where τ is 0."""
+    with np.errstate(divide="ignore"):
+        return -np.expm1(-dt / np.asarray(time_constant, float))
+
+
+class DelayLine:
+    """Delays a signal ``(rows, 2)`` by a real number of steps, mixing the two nearest samples.
+
+    Args:
+      steps: delay of each row in steps, ``(rows,)``, at least 0.
+    """
+
+    def __init__(self, steps: np.ndarray) -> None:
+        self._whole = np.floor(steps).astype(int)
+        self._part = (steps - self._whole)[:, None]
+        self._length = int(self._whole.max(initial=0)) + 2
+        self._memory = np.full((self._length, len(steps), 2), math.nan)
+        self._rows = np.arange(len(steps))
+        self._now = np.zeros(len(steps), dtype=int)
+
+    def reset(self, which: np.ndarray) -> None:
+        """Forgets the past of these rows; until there is one, the first value that comes stands for it."""
+        self._memory[:, which] = math.nan
+
+    def __call__(self, signal: np.ndarray) -> np.ndarray:
+        """Takes this step's value and returns the delayed one."""
+        unknown = np.isnan(self._memory[0, :, 0])
+        if unknown.any():
+            self._memory[:, unknown] = signal[unknown]
+        self._now = (self._now + 1) % self._length
+        self._memory[self._now, self._rows] = signal
+        near = self._memory[(self._now - self._whole) % self._length, self._rows]
+        far = self._memory[(self._now - self._whole - 1) % self._length, self._rows]
+        return np.where(self._part == 0, near, (1 - self._part) * near + self._part * far)

@@ -1,0 +1,42 @@
+"""The driver does not pass small commands on."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from forcegrasp.effects.base import Effect, Parameter
+
+
+class CommandDeadband(Effect):
+    """A command that asks for too little is dropped; the last one that was passed on stays in force.
+
+    ``position``: too near to where the finger is, as in TIAGo's driver. ``held``: too near to the command in force.
+    """
+
+    name = "command_deadband"
+    stage = "command"
+    symptom = "small position deltas do nothing; slow ramps become stairs"
+    formula = "u' = u if |u − q| > b (position) or |u − u'| > b (held), else u' stays"
+    source = "TIAGo's driver sends no command when |q_des − q| ≤ 0.3 mm (authors' code)"
+    look_alikes = ("backlash", "stiction")
+    separates = "slow ramps with small increments: stairs follow the commands and not the force"
+    parameters = (
+        Parameter(
+            "threshold_m", "largest change that is dropped", "m", 0.0, 0.005, 0.0003, trials=(1e-4, 3e-4, 8e-4, 2e-3)
+        ),
+    )
+    variants = ("position", "held")
+    order = 1
+
+    def reset(self, which: np.ndarray) -> None:
+        if not hasattr(self, "_held"):
+            self._held = np.zeros((len(self.values), 2))
+        self._held[which] = np.nan
+
+    def command(self, command: np.ndarray, fresh: np.ndarray) -> np.ndarray:
+        position = self.position
+        self._held = np.where(np.isnan(self._held), position, self._held)
+        from_where = position if self.variant == "position" else self._held
+        sent = (np.abs(command - from_where) > self["threshold_m"]) & fresh[:, None]
+        self._held = np.where(sent, command, self._held)
+        return np.where(self["threshold_m"] > 0, self._held, command)

@@ -1,0 +1,28 @@
+"""Commands act a fixed time after they were given."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from forcegrasp.effects.base import DelayLine, Effect, Parameter
+
+
+class CommandDelay(Effect):
+    """Dead time between a command and the motor, as buses and drivers have it."""
+
+    name = "command_delay"
+    stage = "command"
+    symptom = "all motion is shifted in time alike, in free air and in contact"
+    formula = "u'(t) = u(t − d)"
+    source = "dead time; MuJoCo's actuator `delay` does the same for one value per model"
+    look_alikes = ("actuator_lag", "force_delay")
+    separates = "fast steps: a delayed response keeps its corner, a lagged one is rounded"
+    parameters = (Parameter("delay_s", "time until a command acts", "s", 0.0, 0.4, 0.06, trials=(0.015, 0.05, 0.12)),)
+
+    def reset(self, which: np.ndarray) -> None:
+        if not hasattr(self, "_line"):
+            self._line = DelayLine(self["delay_s"][:, 0] / self.dt)
+        self._line.reset(which)
+
+    def command(self, command: np.ndarray, fresh: np.ndarray) -> np.ndarray:
+        return self._line(command)

@@ -1,0 +1,38 @@
+"""Force readings wander off with time."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from forcegrasp.effects.base import Effect, Parameter
+
+
+class ForceDrift(Effect):
+    """An offset of each force sensor that grows from the start of the grasp."""
+
+    name = "force_drift"
+    stage = "sensor"
+    symptom = "force in free air and in holds has a slope"
+    formula = "f' = f + s t, per finger"
+    source = "thermal drift of strain gauges"
+    look_alikes = ("force_bias", "viscoelastic_contact")
+    separates = "free motion after a long hold: drift stays, relaxation does not"
+    parameters = (
+        Parameter("left_n_s", "slope of the left sensor", "N/s", -1.0, 1.0, 0.02),
+        Parameter("right_n_s", "slope of the right sensor", "N/s", -1.0, 1.0, -0.015),
+    )
+    order = 6
+
+    @classmethod
+    def trials(cls) -> np.ndarray:
+        return np.array([[0.02, 0.0], [0.0, 0.02]])
+
+    def reset(self, which: np.ndarray) -> None:
+        if not hasattr(self, "_time"):
+            self._time = np.zeros((len(self.values), 1))
+        self._time[which] = 0
+
+    def read_force(self, force: np.ndarray) -> np.ndarray:
+        read = force + self.values * self._time
+        self._time += self.dt
+        return read

@@ -1,0 +1,42 @@
+"""The motor's force has a limit."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from forcegrasp.effects.base import Effect, Parameter
+
+
+class ForceLimit(Effect):
+    """A motor that gives no more than so much force, whatever is commanded."""
+
+    name = "force_limit"
+    stage = "actuator"
+    symptom = "force reaches a plateau whatever the command; fast motion is slower than modelled"
+    formula = "|F_motor| ≤ F_max"
+    source = "MuJoCo's actuator `forcerange`"
+    look_alikes = ("force_saturation", "rate_limit")
+    separates = "the finger's position: a limited motor stops closing, a saturated sensor does not"
+    parameters = (
+        Parameter(
+            "force_n",
+            "largest motor force F_max",
+            "N",
+            0.005,
+            50.0,
+            0.15,
+            null=np.inf,
+            logarithmic=True,
+            trials=(0.05, 0.1, 0.2, 0.4, 0.8),
+        ),
+    )
+    order = 2
+
+    def change_model(self, plant, which: np.ndarray) -> None:
+        limit, rows = self["force_n"][which], self.rows[which]
+        ranges, model = plant.field("actuator_forcerange"), plant.model
+        for actuator in plant.actuators:
+            limited = bool(model.actuator_forcelimited[actuator])
+            low, high = model.actuator_forcerange[actuator] if limited else (-np.inf, np.inf)
+            ranges[rows, actuator, 0] = np.maximum(-limit[:, 0], low)
+            ranges[rows, actuator, 1] = np.minimum(limit[:, 0], high)

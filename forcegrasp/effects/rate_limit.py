@@ -1,0 +1,45 @@
+"""Commands move no faster than a limit."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from forcegrasp.effects.base import Effect, Parameter
+
+
+class RateLimit(Effect):
+    """The driver follows steps with a ramp of constant slope."""
+
+    name = "rate_limit"
+    stage = "command"
+    symptom = "fast commands become ramps of one constant slope; slow ones are followed"
+    formula = "|du'/dt| ≤ v"
+    source = "slew limit of position drivers"
+    look_alikes = ("force_limit", "actuator_lag", "command_delay")
+    separates = "steps of several sizes: the slope stays, the time to arrive grows with the step"
+    parameters = (
+        Parameter(
+            "rate_m_s",
+            "fastest change of the command",
+            "m/s",
+            0.001,
+            2.0,
+            0.012,
+            null=np.inf,
+            logarithmic=True,
+            trials=(0.004, 0.01, 0.025, 0.06),
+        ),
+    )
+    order = 2
+
+    def reset(self, which: np.ndarray) -> None:
+        if not hasattr(self, "_held"):
+            self._held = np.zeros((len(self.values), 2))
+        self._held[which] = np.nan
+
+    def command(self, command: np.ndarray, fresh: np.ndarray) -> np.ndarray:
+        held = np.where(np.isnan(self._held), self.position, self._held)
+        step = self["rate_m_s"] * self.dt
+        limited = held + np.clip(command - held, -step, step)
+        self._held = np.where(np.isinf(step), command, limited)
+        return self._held
