@@ -14,6 +14,10 @@ class ConfigError(ForcegraspError):
     """An option is unknown, of the wrong type, or out of its range."""
 
 
+class MeasurementError(ForcegraspError):
+    """A measurement set is missing, unreadable, or can't be right: names the file, and row and column where it can."""
+
+
 class PhysicsError(ForcegraspError):
     """A simulated grasp diverged."""
 

@@ -12,6 +12,7 @@ from forcegrasp.errors import ForcegraspError, closest
 VERBS = {
     "train": "learn a grasp-force policy with PPO, or resume a run",
     "evaluate": "compare policies and controllers on the same simulated grasps",
+    "effects": "list the physical effects that a simulator may lack, or explain one",
 }
 
 USAGE = """forcegrasp {version}: simulate tactile grasping, train grasp-force controllers, compare them
@@ -27,6 +28,7 @@ examples
   forcegrasp train -m experiment=ib,no_ib,no_rand seed=0,1,2 hydra/launcher=joblib
   forcegrasp train resume=runs/RUN                         go on with an interrupted run
   forcegrasp evaluate 'policies=[runs/RUN,force_pi]'
+  forcegrasp effects backlash                              what it looks like, and what looks like it
 
 Every verb explains its options with --help. Exit status: 0 done, 2 bad input, 130 interrupted (and saved).
 """

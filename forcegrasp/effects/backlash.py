@@ -44,6 +44,6 @@ class Backlash(Effect):
 
     def _follow(self, motor: np.ndarray) -> np.ndarray:
         half = self["gap_m"] / 2
-        before = np.where(np.isnan(self._pad), motor, self._pad)
+        before = np.where(np.isnan(self._pad), self.position, self._pad)
         self._pad = np.where(half == 0, motor, np.clip(before, motor - half, motor + half))
         return self._pad

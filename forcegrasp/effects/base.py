@@ -69,6 +69,8 @@ class Effect:
         self.dt = dt
         self.plant: Plant | None = None
         self.rows = np.arange(len(self.values))
+        #: Rows whose readings are new, ``(rows, 1)``; when others are reset, a row is read again where it stands.
+        self.new_reading = np.ones((len(self.values), 1), bool)
         self.reset(self.rows)
 
     def __getitem__(self, parameter: str) -> np.ndarray:
@@ -102,7 +104,7 @@ class Effect:
         """Forgets all memory of these of its rows (indices into the effect's own rows)."""
 
     def change_model(self, plant: Plant, which: np.ndarray) -> None:
-        """Writes MuJoCo's per-simulation fields for these of its rows, after the base model was written."""
+        """Changes MuJoCo's per-simulation fields for these of its rows, in which they are those of the base model."""
 
     def command(self, command: np.ndarray, fresh: np.ndarray) -> np.ndarray:
         """Commanded positions on their way to the actuator, metres. ``fresh`` ``(rows,)``: this is a new command."""
@@ -179,15 +181,21 @@ class DelayLine:
         self._now = np.zeros(len(steps), dtype=int)
 
     def reset(self, which: np.ndarray) -> None:
-        """Forgets the past of these rows; until there is one, the first value that comes stands for it."""
+        """Forgets the past of these rows."""
         self._memory[:, which] = math.nan
 
-    def __call__(self, signal: np.ndarray) -> np.ndarray:
-        """Takes this step's value and returns the delayed one."""
+    def __call__(self, signal: np.ndarray, past: np.ndarray | None = None, new: np.ndarray | bool = True) -> np.ndarray:
+        """Takes this step's value and returns the delayed one.
+
+        Args:
+          signal: the value, ``(rows, 2)``.
+          past: stands for what came before the first value after a reset; by default that value itself.
+          new: False where it is the last step's value once more, ``(rows,)`` or for all.
+        """
         unknown = np.isnan(self._memory[0, :, 0])
         if unknown.any():
-            self._memory[:, unknown] = signal[unknown]
-        self._now = (self._now + 1) % self._length
+            self._memory[:, unknown] = (signal if past is None else past)[unknown]
+        self._now = (self._now + np.asarray(new)) % self._length
         self._memory[self._now, self._rows] = signal
         near = self._memory[(self._now - self._whole) % self._length, self._rows]
         far = self._memory[(self._now - self._whole - 1) % self._length, self._rows]

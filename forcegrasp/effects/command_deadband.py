@@ -26,7 +26,6 @@ class CommandDeadband(Effect):
         ),
     )
     variants = ("position", "held")
-    order = 1
 
     def reset(self, which: np.ndarray) -> None:
         if not hasattr(self, "_held"):

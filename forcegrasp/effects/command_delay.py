@@ -18,6 +18,7 @@ class CommandDelay(Effect):
     look_alikes = ("actuator_lag", "force_delay")
     separates = "fast steps: a delayed response keeps its corner, a lagged one is rounded"
     parameters = (Parameter("delay_s", "time until a command acts", "s", 0.0, 0.4, 0.06, trials=(0.015, 0.05, 0.12)),)
+    order = 1  # after a dead band, which is the driver's
 
     def reset(self, which: np.ndarray) -> None:
         if not hasattr(self, "_line"):
@@ -25,4 +26,4 @@ class CommandDelay(Effect):
         self._line.reset(which)
 
     def command(self, command: np.ndarray, fresh: np.ndarray) -> np.ndarray:
-        return self._line(command)
+        return self._line(command, past=self.position)

@@ -16,7 +16,7 @@ class ForceDeadzone(Effect):
     name = "force_deadzone"
     stage = "sensor"
     symptom = "force stays 0 at a light touch"
-    formula = "f' = sign(f) max(|f| − z, 0) (subtract), or f if |f| > z else 0 (gate)"
+    formula = "f' = sign(f) max(|f| − z, 0) (subtract), or f if |f| ≥ z else 0 (gate)"
     source = "preloaded tactile skins, thresholded drivers"
     look_alikes = ("backlash", "adhesion")
     separates = "partial releases: the zone is crossed at one force, a gap at one travel"

@@ -26,4 +26,4 @@ class ForceDelay(Effect):
         self._line.reset(which)
 
     def read_force(self, force: np.ndarray) -> np.ndarray:
-        return self._line(force)
+        return self._line(force, new=self.new_reading[:, 0])

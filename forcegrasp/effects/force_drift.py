@@ -30,9 +30,8 @@ class ForceDrift(Effect):
     def reset(self, which: np.ndarray) -> None:
         if not hasattr(self, "_time"):
             self._time = np.zeros((len(self.values), 1))
-        self._time[which] = 0
+        self._time[which] = -self.dt  # so that the first reading is at 0
 
     def read_force(self, force: np.ndarray) -> np.ndarray:
-        read = force + self.values * self._time
-        self._time += self.dt
-        return read
+        self._time += self.dt * self.new_reading
+        return force + self.values * self._time

@@ -27,6 +27,6 @@ class ForceLag(Effect):
 
     def read_force(self, force: np.ndarray) -> np.ndarray:
         held = np.where(np.isnan(self._held), force, self._held)
-        weight = first_order_weight(self.dt, self["time_constant_s"])
+        weight = first_order_weight(self.dt, self["time_constant_s"]) * self.new_reading
         self._held = np.where(weight == 1, force, held + weight * (force - held))
         return self._held

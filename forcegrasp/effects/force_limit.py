@@ -33,10 +33,7 @@ class ForceLimit(Effect):
     order = 2
 
     def change_model(self, plant, which: np.ndarray) -> None:
-        limit, rows = self["force_n"][which], self.rows[which]
-        ranges, model = plant.field("actuator_forcerange"), plant.model
+        limit, rows, ranges = self["force_n"][which, 0], self.rows[which], plant.field("actuator_forcerange")
         for actuator in plant.actuators:
-            limited = bool(model.actuator_forcelimited[actuator])
-            low, high = model.actuator_forcerange[actuator] if limited else (-np.inf, np.inf)
-            ranges[rows, actuator, 0] = np.maximum(-limit[:, 0], low)
-            ranges[rows, actuator, 1] = np.minimum(limit[:, 0], high)
+            ranges[rows, actuator, 0] = np.maximum(ranges[rows, actuator, 0], -limit)
+            ranges[rows, actuator, 1] = np.minimum(ranges[rows, actuator, 1], limit)

@@ -21,5 +21,5 @@ class ObjectFriction(Effect):
 
     def change_model(self, plant, which: np.ndarray) -> None:
         rows, dof = self.rows[which], plant.object_dof
-        plant.field("dof_frictionloss")[rows, dof] = plant.model.dof_frictionloss[dof] + self["force_n"][which, 0]
+        plant.field("dof_frictionloss")[rows, dof] += self["force_n"][which, 0]
         plant.stiffen_friction(dof, rows)

@@ -37,8 +37,8 @@ from forcegrasp.errors import ConfigError, closest
 ENTRY_POINTS = "forcegrasp.effects"
 
 _SHIPPED: tuple[type[Effect], ...] = (
-    CommandDelay,
     CommandDeadband,
+    CommandDelay,
     RateLimit,
     ActuatorLag,
     CoulombFriction,

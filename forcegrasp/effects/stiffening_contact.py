@@ -24,4 +24,4 @@ class StiffeningContact(Effect):
     def change_model(self, plant, which: np.ndarray) -> None:
         solimp, rows = plant.field("geom_solimp"), self.rows[which]
         for geom in plant.object_geoms:
-            solimp[rows, geom, 4] = plant.model.geom_solimp[geom, 4] + self["extra_power"][which, 0]
+            solimp[rows, geom, 4] += self["extra_power"][which, 0]

@@ -12,11 +12,13 @@ from typing import Any
 import mujoco
 import numpy as np
 import yaml
+from mujoco.batch import MODEL_FIELDS
 
 from forcegrasp.errors import ConfigError, closest
 
 FORMAT = "forcegrasp-gripper/1"
 _WRITE = re.compile(r"(-?)((?:actuator|dof|geom)_\w+)(?: (\d+))?")
+_NETFORCE = 3  #: index of reduce="netforce" among a contact sensor's ways to reduce
 _SCOPES = ("gripper", "object", "grasp")
 #: Parameters that the simulator itself understands; they need no `writes`.
 SPECIAL = ("force_scale", "radius_m", "offset_m")
@@ -88,7 +90,7 @@ class Gripper:
         try:
             spec = mujoco.MjSpec.from_file(str(self.model))
             if tier == "fast" and self.fast == "sphere":
-                _simplify(spec, self.object_geom)
+                _simplify(spec, self.object_geom, self.axis)
             return spec.compile()
         except ValueError as error:
             raise ConfigError(f"{self.model}: MuJoCo refuses it: {_one_line(error)}") from error
@@ -98,15 +100,16 @@ class Gripper:
 _PADS, _GROUND = 1, 2
 
 
-def _simplify(spec: mujoco.MjSpec, geom: str) -> None:
+def _simplify(spec: mujoco.MjSpec, geom: str, axis: int = 0) -> None:
     spec.option.timestep *= 2
     real = spec.geom(geom)
+    radius = real.size[axis if real.type == mujoco.mjtGeom.mjGEOM_BOX else 0]
     for ground in (real, *spec.worldbody.geoms):
         ground.contype, ground.conaffinity = _GROUND, _GROUND
     sphere = real.parent.add_geom(
         name=f"{geom}_pads",
         type=mujoco.mjtGeom.mjGEOM_SPHERE,
-        size=[real.size[0], 0, 0],
+        size=[radius, 0, 0],
         mass=0,
         contype=_PADS,
         conaffinity=_PADS,
@@ -114,6 +117,11 @@ def _simplify(spec: mujoco.MjSpec, geom: str) -> None:
     )
     for name in ("condim", "priority", "friction", "solref", "solimp"):
         setattr(sphere, name, getattr(real, name))
+
+
+def shipped_folder() -> Path:
+    """Where the descriptions that come with the package are."""
+    return Path(str(files("forcegrasp") / "assets"))
 
 
 def load_gripper(name: str, folder: Path | None = None) -> Gripper:
@@ -126,7 +134,7 @@ def load_gripper(name: str, folder: Path | None = None) -> Gripper:
     Raises:
       ConfigError: if there is no such gripper, or its description can't be right; names the file and the line's key.
     """
-    shipped = Path(str(files("forcegrasp") / "assets"))
+    shipped = shipped_folder()
     if re.fullmatch(r"\w+", name):
         path = shipped / f"{name}.yaml"
         if not path.is_file():
@@ -137,17 +145,17 @@ def load_gripper(name: str, folder: Path | None = None) -> Gripper:
     return _load(path)
 
 
-_loaded: dict[tuple[str, int], Gripper] = {}
-
-
 def _load(path: Path) -> Gripper:
     try:
-        key = (str(path.resolve()), path.stat().st_mtime_ns)
-        if key not in _loaded:
-            _loaded[key] = _parse(path, yaml.safe_load(path.read_text(encoding="utf-8")))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        raise ConfigError(f"{path}: could not read the gripper description: {_one_line(error)}") from error
-    return _loaded[key]
+        raw = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except RecursionError as error:
+        raise ConfigError(f"{path}: could not read the gripper description: nested too deeply") from error
+    except (OSError, ValueError, yaml.YAMLError) as error:
+        why = getattr(error, "strerror", None) or _one_line(error)
+        raise ConfigError(f"{path}: could not read the gripper description: {why}") from error
+    gripper = _parse(path, raw)
+    _check_against_model(gripper)
+    return gripper
 
 
 def _parse(path: Path, raw: Any) -> Gripper:
@@ -159,7 +167,8 @@ def _parse(path: Path, raw: Any) -> Gripper:
     _demand(path, "fingers.", fingers, {"joints", "actuators", "force_sensors", "closed", "open"})
     _demand(path, "object.", thing, {"joint", "geom", "axis"})
     for key in ("joints", "actuators", "force_sensors"):
-        if not isinstance(fingers[key], list) or len(fingers[key]) != 2:
+        names = fingers[key]
+        if not isinstance(names, list) or len(names) != 2 or names[0] == names[1]:
             raise ConfigError(f"{path}: fingers.{key}: must be two names, [left, right]")
     if thing["axis"] not in ("x", "y", "z"):
         raise ConfigError(f"{path}: object.axis: must be x, y or z")
@@ -170,23 +179,24 @@ def _parse(path: Path, raw: Any) -> Gripper:
         if name not in parameters:
             raise ConfigError(f"{path}: parameters.{name}: missing; every gripper needs {', '.join(SPECIAL)}")
     gripper = Gripper(
-        name=str(raw["name"]),
+        name=_text(path, "name", raw["name"]),
         path=path,
-        model=path.parent / str(raw["model"]),
+        model=path.parent / _text(path, "model", raw["model"]),
         fast=raw.get("fast", "none"),
-        joints=tuple(map(str, fingers["joints"])),
-        actuators=tuple(map(str, fingers["actuators"])),
-        force_sensors=tuple(map(str, fingers["force_sensors"])),
+        joints=tuple(_text(path, "fingers.joints", name) for name in fingers["joints"]),
+        actuators=tuple(_text(path, "fingers.actuators", name) for name in fingers["actuators"]),
+        force_sensors=tuple(_text(path, "fingers.force_sensors", name) for name in fingers["force_sensors"]),
         closed=_number(path, "fingers.closed", fingers["closed"]),
         open=_number(path, "fingers.open", fingers["open"]),
-        object_joint=str(thing["joint"]),
-        object_geom=str(thing["geom"]),
+        object_joint=_text(path, "object.joint", thing["joint"]),
+        object_geom=_text(path, "object.geom", thing["geom"]),
         axis="xyz".index(thing["axis"]),
         parameters=parameters,
     )
     if gripper.open_m == 0:
         raise ConfigError(f"{path}: fingers.open: must differ from fingers.closed")
-    _check_against_model(gripper)
+    if parameters["radius_m"].low <= 0:
+        raise ConfigError(f"{path}: parameters.radius_m.low: must be positive")
     return gripper
 
 
@@ -198,8 +208,10 @@ def _parameter(path: Path, name: str, entry: Any) -> BaseParameter:
         raise ConfigError(f"{path}: {where}nominal={nominal:g}: must lie between low={low:g} and high={high:g}")
     if entry["scope"] not in _SCOPES:
         raise ConfigError(f"{path}: {where}scope={entry['scope']}: must be one of {', '.join(_SCOPES)}")
+    if not isinstance(entry["writes"], list):
+        raise ConfigError(f"{path}: {where}writes: must be a list, such as [dof_damping], or []")
     writes = []
-    for text in entry["writes"] or []:
+    for text in entry["writes"]:
         match = _WRITE.fullmatch(str(text))
         if not match:
             raise ConfigError(f"{path}: {where}writes: {text!r} must look like `actuator_gainprm 0` or `-dof_damping`")
@@ -207,38 +219,100 @@ def _parameter(path: Path, name: str, entry: Any) -> BaseParameter:
         writes.append(FieldWrite(field, None if column is None else int(column), -1.0 if sign else 1.0))
     if not writes and name not in SPECIAL:
         raise ConfigError(f"{path}: {where}writes: must name a field of the model, such as `dof_damping`")
-    return BaseParameter(name, nominal, low, high, str(entry["unit"]), entry["scope"], tuple(writes))
+    if writes and name in SPECIAL:
+        raise ConfigError(f"{path}: {where}writes: must be []; the simulator knows what {name} is")
+    unit = _text(path, f"{where}unit", entry["unit"])
+    return BaseParameter(name, nominal, low, high, unit, entry["scope"], tuple(writes))
 
 
 def _check_against_model(gripper: Gripper) -> None:
-    """Finds names and fields that the scene does not have while the description is at hand to be blamed."""
-    path, model = gripper.path, gripper.compile()
-    kinds = {
-        "fingers.joints": (model.joint, gripper.joints),
-        "fingers.actuators": (model.actuator, gripper.actuators),
-        "fingers.force_sensors": (model.sensor, gripper.force_sensors),
-        "object.joint": (model.joint, (gripper.object_joint,)),
-        "object.geom": (model.geom, (gripper.object_geom,)),
-    }
-    for key, (find, names) in kinds.items():
+    """Finds what the scene does not have, or has the wrong way round, while the description is at hand to be blamed."""
+    model = gripper.compile()
+    for key, kind, count, names in (
+        ("fingers.joints", mujoco.mjtObj.mjOBJ_JOINT, model.njnt, gripper.joints),
+        ("fingers.actuators", mujoco.mjtObj.mjOBJ_ACTUATOR, model.nu, gripper.actuators),
+        ("fingers.force_sensors", mujoco.mjtObj.mjOBJ_SENSOR, model.nsensor, gripper.force_sensors),
+        ("object.joint", mujoco.mjtObj.mjOBJ_JOINT, model.njnt, (gripper.object_joint,)),
+        ("object.geom", mujoco.mjtObj.mjOBJ_GEOM, model.ngeom, (gripper.object_geom,)),
+    ):
+        known = [found for found in (mujoco.mj_id2name(model, kind, index) for index in range(count)) if found]
         for name in names:
-            try:
-                find(name)
-            except KeyError as error:
-                raise ConfigError(f"{path}: {key}: {gripper.model.name} has no {name!r}") from error
-    slide = mujoco.mjtJoint.mjJNT_SLIDE
-    if any(model.joint(name).type[0] != slide for name in gripper.joints):
-        raise ConfigError(f"{path}: fingers.joints: must be slide joints")
+            if name not in known:
+                where = f"{gripper.path}: {key}"
+                raise ConfigError(f"{where}: {gripper.model.name} has no {name!r}{closest(name, known)}")
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    for finger in range(2):
+        _check_finger(gripper, model, data, finger)
+    _check_object(gripper, model, data)
     for parameter in gripper.parameters.values():
         for write in parameter.writes:
-            where = f"{path}: parameters.{parameter.name}.writes: {write.field}"
-            field = getattr(model, write.field, None)
-            if not isinstance(field, np.ndarray):
-                raise ConfigError(f"{where} is no field of MuJoCo's model")
-            columns = field.shape[1] if field.ndim == 2 else None
-            if (columns is None) != (write.column is None) or (columns is not None and write.column >= columns):
-                need = "no column" if columns is None else f"a column from 0 to {columns - 1}"
-                raise ConfigError(f"{where} needs {need}")
+            _check_write(f"{gripper.path}: parameters.{parameter.name}.writes: {write.field}", model, write)
+    gripper.compile("fast")
+
+
+def _check_finger(gripper: Gripper, model: mujoco.MjModel, data: mujoco.MjData, finger: int) -> None:
+    joint, drive = model.joint(gripper.joints[finger]), model.actuator(gripper.actuators[finger])
+    where, axis = f"{gripper.path}: fingers", "xyz"[gripper.axis]
+    if joint.type[0] != mujoco.mjtJoint.mjJNT_SLIDE:
+        raise ConfigError(f"{where}.joints: {joint.name!r} must be a slide joint")
+    side, outward = (("left", -1), ("right", 1))[finger]
+    opens = math.copysign(1.0, gripper.open - gripper.closed) * data.xaxis[joint.id][gripper.axis]
+    if opens * outward < 0.9:
+        raise ConfigError(
+            f"{where}.joints: {joint.name!r} must open towards {'-+'[finger]}{axis}, as the {side} finger: swap left"
+            " and right, or closed and open, or change object.axis"
+        )
+    if drive.trntype[0] != mujoco.mjtTrn.mjTRN_JOINT or drive.trnid[0] != joint.id:
+        raise ConfigError(f"{where}.actuators: {drive.name!r} must drive the {side} finger's joint {joint.name!r}")
+    if drive.gear[0] != 1 or drive.gainprm[0] <= 0 or not math.isclose(drive.biasprm[1], -drive.gainprm[0]):
+        raise ConfigError(f"{where}.actuators: {drive.name!r} must be a position servo, such as <position kp='100'>")
+    for kind, limited, (low, high) in (
+        ("joint", model.jnt_limited[joint.id], joint.range),
+        ("actuator", model.actuator_ctrllimited[drive.id], drive.ctrlrange),
+    ):
+        for key, value in (("closed", gripper.closed), ("open", gripper.open)):
+            if limited and not low - 1e-9 <= value <= high + 1e-9:
+                raise ConfigError(f"{where}.{key}={value:g}: the {side} {kind} goes from {low:g} to {high:g} m")
+    sensor = model.sensor(gripper.force_sensors[finger])
+    if not _reads_a_press(model, sensor.id):
+        raise ConfigError(
+            f"{where}.force_sensors: {sensor.name!r} must be a touch sensor, or a contact sensor with data='force' and"
+            " not reduce='netforce': its numbers are summed, and must be positive when the finger presses"
+        )
+
+
+def _reads_a_press(model: mujoco.MjModel, sensor: int) -> bool:
+    # A contact sensor's integers: bits of `data`, index of `reduce`. A net force has the world's axes and a sign.
+    data, reduce, _ = model.sensor_intprm[sensor]
+    kind = model.sensor_type[sensor]
+    only_force = data == 1 << int(mujoco.mjtConDataField.mjCONDATA_FORCE) and reduce != _NETFORCE
+    return kind == mujoco.mjtSensor.mjSENS_TOUCH or (kind == mujoco.mjtSensor.mjSENS_CONTACT and only_force)
+
+
+def _check_object(gripper: Gripper, model: mujoco.MjModel, data: mujoco.MjData) -> None:
+    where, axis = f"{gripper.path}: object", "xyz"[gripper.axis]
+    joint, geom = model.joint(gripper.object_joint), model.geom(gripper.object_geom)
+    free = joint.type[0] == mujoco.mjtJoint.mjJNT_FREE
+    slides = joint.type[0] == mujoco.mjtJoint.mjJNT_SLIDE and data.xaxis[joint.id][gripper.axis] > 0.9
+    if not (free or slides):
+        raise ConfigError(f"{where}.joint: {joint.name!r} must be a free joint, or a slide joint towards +{axis}")
+    if geom.bodyid[0] != joint.bodyid[0]:
+        raise ConfigError(f"{where}.geom: {geom.name!r} must be on the body that {joint.name!r} moves")
+    shapes = mujoco.mjtGeom
+    if shapes(geom.type[0]) not in (shapes.mjGEOM_CYLINDER, shapes.mjGEOM_SPHERE, shapes.mjGEOM_BOX):
+        raise ConfigError(f"{where}.geom: {geom.name!r} must be a cylinder, a sphere or a box, to have a radius")
+
+
+def _check_write(where: str, model: mujoco.MjModel, write: FieldWrite) -> None:
+    field = getattr(model, write.field, None) if write.field in MODEL_FIELDS else None
+    if not isinstance(field, np.ndarray) or field.dtype.kind != "f":
+        known = [name for name in MODEL_FIELDS if name.startswith(("actuator_", "dof_", "geom_"))]
+        raise ConfigError(f"{where} is no field of numbers in MuJoCo's model{closest(write.field, known)}")
+    columns = field.shape[1] if field.ndim == 2 else None
+    if (columns is None) != (write.column is None) or (columns is not None and write.column >= columns):
+        need = "no column" if columns is None else f"a column from 0 to {columns - 1}"
+        raise ConfigError(f"{where} needs {need}")
 
 
 def _mapping(path: Path, raw: dict, key: str) -> dict:
@@ -259,10 +333,20 @@ def _demand(path: Path, where: str, raw: Any, keys: set[str], optional: set[str]
 
 
 def _number(path: Path, where: str, value: Any) -> float:
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
-        raise ConfigError(f"{path}: {where}={value}: must be a number")
-    return float(value)
+    try:
+        if isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value):
+            return float(value)
+    except OverflowError:
+        pass
+    hint = "; YAML wants 1.0e-3 for 1e-3" if isinstance(value, str) and "e" in value.lower() else ""
+    raise ConfigError(f"{path}: {where}={_one_line(value)[:40]}: must be a number{hint}")
 
 
-def _one_line(error: Exception) -> str:
-    return " ".join(str(error).split())
+def _text(path: Path, where: str, value: Any) -> str:
+    if not isinstance(value, str) or not value.strip() or not value.isprintable():
+        raise ConfigError(f"{path}: {where}={_one_line(value)[:40]}: must be text; put it in quotes")
+    return value
+
+
+def _one_line(message: object) -> str:
+    return " ".join(str(message).split())

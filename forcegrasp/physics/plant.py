@@ -31,16 +31,30 @@ class Plant:
       n: number of grasps.
       tier: physics tier, see :meth:`~forcegrasp.physics.gripper.Gripper.compile`.
       threads: threads of the engine; 0 uses every core.
+      step_factor: multiplies the physics step.
+      other_collisions: uses MuJoCo's other collision code.
 
     Raises:
       ConfigError: if there is no such tier.
     """
 
-    def __init__(self, gripper: Gripper, n: int, tier: str = "reference", threads: int = 0) -> None:
+    def __init__(
+        self,
+        gripper: Gripper,
+        n: int,
+        tier: str = "reference",
+        threads: int = 0,
+        step_factor: float = 1.0,
+        other_collisions: bool = False,
+    ) -> None:
         guard.silence_log()
         self.gripper, self.n = gripper, n
         self.model = model = gripper.compile(tier)
+        model.opt.timestep *= step_factor
+        if other_collisions:
+            model.opt.disableflags ^= mujoco.mjtDisableBit.mjDSBL_NATIVECCD
         self.dt = float(model.opt.timestep)  #: physics step, seconds
+        self._prepare(model)
         self.batch = batch = Batch(model, n, threads)
         self._qpos, self._qvel = batch.bind("qpos"), batch.bind("qvel")
         self._ctrl, self._sensors = batch.bind("ctrl"), batch.bind("sensordata")
@@ -51,15 +65,26 @@ class Plant:
         thing = model.joint(gripper.object_joint)
         is_free = thing.type[0] == mujoco.mjtJoint.mjJNT_FREE
         self._object_qpos = thing.qposadr[0] + (gripper.axis if is_free else 0)
+        self._object_origin = model.qpos0[self._object_qpos]  # the middle of the grasp is where the scene puts it
         self.object_dof = thing.dofadr[0] + (gripper.axis if is_free else 0)
         self.actuators = [model.actuator(name).id for name in gripper.actuators]
         self._object_body = model.geom(gripper.object_geom).bodyid[0]
         #: geoms of the object
         self.object_geoms = np.flatnonzero(model.geom_bodyid == self._object_body)
+        #: What moves with a finger's pads, in the frame of the finger's body: field of positions → indices.
+        self._pads = [
+            {
+                "geom_pos": np.flatnonzero(model.geom_bodyid == joint.bodyid[0]),
+                "site_pos": np.flatnonzero(model.site_bodyid == joint.bodyid[0]),
+                "body_pos": np.flatnonzero(model.body_parentid == joint.bodyid[0]),
+            }
+            for joint in joints
+        ]
         self._readings = [slice(s.adr[0], s.adr[0] + s.dim[0]) for s in map(model.sensor, gripper.force_sensors)]
         self._sign = 1.0 if gripper.open > gripper.closed else -1.0
         self._origin = gripper.closed
         self._fields: dict[str, np.ndarray] = {}
+        self._base: dict[str, np.ndarray] = {}
         self._effects: list[Effect] = []
         self._hooked: dict[str, list[Effect]] = {}
         self.force_scale = np.ones(n)  #: f_α, factor from the force sensors to the reading, ``(n,)``
@@ -69,6 +94,31 @@ class Plant:
         self.object_push_n = np.zeros(n)
         self.measured_force = np.zeros((n, 2))  #: what the force sensors say, newtons
         self.measured_position = np.zeros((n, 2))  #: what the encoders say, metres
+
+    def _prepare(self, model: mujoco.MjModel) -> None:
+        """Undoes the compiler's shortcuts past fields that effects change; what is simulated stays the same."""
+        # Pads that shift leave the bounding volumes of their bodies, and the midphase would not see them touch.
+        model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_MIDPHASE
+        frames = mujoco.mjtSameFrame
+        only_rotation = {
+            frames.mjSAMEFRAME_BODY.value: frames.mjSAMEFRAME_BODYROT.value,
+            frames.mjSAMEFRAME_INERTIA.value: frames.mjSAMEFRAME_INERTIAROT.value,
+        }
+        bodies = [model.joint(name).bodyid[0] for name in self.gripper.joints]
+        #: Pads in the very frame of their body, whose own position would not be read: field, index, what it must be.
+        self._pad_frames = [
+            (f"{kind}_sameframe", index, only_rotation[same])
+            for kind in ("geom", "site")
+            for index, (body, same) in enumerate(
+                zip(getattr(model, f"{kind}_bodyid"), getattr(model, f"{kind}_sameframe"), strict=True)
+            )
+            if body in bodies and same in only_rotation
+        ]
+        for name in self.gripper.actuators:  # without a limit, a range would not be read
+            actuator = model.actuator(name).id
+            if not model.actuator_forcelimited[actuator]:
+                model.actuator_forcelimited[actuator] = 1
+                model.actuator_forcerange[actuator] = -np.inf, np.inf
 
     # --- state ---------------------------------------------------------------------------------------------------
 
@@ -84,8 +134,8 @@ class Plant:
 
     @property
     def object_position(self) -> np.ndarray:
-        """Object position along the grasp axis, metres, ``(n,)``."""
-        return self._qpos[:, self._object_qpos].copy()
+        """Object position along the grasp axis from where the scene puts it, metres, ``(n,)``."""
+        return self._qpos[:, self._object_qpos] - self._object_origin
 
     @property
     def pad_force(self) -> np.ndarray:
@@ -107,44 +157,54 @@ class Plant:
         """A per-simulation field of MuJoCo's model, writable, ``(n, ...)``."""
         if name not in self._fields:
             self._fields[name] = self.batch.expand(name)
+            self._base[name] = self._fields[name].copy()
         return self._fields[name]
+
+    def base(self, name: str) -> np.ndarray:
+        """What :meth:`field` is without effects: the scene's values, and base parameters where they were written."""
+        self.field(name)
+        return self._base[name]
 
     def write(self, parameter: BaseParameter, ids: np.ndarray, values: np.ndarray) -> None:
         """Writes a base parameter of these rows into the fields that follow it. ``values``: ``(len(ids),)``."""
         rows = {"actuator": self.actuators, "dof": self.finger_dofs, "geom": self.object_geoms}
         for write in parameter.writes:
-            field = self.field(write.field)
             for row in rows[write.field.split("_")[0]]:
-                if write.column is None:
-                    field[ids, row] = write.sign * values
-                else:
-                    field[ids, row, write.column] = write.sign * values
+                column = () if write.column is None else (write.column,)
+                self._write_base(write.field, (ids, row, *column), write.sign * values)
+
+    def _write_base(self, field: str, where: tuple, values: np.ndarray) -> None:
+        self.field(field)[where] = self.base(field)[where] = values
 
     def write_radius(self, ids: np.ndarray, radius_m: np.ndarray) -> None:
         """Gives objects a radius (half the width of a box), with the inertia that follows from it at the same mass.
 
+        An object that is more than the one geom, or has an inertia of its own in the scene, keeps its inertia.
         Bounding boxes, radii and inverse weights follow from these: :meth:`reset` has MuJoCo do it.
         """
-        model, body = self.model, self._object_body
-        mass, inertia, size = model.body_mass[body], self.field("body_inertia"), self.field("geom_size")
-        geom = model.geom(self.gripper.object_geom)
-        kind = geom.type[0]
-        types = mujoco.mjtGeom
-        for index in self.object_geoms:
-            size[ids, index, self.gripper.axis if kind == types.mjGEOM_BOX else 0] = radius_m
+        model, geom = self.model, self.model.geom(self.gripper.object_geom)
+        column = self.gripper.axis if geom.type[0] == mujoco.mjtGeom.mjGEOM_BOX else 0
+        self._write_base("geom_size", (ids, geom.id, column), radius_m)
+        sphere = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, f"{geom.name}_pads")  # of the fast tier
+        if sphere >= 0:
+            self._write_base("geom_size", (ids, sphere, 0), radius_m)
+        if np.allclose(self._inertia(geom.size[column : column + 1]), model.body_inertia[self._object_body], rtol=1e-9):
+            self._write_base("body_inertia", (ids, self._object_body), self._inertia(radius_m))
+
+    def _inertia(self, radius: np.ndarray) -> np.ndarray:
+        """Moments of inertia of an object that is all one geom, ``(len(radius), 3)``."""
+        mass, geom = self.model.body_mass[self._object_body], self.model.geom(self.gripper.object_geom)
         # The order of operations is the compiler's: the last bit of an inertia can move a contact point.
-        if kind == types.mjGEOM_CYLINDER:
+        if geom.type[0] == mujoco.mjtGeom.mjGEOM_CYLINDER:
             length = 2 * geom.size[1]
-            inertia[ids, body, 0] = mass * (3 * radius_m * radius_m + length * length) / 12
-            inertia[ids, body, 1] = inertia[ids, body, 0]
-            inertia[ids, body, 2] = mass * radius_m * radius_m / 2
-        elif kind == types.mjGEOM_SPHERE:
-            inertia[ids, body] = (2 * mass * radius_m * radius_m / 5)[:, None]
-        elif kind == types.mjGEOM_BOX:
-            half = np.broadcast_to(geom.size, (len(ids), 3)).copy()
-            half[:, self.gripper.axis] = radius_m
-            squares = half**2
-            inertia[ids, body] = mass / 3 * (squares.sum(axis=1, keepdims=True) - squares)
+            across = mass * (3 * radius * radius + length * length) / 12
+            return np.stack([across, across, mass * radius * radius / 2], axis=1)
+        if geom.type[0] == mujoco.mjtGeom.mjGEOM_SPHERE:
+            return np.repeat((2 * mass * radius * radius / 5)[:, None], 3, axis=1)
+        half = np.repeat(geom.size[None], len(radius), axis=0)
+        half[:, self.gripper.axis] = radius
+        squares = half**2
+        return mass / 3 * (squares.sum(axis=1, keepdims=True) - squares)
 
     def attach(self, effects: Sequence[tuple[Effect, np.ndarray]]) -> None:
         """Puts effects into the plant, each on its own rows, in the order of their stages; replaces earlier ones."""
@@ -160,19 +220,27 @@ class Plant:
           offset_m: where their objects stand along the grasp axis, ``(len(ids),)``.
           position_m: where the fingers stand, ``(len(ids), 2)``; as in the scene by default.
         """
+        for name, field in self._fields.items():  # whatever effects made of it
+            field[ids] = self._base[name][ids]
         for effect in self._effects:
             which = np.flatnonzero(np.isin(effect.rows, ids))
             effect.reset(which)
             if "change_model" in effect.hooks():
                 effect.change_model(self, which)
         self.batch.set_const(ids)
+        for name, index, frame in self._pad_frames:  # set_const finds them anew
+            self.batch.expand(name)[ids, index] = frame
         keyframe = {"keyframe": 0} if self.model.nkey else {}
         self.batch.reset(ids, stage=mujoco.mjtStage.mjSTAGE_NONE.value, **keyframe)
-        self._qpos[ids, self._object_qpos] = offset_m
+        self._qpos[ids, self._object_qpos] = self._object_origin + offset_m
         if position_m is not None:
             self._qpos[np.asarray(ids)[:, None], self._finger_qpos] = position_m * self._sign + self._origin
         self.batch.forward(ids)
+        for effect in self._effects:  # all rows are read, but only these anew
+            effect.new_reading[:] = np.isin(effect.rows, ids)[:, None]
         self._read()
+        for effect in self._effects:
+            effect.new_reading[:] = True
 
     # --- time ----------------------------------------------------------------------------------------------------
 
@@ -230,25 +298,26 @@ class Plant:
     def _write_friction(self) -> None:
         if not self.friction_n.any() and "dof_frictionloss" not in self._fields:
             return
-        loss, model = self.field("dof_frictionloss"), self.model
+        base, loss = self.base("dof_frictionloss"), self.field("dof_frictionloss")
         for side, dof in enumerate(self.finger_dofs):
-            loss[:, dof] = model.dof_frictionloss[dof] + self.friction_n[:, side]
+            loss[:, dof] = base[:, dof] + self.friction_n[:, side]
             self.stiffen_friction(dof)
 
     def stiffen_friction(self, dof: int, rows: np.ndarray | slice = slice(None)) -> None:
-        """Lets dry friction on a degree of freedom hold instead of creep, as far as the step allows."""
-        self.field("dof_solref")[rows, dof] = _STIFF_SOLREF
-        self.field("dof_solimp")[rows, dof] = _STIFF_SOLIMP
+        """Lets dry friction that an effect added hold instead of creep, as far as the step allows."""
+        more = (self.field("dof_frictionloss") > self.base("dof_frictionloss"))[rows, dof, None]
+        for name, stiff in (("dof_solref", _STIFF_SOLREF), ("dof_solimp", _STIFF_SOLIMP)):
+            self.field(name)[rows, dof] = np.where(more, stiff, self.base(name)[rows, dof])
 
     def _write_pad_shift(self) -> None:
         if not self.pad_shift_m.any() and "geom_pos" not in self._fields:
             return
-        position, model = self.field("geom_pos"), self.model
         for side, name in enumerate(self.gripper.joints):
-            joint = model.joint(name)
-            axis = self._sign * joint.axis
-            for geom in np.flatnonzero(model.geom_bodyid == joint.bodyid[0]):
-                position[:, geom] = model.geom_pos[geom] + self.pad_shift_m[:, side : side + 1] * axis
+            joint = self.model.joint(name)
+            shift = self.pad_shift_m[:, side : side + 1] * (self._sign * joint.axis)
+            for field, indices in self._pads[side].items():
+                for index in indices:
+                    self.field(field)[:, index] = getattr(self.model, field)[index] + shift
 
     def _read(self) -> None:
         self.measured_force, self.measured_position = self.force, self.position

@@ -1,0 +1,107 @@
+"""Fits the base model from several starts, and says whether to believe it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from forcegrasp.compare.fit import Fit, Simulators, fit_once
+from forcegrasp.compare.problem import Problem
+from forcegrasp.compare.target import Target
+
+#: Number of starts.
+STARTS = 3
+# The further starts see this many grasps of each object: enough to tell whether there is another optimum.
+_GRASPS_PER_OBJECT = 2
+# Starts agree if their costs do to this share, or to this much per residual.
+_SAME_SHARE, _SAME_COST = 0.01, 0.002
+# Largest slope at an optimum, in standard errors of the parameter; those of a noisy simulator never vanish.
+_FLAT = 5.0
+
+
+@dataclass(frozen=True)
+class BaseFit:
+    """The best of several fits, with the gate that a diagnosis must pass."""
+
+    fit: Fit
+    errors: tuple[float, ...]  #: rms residual ÷ noise where each start ended
+    converged: bool
+    reason: str = ""  #: why it is not, in words
+
+
+def fit_base(
+    target: Target,
+    problem: Problem,
+    simulators: Simulators,
+    rng: np.random.Generator,
+    progress: Callable[[str], None] = lambda text: None,
+) -> BaseFit:
+    """Fits from the nominal parameters, and then looks from random places inside the bounds for a better optimum."""
+    first = fit_once(target, problem, simulators, problem.start())
+    progress(f"base model, start 1 of {STARTS}: {rms_error(first, target):.2f} × noise")
+    few = _few_grasps(target)
+    small = _Subset(target, problem, few, first)
+    ends = [small.fit(small.known)]
+    for number in range(1, STARTS):
+        low, high = small.problem.low, small.problem.high
+        ends.append(small.fit(low + rng.uniform(0.2, 0.8, len(low)) * (high - low)))
+        progress(f"base model, start {number + 1} of {STARTS}: {rms_error(ends[-1], small.target):.2f} × noise")
+    best = min(ends, key=lambda f: f.cost)
+    errors = tuple(rms_error(f, small.target) for f in ends)
+    count = small.target.mask.sum() * 4
+    tolerance = max(_SAME_SHARE * best.cost, _SAME_COST * count)
+    if ends[0].cost - best.cost > tolerance:  # another start found a better place
+        first = fit_once(target, problem, simulators, small.enlarge(best))
+    if sum(f.cost - best.cost <= tolerance for f in ends) < 2:
+        spread = ", ".join(f"{error:.2f}" for error in errors)
+        return BaseFit(first, errors, False, f"the starts end in different places (errors of {spread} × noise)")
+    return check_gradient(first, target, errors)
+
+
+def check_gradient(fit: Fit, target: Target, errors: tuple[float, ...] = ()) -> BaseFit:
+    """The part of the gate that one fit can pass or not: its error must be level where it ended."""
+    if fit.gradient > _FLAT * max(1.0, rms_error(fit, target)):
+        reason = f"the error still falls where the fit ended (slope of {fit.gradient:.1f} standard errors)"
+        return BaseFit(fit, errors, False, reason)
+    return BaseFit(fit, errors, True)
+
+
+def rms_error(fit: Fit, target: Target) -> float:
+    """Root mean square of a fit's residuals ÷ noise."""
+    return float(np.sqrt(fit.cost / (target.mask.sum() * 4)))
+
+
+def _few_grasps(target: Target) -> np.ndarray:
+    """The first grasps of each object."""
+    seen: dict[str, int] = {}
+    chosen = []
+    for index, grasp in enumerate(target.grasps):
+        seen[grasp.object] = seen.get(grasp.object, 0) + 1
+        if seen[grasp.object] <= _GRASPS_PER_OBJECT:
+            chosen.append(index)
+    return np.array(chosen)
+
+
+class _Subset:
+    """The same problem on some of its grasps, with the cheap model corrected as in a fit of all of them."""
+
+    def __init__(self, target: Target, problem: Problem, keep: np.ndarray, fitted: Fit) -> None:
+        self.target = target.subset(keep)
+        self.problem = Problem(problem.gripper, self.target.grasps, problem.effects)
+        self._simulators = Simulators(self.problem)
+        self._correction = fitted.correction[keep][:, : self._simulators.exact.mask.shape[1]]
+        self._full, self._fitted = problem, fitted
+        names = [e.name for e in problem.entries]
+        self._places = [names.index(e.name) for e in self.problem.entries]
+        self.known = fitted.vector[self._places]
+
+    def fit(self, start: np.ndarray) -> Fit:
+        return fit_once(self.target, self.problem, self._simulators, start, self._correction, rounds=0)
+
+    def enlarge(self, fit: Fit) -> np.ndarray:
+        """Coordinates for the whole problem: what these grasps don't fix stays as it was."""
+        vector = self._fitted.vector.copy()
+        vector[self._places] = fit.vector
+        return vector

@@ -1,0 +1,119 @@
+"""Where a model fails: its error per signal and phase, against the floor that sensor noise sets."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from forcegrasp.compare.heldout import rms
+from forcegrasp.compare.target import PHASES, SIGNALS, UNITS, Target
+
+#: What a residual is held against, in reports and where nothing explains it.
+COVARIATES = ("time_since_contact_s", "velocity_m_s", "direction", "force_n", "command_m", "position_m", "time_s")
+_BINS = 12
+
+
+@dataclass(frozen=True)
+class Cell:
+    """The error of one signal in one phase."""
+
+    signal: str
+    phase: str
+    samples: int
+    rms: float  #: in the signal's unit
+    ratio: float  #: rms ÷ sensor noise
+    bias: float  #: mean of measured − predicted, in the signal's unit
+    unit: str
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """A model against a measurement set."""
+
+    target: Target
+    predicted: np.ndarray  #: ``(G, S, 4)``
+    residual: np.ndarray  #: (measured − predicted) ÷ noise, ``(G, S, 4)``
+    heldout: np.ndarray  #: the same for grasps held out of the fit; NaN where there are none
+    floor: float  #: error ÷ noise that a perfect model would leave
+
+    def cells(self) -> list[Cell]:
+        """One cell for each signal and phase that occurs."""
+        found = []
+        for k, (signal, unit) in enumerate(zip(SIGNALS, UNITS, strict=True)):
+            for index, phase in enumerate(PHASES):
+                inside = self.residual[..., k][self.target.phase == index]
+                if len(inside):
+                    ratio, sigma = float(np.sqrt(np.mean(inside**2))), self.target.sigma[k]
+                    bias = float(inside.mean() * sigma)
+                    found.append(Cell(signal, phase, len(inside), ratio * sigma, ratio, bias, unit))
+        return found
+
+    def by_grasp(self) -> np.ndarray:
+        """rms residual ÷ noise of each grasp, ``(G,)``."""
+        squares = np.sum(self.residual**2, axis=(1, 2))
+        return np.sqrt(squares / (4 * self.target.mask.sum(axis=1)))
+
+    def by_grasp_and_phase(self) -> np.ndarray:
+        """rms residual ÷ noise, ``(G, phases)``; NaN where a grasp has no such phase."""
+        grid = np.full((len(self.target.grasps), len(PHASES)), np.nan)
+        for index in range(len(PHASES)):
+            inside = self.target.phase == index
+            counts = inside.sum(axis=1)
+            squares = np.sum(self.residual**2 * inside[:, :, None], axis=(1, 2))
+            grid[counts > 0, index] = np.sqrt(squares[counts > 0] / (4 * counts[counts > 0]))
+        return grid
+
+    def floor_ratio(self) -> float:
+        """Held-out rms residual ÷ sensor noise; of the grasps themselves where none were held out."""
+        value = rms(self.heldout, self.target)
+        return value if np.isfinite(value) else rms(self.residual, self.target)
+
+    def covariates(self) -> dict[str, np.ndarray]:
+        """What the residual may depend on, each ``(G, S, 2)``, left and right finger."""
+        return covariates(self.target)
+
+    def explanations(self) -> list[tuple[str, str, float]]:
+        """Covariate, signal kind and the share of the residual's variance that its bins explain, largest first."""
+        shares = []
+        for name, values in self.covariates().items():
+            for kind, k in (("position", 0), ("force", 2)):
+                share = _binned_share(values, self.residual[..., k : k + 2], self.target.mask)
+                shares.append((name, kind, share))
+        return sorted(shares, key=lambda s: -s[2])
+
+
+def covariates(target: Target) -> dict[str, np.ndarray]:
+    """The covariates of :data:`COVARIATES`, each ``(G, S, 2)``; NaN where a sample has none."""
+    shape = (*target.mask.shape, 2)
+    found = {name: np.full(shape, np.nan) for name in COVARIATES}
+    for index, grasp in enumerate(target.grasps):
+        n = len(grasp.time_s)
+        velocity = np.gradient(grasp.position_m, grasp.time_s, axis=0) if n > 1 else np.zeros((n, 2))
+        touching = grasp.force_n - np.median(grasp.force_n[: max(3, n // 20)], axis=0) > 5 * target.sigma[2:]
+        for side in range(2):
+            first = np.argmax(touching[:, side]) if touching[:, side].any() else None
+            if first is not None:
+                since = grasp.time_s - grasp.time_s[first]
+                found["time_since_contact_s"][index, :n, side] = np.where(since >= 0, since, np.nan)
+        slow = 4 * target.sigma[0] / max(np.median(np.diff(grasp.time_s)), 1e-9) if n > 1 else 0.0
+        found["velocity_m_s"][index, :n] = velocity
+        found["direction"][index, :n] = np.where(np.abs(velocity) < slow, 0.0, np.sign(velocity))
+        found["force_n"][index, :n] = grasp.force_n
+        found["command_m"][index, :n] = grasp.command_m
+        found["position_m"][index, :n] = grasp.position_m
+        found["time_s"][index, :n] = (grasp.time_s - grasp.time_s[0])[:, None]
+    return found
+
+
+def _binned_share(values: np.ndarray, residual: np.ndarray, mask: np.ndarray) -> float:
+    """Share of the residual's mean square that the means of equally filled bins explain."""
+    chosen = mask[..., None] & np.isfinite(values)
+    x, y = values[chosen], residual[chosen]
+    total = np.sum(residual[np.broadcast_to(mask[..., None], residual.shape)] ** 2)
+    if len(x) < 5 * _BINS or total == 0:
+        return 0.0
+    edges = np.unique(np.quantile(x, np.linspace(0, 1, _BINS + 1)))
+    bins = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, max(0, len(edges) - 2))
+    sums, counts = np.bincount(bins, weights=y), np.bincount(bins)
+    return float(np.sum(sums[counts > 0] ** 2 / counts[counts > 0]) / total)

@@ -1,0 +1,237 @@
+"""Finds out which physical effects a model lacks, one after the other, on evidence from grasps held out of the fit."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from forcegrasp.compare.base_fit import BaseFit
+from forcegrasp.compare.fit import Fit, Simulators, fit_once
+from forcegrasp.compare.heldout import heldout_residual, log_likelihood, make_folds, rms
+from forcegrasp.compare.problem import Problem
+from forcegrasp.compare.score import Background, Score, null_gains, numerical_error, score_effects
+from forcegrasp.compare.target import PHASES, Target
+from forcegrasp.effects import Effect
+
+#: Largest number of effects that are looked for.
+MOST_EFFECTS = 4
+#: Family-wise probability of a false alarm that is accepted at each step.
+ALARM = 0.01
+#: An effect must lower the error of some signal in some phase by this share.
+LEAST_GAIN = 0.02
+#: Share of the error beyond the noise that must be explained for effects to be the answer; below it is "unknown".
+EXPLAINED = 0.7
+# Refitted per step: signatures only rank.
+_REFITTED = 6
+# A signature this much worse than the best is not refitted.
+_HOPELESS = 0.15
+# Effects whose signatures are that parallel can't be told apart, whatever the likelihood says.
+_PARALLEL = 0.995
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One effect, refitted together with everything else."""
+
+    effect: type[Effect]
+    variant: str
+    fit: Fit
+    p_family: float  #: probability that the best signature of sensor noise does as well
+    gains: np.ndarray  #: change of each held-out grasp's log-likelihood, ``(G,)``
+    error_after: float  #: held-out rms residual ÷ noise
+    largest_fall: float  #: largest share by which the error of a signal in a phase falls
+    signature: np.ndarray  #: unit vector, ``(N,)``
+
+    @property
+    def heldout_gain(self) -> float:
+        """Change of the held-out log-likelihood, all grasps together."""
+        return float(np.nansum(self.gains))
+
+    def parameters(self) -> dict[str, float]:
+        """The effect's fitted parameters."""
+        count = len(self.effect.parameters)
+        return dict(zip((p.name for p in self.effect.parameters), map(float, self.fit.values[-count:]), strict=True))
+
+
+@dataclass(frozen=True)
+class Step:
+    """One round of the search."""
+
+    verdict: str  #: "effect", "one_of" or "none"
+    effects: tuple[str, ...]  #: the effect found, or the set that can't be told apart, best first
+    candidates: tuple[Candidate, ...]  #: refitted, best first
+    scores: tuple[Score, ...]  #: best signature of each effect, best first
+    error_before: float
+    error_after: float
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """What the data say that the model lacks."""
+
+    verdict: str  #: "effect", "one_of", "explained", "unknown" or "not_fitted"
+    effects: tuple[str, ...]
+    steps: tuple[Step, ...]
+    base: BaseFit
+    fit: Fit  #: with the effects that were found
+    target: Target
+    folds: tuple[np.ndarray, ...]
+    error_before: float
+    error_after: float
+    numerical: tuple[np.ndarray, ...] = field(default=())  #: each ``(G, S, 4)``
+    floor: float = 1.0  #: error that sensor noise and the model's own numerical error leave
+
+    def heldout(self) -> np.ndarray:
+        """Residuals of held-out grasps under the final fit, ``(G, S, 4)``."""
+        return heldout_residual(self.fit, self.target, self.folds)
+
+
+def diagnose(
+    target: Target,
+    base: BaseFit,
+    simulators: Simulators,
+    effects: Sequence[type[Effect]],
+    rng: np.random.Generator,
+    progress: Callable[[str], None] = lambda text: None,
+) -> Diagnosis:
+    """Adds effects to a fitted base model for as long as the evidence holds.
+
+    Args:
+      target: the measurements.
+      base: the fitted base model, possibly with effects already in it.
+      simulators: of the same grasps.
+      effects: the catalogue.
+      rng: for the null distribution.
+      progress: told what is going on.
+    """
+    folds = tuple(make_folds(target.grasps))
+    fit = base.fit
+    error_before = rms(heldout_residual(fit, target, folds), target)
+    if not base.converged:
+        return Diagnosis("not_fitted", (), (), base, fit, target, folds, error_before, error_before)
+    numerical = tuple(numerical_error(fit, target))
+    floor = numerical_floor(numerical, target)
+    steps: list[Step] = []
+    while len(steps) < MOST_EFFECTS:
+        known = {effect for effect, _ in fit.problem.effects}
+        step = _look_further(target, fit, simulators, [e for e in effects if e not in known], folds, numerical, rng, progress)
+        steps.append(step)
+        if step.verdict == "none":
+            break
+        fit = step.candidates[0].fit
+        progress(f"found {step.effects[0]}: held-out error {step.error_before:.2f} → {step.error_after:.2f} × noise")
+        if step.error_after <= floor:
+            break
+    error_after = rms(heldout_residual(fit, target, folds), target)
+    found = [s for s in steps if s.verdict != "none"]
+    verdict = _verdict(found, error_before, error_after, floor)
+    names = tuple(s.effects[0] for s in found) if verdict == "effect" else ()
+    if verdict == "one_of":
+        names = found[0].effects
+    return Diagnosis(
+        verdict, names, tuple(steps), base, fit, target, folds, error_before, error_after, numerical, floor
+    )
+
+
+def numerical_floor(numerical: Sequence[np.ndarray], target: Target) -> float:
+    """Error ÷ noise that even a perfect model leaves: the sensor noise, and what integration and contacts add."""
+    squares = [np.mean(n[target.mask] ** 2) for n in numerical]
+    # Halving the step shows about half of what the step costs in all.
+    return float(np.sqrt(1 + 4 * squares[0] + squares[1]))
+
+
+def _verdict(found: list[Step], before: float, after: float, floor: float) -> str:
+    at_floor = after <= max(floor, 1.02)
+    if not found:
+        return "explained" if before <= max(floor, 1.02) * 1.03 else "unknown"
+    share = (before**2 - after**2) / max(before**2 - 1, 1e-9)
+    if not at_floor and share < EXPLAINED:
+        return "unknown"
+    return "one_of" if len(found) == 1 and found[0].verdict == "one_of" else "effect"
+
+
+def _look_further(
+    target: Target,
+    fit: Fit,
+    simulators: Simulators,
+    effects: Sequence[type[Effect]],
+    folds: Sequence[np.ndarray],
+    numerical: Sequence[np.ndarray],
+    rng: np.random.Generator,
+    progress: Callable[[str], None],
+) -> Step:
+    background = Background(fit, numerical)
+    progress(f"trying {len(effects)} effects")
+    groups = score_effects(fit, target, simulators, background, effects)
+    ranked = sorted((group[0] for group in groups), key=lambda s: -s.gain)
+    null = null_gains(groups, rng)
+    held = heldout_residual(fit, target, folds)
+    error = rms(held, target)
+    bar = float(np.quantile(null, 1 - ALARM))
+    hopeful = [s for s in ranked if s.gain > max(bar, _HOPELESS * ranked[0].gain)][:_REFITTED]
+    candidates = []
+    for number, score in enumerate(hopeful, 1):
+        progress(f"refitting with {score.effect.name} {score.variant} ({number} of {len(hopeful)})")
+        candidates.append(_refit(score, target, fit, simulators, folds, held, null))
+    best: dict[str, Candidate] = {}
+    for candidate in sorted(candidates, key=lambda c: -c.heldout_gain):
+        best.setdefault(candidate.effect.name, candidate)  # of several variants the best one
+    ordered = tuple(best.values())
+    if not ordered or not _convincing(ordered[0]):
+        return Step("none", (), ordered, tuple(ranked), error, error)
+    winner = ordered[0]
+    equal = [winner, *(c for c in ordered[1:] if _equal(winner, c))]
+    names = tuple(c.effect.name for c in equal)
+    verdict = "effect" if len(names) == 1 else "one_of"
+    return Step(verdict, names, ordered, tuple(ranked), error, winner.error_after)
+
+
+def _refit(
+    score: Score,
+    target: Target,
+    fit: Fit,
+    simulators: Simulators,
+    folds: Sequence[np.ndarray],
+    held: np.ndarray,
+    null: np.ndarray,
+) -> Candidate:
+    old = fit.problem
+    problem = Problem(old.gripper, old.grasps, [*old.effects, (score.effect, score.variant)])
+    added = [e.coordinate(v) for e, v in zip(problem.entries[len(old) :], score.values, strict=True)]
+    refit = fit_once(target, problem, simulators, np.r_[fit.vector, added], fit.correction, rounds=1)
+    after = heldout_residual(refit, target, folds)
+    gains = log_likelihood(after) - log_likelihood(held)
+    fall = max((1 - rms(after, target, w) / rms(held, target, w) for w in cells(target)), default=0.0)
+    p_family = (1 + int(np.sum(null >= score.gain))) / (1 + len(null))
+    return Candidate(
+        score.effect, score.variant, refit, p_family, gains, rms(after, target), fall, score.signature
+    )
+
+
+def cells(target: Target, least: int = 40) -> list[np.ndarray]:
+    """Masks ``(G, S, 4)`` of positions and of forces in each phase that has at least so many samples."""
+    masks = []
+    for index in range(len(PHASES)):
+        inside = target.phase == index
+        if inside.sum() >= least:
+            for signals in ((1, 1, 0, 0), (0, 0, 1, 1)):
+                masks.append(inside[:, :, None] & np.array(signals, bool))
+    return masks
+
+
+def _convincing(candidate: Candidate) -> bool:
+    gains = candidate.gains[np.isfinite(candidate.gains)]
+    spread = gains.std(ddof=1) * np.sqrt(len(gains)) if len(gains) > 1 else np.inf
+    return (
+        candidate.p_family <= ALARM and gains.sum() > max(spread, 5.0) and candidate.largest_fall >= LEAST_GAIN
+    )
+
+
+def _equal(winner: Candidate, other: Candidate) -> bool:
+    lead = winner.gains - other.gains
+    lead = lead[np.isfinite(lead)]
+    error = lead.std(ddof=1) * np.sqrt(len(lead)) if len(lead) > 1 else np.inf
+    parallel = abs(float(winner.signature @ other.signature))
+    return other.heldout_gain > 0 and (lead.sum() <= error or parallel > _PARALLEL)

@@ -1,0 +1,67 @@
+"""What a model says the measured grasps should have looked like."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from forcegrasp.effects import Effect
+from forcegrasp.measure.replay import EffectOn, Replay
+
+
+@dataclass(frozen=True)
+class Applied:
+    """An effect with one set of parameters, on all grasps. ``values``: ``(parameters,)``."""
+
+    effect: type[Effect]
+    variant: str
+    values: np.ndarray
+
+
+@dataclass(frozen=True)
+class Case:
+    """A whole model of a set: base parameters of each grasp, and effects."""
+
+    base: dict[str, np.ndarray]  #: name → ``(G,)``
+    effects: tuple[Applied, ...] = field(default=())
+
+    def simulation_key(self) -> bytes:
+        """Equal for cases that differ in nothing but sensors: they share one simulation."""
+        parts = [value.tobytes() for name, value in sorted(self.base.items()) if name != "force_scale"]
+        for one in self.effects:
+            if not one.effect.reads_only():
+                parts.append(f"{one.effect.name}/{one.variant}/".encode() + one.values.tobytes())
+        return b"|".join(parts)
+
+
+def predict(replay: Replay, cases: Sequence[Case]) -> np.ndarray:
+    """Predicted signals of all cases, ``(cases, G, S, 4)``; everything that must be simulated is simulated at once."""
+    keys = [case.simulation_key() for case in cases]
+    first = {key: index for index, key in reversed(list(enumerate(keys)))}
+    simulated = [cases[index] for index in sorted(first.values())]
+    place = {cases[index].simulation_key(): n for n, index in enumerate(sorted(first.values()))}
+    count = len(replay.grasps)
+    base = {name: np.concatenate([c.base[name] for c in simulated]) for name in simulated[0].base if name != "force_scale"}
+    grasp = np.tile(np.arange(count), len(simulated))
+    motion = replay.simulate(grasp, base, _spread(simulated, count, reads_only=False))
+    rows = np.concatenate([np.arange(count) + place[key] * count for key in keys])
+    scale = np.concatenate([case.base["force_scale"] for case in cases])
+    readings = replay.read(motion, rows, scale, _spread(cases, count, reads_only=True))
+    signals = np.concatenate([readings.position, readings.force], axis=-1)
+    return signals.reshape(len(cases), count, *signals.shape[1:])
+
+
+def _spread(cases: Sequence[Case], count: int, reads_only: bool) -> list[EffectOn]:
+    """Effects of all cases, each kind once, on the rows of the cases that have it."""
+    kinds: dict[tuple[type[Effect], str], list[tuple[int, np.ndarray]]] = {}
+    for index, case in enumerate(cases):
+        for one in case.effects:
+            if one.effect.reads_only() == reads_only:
+                kinds.setdefault((one.effect, one.variant), []).append((index, one.values))
+    spread = []
+    for (effect, variant), places in kinds.items():
+        rows = np.concatenate([np.arange(count) + index * count for index, _ in places])
+        spread.append(EffectOn(effect, variant, rows, np.repeat([values for _, values in places], count, axis=0)))
+    return spread

@@ -1,0 +1,19 @@
+"""Measurement sets: reading them strictly, checking that they can be right, writing them, converting ROS bags."""
+
+from forcegrasp.measure.checks import check_set, check_table
+from forcegrasp.measure.read import read_set
+from forcegrasp.measure.rosbag import convert_bag
+from forcegrasp.measure.schema import FinalForceTable, MeasuredGrasp, MeasurementSet
+from forcegrasp.measure.write import write_set, write_table
+
+__all__ = [
+    "FinalForceTable",
+    "MeasuredGrasp",
+    "MeasurementSet",
+    "check_set",
+    "check_table",
+    "convert_bag",
+    "read_set",
+    "write_set",
+    "write_table",
+]

@@ -1,0 +1,176 @@
+"""Which way is closing, which sign presses, which finger is which? Refuses only where no effect could be the reason."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+
+import numpy as np
+
+from forcegrasp.errors import MeasurementError
+from forcegrasp.measure.check_liveness import feels, force_noise, without_trend
+from forcegrasp.measure.samples import place
+from forcegrasp.measure.schema import COMMAND, FINGERS, FORCE, POSITION, MeasuredGrasp, MeasurementSet
+
+#: Positions may lag behind commands by any of these, in seconds.
+_LAGS = (0.0, 0.05, 0.1, 0.2, 0.4, 0.8)
+
+
+def check_signs(measured: MeasurementSet, open_m: float, closed_m: float) -> None:
+    """Raises MeasurementError if a closing direction, the sign of a force, or the fingers are the wrong way round."""
+    reach = open_m - closed_m
+    for finger in range(2):
+        _check_follows(measured, finger, abs(reach))
+        _check_presses(measured, finger, closed_m, reach)
+    _check_fingers(measured, abs(reach))
+    for grasp in measured.grasps:
+        _check_free_air(measured, grasp, abs(reach))
+
+
+def _check_follows(measured: MeasurementSet, finger: int, reach: float) -> None:
+    """Positions must not run against commands that cover a good part of the range, whatever the delay."""
+    against = []
+    for grasp in measured.grasps:
+        command, position = grasp.command_m[:, finger], grasp.position_m[:, finger]
+        if np.ptp(command) < 0.2 * reach or np.ptp(position) < 0.2 * np.ptp(command):
+            continue
+        found = [_correlation(position, _held(grasp.time_s, command, grasp.time_s - lag)) for lag in _LAGS]
+        if min(found) < -0.7 and max(found) < 0.5:
+            against.append((min(found), grasp))
+    if against and (min(lowest for lowest, _ in against) < -0.9 or len(against) > 1):
+        raise MeasurementError(
+            f"{place(measured.path, against[0][1], 0, POSITION[finger])}: runs against {COMMAND[finger]}; both must be"
+            " 0 when closed and grow when opening"
+        )
+
+
+def _check_presses(measured: MeasurementSet, finger: int, closed_m: float, reach: float) -> None:
+    """Forces must grow as commands close; asked session by session, of grasps in which this finger feels much."""
+    largest = max((_span(grasp.force_n[:, k])[2] for grasp in measured.grasps for k in range(2)), default=0.0)
+    sessions: dict[str, list[MeasuredGrasp]] = defaultdict(list)
+    for grasp in measured.grasps:
+        force = grasp.force_n[:, finger]
+        least = max(0.2 * largest, 8 * force_noise(force, measured.force_std_n))
+        if _span(force)[2] > least and feels(grasp.force_n)[finger]:
+            sessions[grasp.session].append(grasp)
+    for grasps in sessions.values():
+        first = grasps[0]
+        if _wrong_way([_answer(g, g.force_n[:, finger], g.command_m.mean(axis=1) / reach) for g in grasps]):
+            low, high, _ = _span(first.force_n[:, finger])
+            if -low > high:
+                what, todo = "pressing gives negative forces", "multiply them by -1: f ≥ 0 presses"
+            else:
+                what, todo = "grows while the fingers open", "the closing direction is wrong: q = 0 must be closed"
+            raise MeasurementError(f"{place(measured.path, first, 0, FORCE[finger])}: {what}; {todo}")
+        # One finger the wrong way round leaves the mean of both commands as it is; but then it starts closed.
+        starts = [(g.position_m[0, [finger, 1 - finger]] - closed_m) / reach for g in grasps]
+        if all(own < 0.25 and other > 0.6 for own, other in starts) and _wrong_way(
+            [_answer(g, g.force_n[:, finger], g.command_m[:, finger] / reach) for g in grasps]
+        ):
+            raise MeasurementError(
+                f"{place(measured.path, first, 0, POSITION[finger])}: the {FINGERS[finger]} finger presses more"
+                " the further it opens; the closing direction is wrong: q = 0 must be closed"
+            )
+
+
+def _answer(grasp: MeasuredGrasp, force: np.ndarray, command: np.ndarray) -> np.ndarray:
+    """How force and opening change together, at each lag: sums of products and squares, ``(2, lags, 3)``.
+
+    First as they are; then less the force's line over the whole grasp, lest a strong drift pass for an answer.
+    """
+    time = grasp.time_s
+    window = min(max(0.3, 3 * float(np.median(np.diff(time)))), (time[-1] - time[0]) / 8)
+
+    def change(values: np.ndarray, lag: float) -> np.ndarray:
+        return _held(time, values, time - lag) - _held(time, values, time - lag - window)
+
+    forces = [change(force, 0.0), change(without_trend(force, time), 0.0)]
+    opened = [change(command, lag) for lag in _LAGS]
+    return np.array([[[f @ opening, f @ f, opening @ opening] for opening in opened] for f in forces])
+
+
+def _wrong_way(answers: list[np.ndarray]) -> bool:
+    """Whether forces clearly grow with opening, all grasps together; a lag may hide, but not reverse this."""
+    product, force, opening = np.moveaxis(np.sum(answers, axis=0), 2, 0)
+    alike = product / np.sqrt(np.maximum(force * opening, 1e-300))
+    return all(row.max() > 0.3 and row.max() > 2 * max(-row.min(), 0.0) for row in alike)
+
+
+def _check_fingers(measured: MeasurementSet, reach: float) -> None:
+    """An object off to the right is touched by the right finger first, if both close alike."""
+    right, wrong = [], []
+    for grasp in measured.grasps:
+        offset = grasp.offset_m
+        if offset is None or abs(offset) < 0.05 * reach:
+            continue
+        onsets = [_onset(grasp.time_s, force, measured.force_std_n) for force in grasp.force_n.T]
+        if None in onsets:
+            continue
+        first, (left_at, right_at) = min(onsets), grasp.time_s[onsets]
+        unlike = np.abs(np.diff(grasp.command_m[: first + 1], axis=1)).max() > 0.02 * reach
+        unlike |= np.abs(np.diff(grasp.position_m[first])).max() > 0.05 * reach
+        lead = 0.1 + 2 * float(np.median(np.diff(grasp.time_s)))
+        if unlike or abs(left_at - right_at) < lead:
+            continue
+        if (left_at < right_at) == (offset < 0):
+            right.append(grasp)
+        elif _too_open_for_both(grasp, first) or (grasp.radius_m is None and abs(left_at - right_at) > 3 * lead):
+            wrong.append(grasp)
+    if len(wrong) > 1 and len(wrong) >= 0.8 * len(wrong + right):
+        raise MeasurementError(
+            f"{place(measured.path, wrong[0], 0, FORCE[0])}: the wrong finger touches first in {len(wrong)} of"
+            f" {len(wrong + right)} off-centre grasps; are left and right swapped? or correct object_offset_m"
+        )
+
+
+def _check_free_air(measured: MeasurementSet, grasp: MeasuredGrasp, reach: float) -> None:
+    """Before a finger can touch, forces may be biased and drift, but not fluctuate as if grasping."""
+    if grasp.radius_m is None or grasp.offset_m is None:
+        return
+    surface = grasp.radius_m + np.array([-1.0, 1.0]) * grasp.offset_m
+    near = (grasp.position_m - surface < 0.15 * reach).any(axis=1)
+    free = int(near.argmax()) if near.any() else len(near)
+    if free < 10 or len(near) - free < 10:
+        return
+    largest = max(_span(force)[2] for force in grasp.force_n[free:].T)
+    for finger, force in enumerate(grasp.force_n.T):
+        rest = without_trend(force[:free], grasp.time_s[:free])
+        noise = force_noise(force[free:], measured.force_std_n)
+        crossings = np.count_nonzero(np.diff(np.signbit(rest)))
+        if np.std(rest) > max(15 * noise, 0.2 * largest) and crossings > 3:
+            index = int(np.abs(rest).argmax())
+            raise MeasurementError(
+                f"{place(measured.path, grasp, index, FORCE[finger])}: {force[index]:.3g} N in free air, where forces"
+                f" fluctuate by {np.std(rest):.2g} N; cut it out, or correct object_radius_m or object_offset_m"
+            )
+
+
+def _span(force: np.ndarray) -> tuple[float, float, float]:
+    """Low, high and their difference, without the outermost 2 % at either end."""
+    low, high = np.quantile(force, (0.02, 0.98)).tolist()
+    return low, high, high - low
+
+
+def _correlation(a: np.ndarray, b: np.ndarray) -> float:
+    spread = np.std(a) * np.std(b)
+    return float(np.mean((a - a.mean()) * (b - b.mean())) / spread) if spread > 0 else 0.0
+
+
+def _held(time: np.ndarray, command: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """The command in force at some times; before the first sample, the first."""
+    return command[np.maximum(np.searchsorted(time, at, side="right") - 1, 0)]
+
+
+def _onset(time: np.ndarray, force: np.ndarray, std: float | None) -> int | None:
+    """Index of the first of three samples in a row at which the force has clearly grown of late, or None."""
+    window = max(0.25, 5 * float(np.median(np.diff(time))))
+    grown = force - force[np.searchsorted(time, time - window)]
+    above = grown > max(8 * force_noise(force, std), 0.05 * _span(force)[2])
+    run = above[:-2] & above[1:-1] & above[2:]
+    return int(run.argmax()) if run.any() else None
+
+
+def _too_open_for_both(grasp: MeasuredGrasp, index: int) -> bool:
+    """Whether the fingers are too far apart for the object to be between both: just one of them can touch it."""
+    if grasp.radius_m is None or grasp.offset_m is None:
+        return False
+    return bool(grasp.position_m[index].sum() > 2 * grasp.radius_m + abs(grasp.offset_m))

@@ -1,0 +1,85 @@
+"""Metres, seconds, newtons? A gripper's own range tells, and the time between samples."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from forcegrasp.errors import MeasurementError
+from forcegrasp.measure.folder import show
+from forcegrasp.measure.samples import place
+from forcegrasp.measure.schema import COMMAND, OBJECT, POSITION, MeasuredGrasp, MeasurementSet
+
+#: Beyond this many times the gripper's range, a length is in another unit.
+_OTHER_UNIT = 10
+#: Beyond this many times the range, a finger is where the gripper can't be.
+_OUT_OF_REACH = 1.5
+_CLOCKS = ((1e6, "nanoseconds", "1e9"), (1e3, "microseconds", "1e6"), (1, "milliseconds", "1000"))
+
+
+def check_units(measured: MeasurementSet, open_m: float, closed_m: float) -> list[str]:
+    """Raises MeasurementError about lengths or times in another unit; returns warnings about odd ones."""
+    reach = abs(open_m - closed_m)
+    _check_noise(measured, reach)
+    warnings = []
+    for grasp in measured.grasps:
+        _check_lengths(measured, grasp, open_m, closed_m)
+        _check_clock(measured, grasp)
+        warnings += _warnings(measured, grasp, reach)
+    return warnings
+
+
+def _check_noise(measured: MeasurementSet, reach: float) -> None:
+    if (measured.position_std_m or 0) > 0.1 * reach:
+        raise MeasurementError(
+            f"{show(measured.path / 'meta.yaml')}: position_std_m: {measured.position_std_m:g} is more than a tenth of"
+            f" the {reach:g} m that the gripper opens: looks like millimetres, divide by 1000"
+        )
+
+
+def _check_lengths(measured: MeasurementSet, grasp: MeasuredGrasp, open_m: float, closed_m: float) -> None:
+    reach = abs(open_m - closed_m)
+    for name, value in (("object_radius_m", grasp.radius_m), ("object_offset_m", grasp.offset_m)):
+        if value is not None and abs(value) > _OTHER_UNIT * reach:
+            raise MeasurementError(
+                f"{show(measured.path / 'grasps.csv')}: grasp {show(grasp.name)}, column {name}: {value:g} where the"
+                f" gripper opens {reach:g} m: looks like millimetres, divide by 1000"
+            )
+    signals = grasp.signals()
+    for column in (*COMMAND, *POSITION, *([OBJECT] if OBJECT in signals else [])):
+        values = signals[column]
+        far = int(np.abs(values).argmax())
+        if abs(values[far]) > _OTHER_UNIT * max(reach, abs(open_m), abs(closed_m)):
+            raise MeasurementError(
+                f"{place(measured.path, grasp, far, column)}: {values[far]:g} where the gripper opens {reach:g} m:"
+                " looks like millimetres, divide by 1000"
+            )
+    for column in POSITION:
+        outside = np.abs(signals[column] - (open_m + closed_m) / 2) > (_OUT_OF_REACH - 0.5) * reach
+        if outside.any():
+            index = int(outside.argmax())
+            raise MeasurementError(
+                f"{place(measured.path, grasp, index, column)}: {signals[column][index]:g} is out of reach of a"
+                f" finger that goes from {closed_m:g} to {open_m:g} m; give metres per finger, of the right gripper"
+            )
+
+
+def _check_clock(measured: MeasurementSet, grasp: MeasuredGrasp) -> None:
+    interval = float(np.median(np.diff(grasp.time_s)))
+    for at_least, unit, factor in _CLOCKS:
+        if interval > at_least:
+            raise MeasurementError(
+                f"{place(measured.path, grasp, 1, 't_s')}: samples are {interval:g} s apart: looks like {unit},"
+                f" divide by {factor}"
+            )
+
+
+def _warnings(measured: MeasurementSet, grasp: MeasuredGrasp, reach: float) -> list[str]:
+    warnings = []
+    where = place(measured.path, grasp)
+    if grasp.radius_m is not None and grasp.radius_m > 1.2 * reach:
+        warnings.append(f"{where}: a radius of {grasp.radius_m:g} m does not fit between fingers that open {reach:g} m")
+    if np.median(np.diff(grasp.time_s)) < 1e-5:
+        warnings.append(f"{where}: more than 100,000 samples per second; is t_s in seconds?")
+    if np.abs(grasp.force_n).max() > 1000:
+        warnings.append(f"{where}: forces of {np.abs(grasp.force_n).max():.4g} N; are they in newtons?")
+    return warnings

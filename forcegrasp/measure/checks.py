@@ -1,0 +1,95 @@
+"""Can this set be right? Refuses what no physical effect explains, warns of what is odd, accepts the rest."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from forcegrasp.errors import MeasurementError
+from forcegrasp.measure.check_liveness import check_liveness
+from forcegrasp.measure.check_signs import check_signs
+from forcegrasp.measure.check_units import check_units
+from forcegrasp.measure.folder import show
+from forcegrasp.measure.samples import MIN_SAMPLES, check_samples, place
+from forcegrasp.measure.schema import FinalForceTable, MeasuredGrasp, MeasurementSet
+
+#: A pause this many times the median sample interval is worth a warning.
+_GAP = 5
+
+
+def check_set(measured: MeasurementSet, open_m: float, closed_m: float = 0.0) -> list[str]:
+    """Checks a set against the gripper it is said to come from.
+
+    Bias, drift, delays, dead zones, saturation, crosstalk, adhesion and the like are legitimate: they are for the
+    diagnosis to find.
+
+    Args:
+      measured: the set.
+      open_m: position of a finger that is fully open.
+      closed_m: position of a finger that is fully closed.
+
+    Returns:
+      Warnings, one line each.
+
+    Raises:
+      MeasurementError: if the set can't be right: where, why, and what to do.
+    """
+    if not measured.grasps:
+        raise MeasurementError(f"{show(measured.path)}: holds no grasps; record some")
+    for grasp in measured.grasps:
+        check_samples(measured.path, grasp)
+        if len(grasp.time_s) < MIN_SAMPLES:
+            raise MeasurementError(
+                f"{place(measured.path, grasp)}: {len(grasp.time_s)} samples are too few, {MIN_SAMPLES} are needed;"
+                " is a sample here called a grasp? else remove it"
+            )
+    warnings = check_units(measured, open_m, closed_m)
+    warnings += check_liveness(measured, abs(open_m - closed_m))
+    check_signs(measured, open_m, closed_m)
+    if len(measured.grasps) == 1:
+        warnings.append(f"{show(measured.path)}: one grasp only; nothing can be held out to test a finding on")
+    return warnings + _gaps(measured) + _copies(measured)
+
+
+def check_table(table: FinalForceTable, open_m: float) -> list[str]:
+    """Checks a table of final forces against a gripper that opens ``open_m``; returns warnings as :func:`check_set`."""
+    path = table.path / "table.csv"
+    delta, force = table.delta_q_m, table.final_force_n
+    wrong = np.abs(delta) > 3 * abs(open_m)
+    if wrong.any():
+        index = int(wrong.argmax())
+        raise MeasurementError(
+            f"{show(path)}: row {index + 2}, column delta_q_m: {delta[index]:g} where the gripper opens {open_m:g} m:"
+            " looks like millimetres, divide by 1000"
+        )
+    if not force.any():
+        raise MeasurementError(f"{show(path)}: column final_force_n: all forces are zero; is the sensor connected?")
+    if len(delta) > 2 and np.ptp(delta) > 0 and np.ptp(force) > 0 and np.corrcoef(delta, force)[0, 1] < -0.8:
+        raise MeasurementError(
+            f"{show(path)}: column final_force_n: falls as delta_q_m grows; larger deltas must press harder, with f ≥ 0"
+        )
+    counts = {name: table.objects.count(name) for name in dict.fromkeys(table.objects)}
+    return [f"{show(path)}: object {show(name)} has {n} rows only" for name, n in counts.items() if n < 3]
+
+
+def _gaps(measured: MeasurementSet) -> list[str]:
+    warnings = []
+    for grasp in measured.grasps:
+        steps = np.diff(grasp.time_s)
+        longest = int(steps.argmax())
+        if steps[longest] > _GAP * np.median(steps):
+            warnings.append(
+                f"{place(measured.path, grasp, longest + 1, 't_s')}: a gap of {steps[longest]:.3g} s where samples are"
+                f" {np.median(steps):.3g} s apart; it stays a gap"
+            )
+    return warnings
+
+
+def _copies(measured: MeasurementSet) -> list[str]:
+    """Grasps that agree to the last bit: right for a noiseless simulation, a slip anywhere else."""
+    seen: dict[bytes, MeasuredGrasp] = {}
+    warnings = []
+    for grasp in measured.grasps:
+        first = seen.setdefault(np.hstack([grasp.position_m, grasp.force_n]).tobytes(), grasp)
+        if first is not grasp:
+            warnings.append(f"{place(measured.path, grasp)}: the same readings as grasp {show(first.name)}; copied?")
+    return warnings

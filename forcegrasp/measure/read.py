@@ -1,0 +1,177 @@
+"""Reads a measurement set from its folder, or says in one line why it can't."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import polars as pl
+
+from forcegrasp.errors import MeasurementError, closest
+from forcegrasp.measure.csv_file import read_csv
+from forcegrasp.measure.folder import MAX_NAME, find_file, open_folder, show
+from forcegrasp.measure.parquet_file import read_parquet
+from forcegrasp.measure.samples import check_samples
+from forcegrasp.measure.schema import (
+    COMMAND,
+    FORCE,
+    FORMAT,
+    OBJECT,
+    POSITION,
+    SIGNALS,
+    SPLITS,
+    FinalForceTable,
+    MeasuredGrasp,
+    MeasurementSet,
+    fingerprint_of_set,
+    fingerprint_of_table,
+)
+from forcegrasp.measure.table import Columns, Table
+from forcegrasp.measure.yaml_file import Reader, load_yaml
+
+META = ("format", "kind", "gripper", "source", "license")
+NOISE = ("position_std_m", "force_std_n")
+MAX_TEXT = 10_000
+
+_GRASPS = Columns(
+    text=("grasp", "object", "session", "split"),
+    numbers=("object_radius_m", "object_offset_m"),
+    optional=("object_offset_m", "split"),
+    blank=("object_radius_m", "object_offset_m", "split"),
+)
+_SAMPLES = Columns(text=("grasp",), numbers=(*SIGNALS, OBJECT), optional=(OBJECT,), blank=(OBJECT,))
+_FINAL = Columns(text=("object",), numbers=("delta_q_m", "final_force_n"))
+
+
+def read_set(path: str | Path) -> MeasurementSet | FinalForceTable:
+    """Returns the measurement set in a folder.
+
+    Raises:
+      MeasurementError: if anything is missing, unknown, broken, or too large: file, row, column and what to do.
+    """
+    folder = open_folder(path)
+    file = find_file(folder, "meta.yaml")
+    content = load_yaml(file)
+    if content.get("format") != FORMAT:  # first, lest the keys of another format are called unknown
+        raise MeasurementError(f"{show(file)}: format: must be {FORMAT}, not {show(content.get('format', ''))}")
+    meta = Reader(content, show(file), META, NOISE)
+    kind = meta.text("kind", MAX_NAME)
+    readers = {"grasps": _read_grasps, "final_force": _read_table}
+    if kind not in readers:
+        raise meta.refuse("kind", f"{show(kind)} is unknown{closest(kind, readers)}")
+    facts = {
+        "path": folder,
+        "name": folder.resolve().name,
+        "gripper": meta.text("gripper", MAX_NAME),
+        "source": meta.text("source", MAX_TEXT, lines=True),
+        "license": meta.text("license", MAX_TEXT, lines=True),
+        "force_std_n": meta.positive("force_std_n"),
+    }
+    return readers[kind](folder, meta, facts)
+
+
+def _read_table(folder: Path, meta: Reader, facts: dict[str, Any]) -> FinalForceTable:
+    if meta.get("position_std_m") is not None:
+        raise meta.refuse("position_std_m", "a table of final forces has no positions; remove it")
+    _refuse_files(folder, "final_force", ("grasps.csv", "samples.csv", "samples.parquet"))
+    frame = read_csv(find_file(folder, "table.csv"), _FINAL).frame
+    objects = tuple(frame["object"].to_list())
+    delta, force = (np.array(frame[name].to_numpy()) for name in _FINAL.numbers)
+    fingerprint = fingerprint_of_table(facts["gripper"], facts["force_std_n"], objects, delta, force)
+    return FinalForceTable(**facts, objects=objects, delta_q_m=delta, final_force_n=force, fingerprint=fingerprint)
+
+
+def _read_grasps(folder: Path, meta: Reader, facts: dict[str, Any]) -> MeasurementSet:
+    _refuse_files(folder, "grasps", ("table.csv",))
+    table = read_csv(find_file(folder, "grasps.csv"), _GRASPS)
+    _check_grasps(table)
+    both = [name for name in ("samples.csv", "samples.parquet") if os.path.lexists(folder / name)]
+    if len(both) == 2:
+        raise MeasurementError(f"{show(folder)}: has samples.csv and samples.parquet; remove one")
+    if both == ["samples.parquet"]:
+        samples = read_parquet(find_file(folder, "samples.parquet"), _SAMPLES)
+    else:
+        samples = read_csv(find_file(folder, "samples.csv"), _SAMPLES)
+    grasps = _grasps(folder, table, samples)
+    position_std = meta.positive("position_std_m")
+    return MeasurementSet(
+        **facts,
+        position_std_m=position_std,
+        grasps=grasps,
+        fingerprint=fingerprint_of_set(facts["gripper"], position_std, facts["force_std_n"], grasps),
+    )
+
+
+def _refuse_files(folder: Path, kind: str, names: tuple[str, ...]) -> None:
+    for name in names:
+        if (folder / name).exists():
+            raise MeasurementError(
+                f"{show(folder / name)}: does not belong to kind {kind}; remove it, or correct kind in meta.yaml"
+            )
+
+
+def _check_grasps(table: Table) -> None:
+    """Raises MeasurementError about a name that is there twice, a radius that is none, or an unknown split."""
+    frame = table.frame
+    names = frame["grasp"].to_list()
+    for index in np.flatnonzero(frame["grasp"].is_duplicated().to_numpy()).tolist():
+        first = names.index(names[index])
+        if first < index:
+            again = f"{show(names[index])} is there already, in row {table.first_row + first}; give it another name"
+            raise table.refuse(index, "grasp", again)
+    for index, radius in enumerate(frame["object_radius_m"]):
+        if radius is not None and radius <= 0:
+            raise table.refuse(index, "object_radius_m", f"{radius:g} must be positive; leave it empty if not known")
+    if "split" in frame.columns:
+        for index, split in enumerate(frame["split"]):
+            if split and split not in SPLITS:
+                raise table.refuse(
+                    index, "split", f"{show(split)} is unknown{closest(split, SPLITS)}; or leave it empty"
+                )
+
+
+def _grasps(folder: Path, table: Table, samples: Table) -> tuple[MeasuredGrasp, ...]:
+    """Joins the rows of grasps.csv with their samples, which may be interleaved."""
+    names = table.frame["grasp"].to_list()
+    numbered = samples.frame.with_row_index("row", offset=samples.first_row)
+    parts = {str(key[0]): part for key, part in numbered.partition_by("grasp", as_dict=True).items()}
+    for name, part in parts.items():
+        if name not in set(names):
+            index = int(part["row"][0]) - samples.first_row
+            raise samples.refuse(index, "grasp", f"{show(name)} is not in grasps.csv{closest(name, names[:1000])}")
+    for index, name in enumerate(names):
+        if name not in parts:
+            raise table.refuse(index, "grasp", f"{show(name)} has no samples in {samples.path.name}; remove the row")
+    grasps = tuple(_grasp(samples, facts, parts[facts["grasp"]]) for facts in table.frame.iter_rows(named=True))
+    for grasp in grasps:
+        check_samples(folder, grasp)
+    return grasps
+
+
+def _grasp(samples: Table, facts: dict[str, Any], part: pl.DataFrame) -> MeasuredGrasp:
+    def columns(names: tuple[str, ...]) -> np.ndarray:
+        return np.stack([part[name].to_numpy() for name in names], axis=1)
+
+    seen = None
+    if OBJECT in part.columns and part[OBJECT].null_count() < part.height:
+        empty = part[OBJECT].is_null()
+        if empty.any():
+            index = int(part["row"][int(empty.to_numpy().argmax())]) - samples.first_row
+            raise samples.refuse(index, OBJECT, "is empty, though not in all of this grasp; fill or empty all its rows")
+        seen = np.array(part[OBJECT].to_numpy())
+    return MeasuredGrasp(
+        name=facts["grasp"],
+        object=facts["object"],
+        session=facts["session"],
+        radius_m=facts["object_radius_m"],
+        offset_m=facts.get("object_offset_m"),
+        split=facts.get("split") or None,
+        time_s=np.array(part["t_s"].to_numpy()),
+        command_m=columns(COMMAND),
+        position_m=columns(POSITION),
+        force_n=columns(FORCE),
+        object_m=seen,
+        rows=part["row"].to_numpy().astype(np.int64),
+    )

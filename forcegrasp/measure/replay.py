@@ -1,0 +1,178 @@
+"""Replays a measurement set's commands, held as they were given, on simulated grippers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from forcegrasp.effects import Effect
+from forcegrasp.errors import PhysicsError
+from forcegrasp.measure.schema import MeasuredGrasp
+from forcegrasp.physics.gripper import Gripper
+from forcegrasp.physics.plant import Plant, write_base
+
+#: A finger starts where its first command or the end of its range is, if it was measured that near to it. Metres.
+_AT_REST_M = 1e-3
+#: Rows × physics steps that are kept in memory at once.
+_CHUNK = 8_000_000
+
+
+@dataclass(frozen=True)
+class EffectOn:
+    """An effect on some rows. ``values``: ``(len(rows), parameters)``."""
+
+    effect: type[Effect]
+    variant: str
+    rows: np.ndarray
+    values: np.ndarray
+
+
+@dataclass(frozen=True)
+class Motion:
+    """What happened in simulated rows, at the physics rate; not yet what sensors say of it."""
+
+    grasp: np.ndarray  #: index of the measured grasp each row replays, ``(n,)``
+    position: np.ndarray  #: metres, ``(n, steps, 2)``
+    pad_force: np.ndarray  #: force between pad and object before f_α, newtons, ``(n, steps, 2)``
+    object_position: np.ndarray  #: metres, ``(n, steps)``
+
+
+@dataclass(frozen=True)
+class Readings:
+    """What sensors say at the sample times; after a grasp's last sample, its last reading again."""
+
+    position: np.ndarray  #: metres, ``(n, samples, 2)``
+    force: np.ndarray  #: newtons, ``(n, samples, 2)``
+    object_position: np.ndarray  #: metres, ``(n, samples)``
+
+
+class Replay:
+    """Replays grasps of one gripper.
+
+    A command acts from the physics step at its time stamp until the next command's; a reading is the state at its time
+    stamp, before that command acts. Nothing is interpolated.
+
+    Args:
+      gripper: what is simulated.
+      grasps: whose commands are replayed.
+      tier: physics tier.
+      step_factor: multiplies the physics step; ½ tells how exact the integration is.
+      other_collisions: uses MuJoCo's other collision code; tells how exact the contacts are.
+    """
+
+    def __init__(
+        self,
+        gripper: Gripper,
+        grasps: Sequence[MeasuredGrasp],
+        tier: str = "reference",
+        step_factor: float = 1.0,
+        other_collisions: bool = False,
+    ) -> None:
+        self.gripper, self.grasps, self.tier = gripper, tuple(grasps), tier
+        self._step_factor, self._other_collisions = step_factor, other_collisions
+        self.dt = float(gripper.compile(tier).opt.timestep) * step_factor
+        starts = [np.rint((g.time_s - g.time_s[0]) / self.dt).astype(int) for g in self.grasps]
+        self._steps = 1 + max(start[-1] for start in starts)
+        samples = max(len(start) for start in starts)
+        #: physics step at which each sample is taken, ``(grasps, samples)``
+        self.sample_steps = np.stack([np.pad(start, (0, samples - len(start)), "edge") for start in starts])
+        #: which samples there are, ``(grasps, samples)``
+        self.mask = np.stack([np.arange(samples) < len(start) for start in starts])
+        self._command = np.stack([self._held(g, start) for g, start in zip(self.grasps, starts, strict=True)], axis=1)
+        self._fresh = np.zeros(self._command.shape[:2], bool)
+        for index, start in enumerate(starts):
+            self._fresh[start, index] = True
+        self.start_m = np.stack([start_position(g, gripper.open_m) for g in self.grasps])
+
+    def _held(self, grasp: MeasuredGrasp, start: np.ndarray) -> np.ndarray:
+        sample_at = np.searchsorted(start, np.arange(self._steps), side="right") - 1
+        return grasp.command_m[sample_at]
+
+    def simulate(self, grasp: np.ndarray, base: Mapping[str, np.ndarray], effects: Sequence[EffectOn] = ()) -> Motion:
+        """Simulates rows at once, each one grasp with its own parameters.
+
+        Args:
+          grasp: which grasp each row replays, ``(n,)``.
+          base: base parameters by name, each ``(n,)``; `force_scale` has no place here.
+          effects: those that change what happens.
+
+        Raises:
+          PhysicsError: if a row diverged.
+        """
+        n, rows_at_once = len(grasp), max(1, _CHUNK // self._steps)
+        if n > rows_at_once:
+            parts = []
+            for low in range(0, n, rows_at_once):
+                part = slice(low, min(n, low + rows_at_once))
+                chunk = {name: value[part] for name, value in base.items()}
+                parts.append(self.simulate(grasp[part], chunk, [_cut(e, part) for e in effects]))
+            names = ("grasp", "position", "pad_force", "object_position")
+            return Motion(*(np.concatenate([getattr(p, name) for p in parts]) for name in names))
+        plant = Plant(self.gripper, n, self.tier, 0, self._step_factor, self._other_collisions)
+        plant.attach([(e.effect(e.values, self.dt, e.variant), e.rows) for e in effects if len(e.rows)])
+        ids = np.arange(n)
+        plant.reset(ids, write_base(plant, ids, base), self.start_m[grasp])
+        position, pad_force = np.empty((2, self._steps, n, 2))
+        object_position = np.empty((self._steps, n))
+        for step in range(self._steps):
+            position[step], pad_force[step] = plant.position, plant.force
+            object_position[step] = plant.object_position
+            if step < self._steps - 1:
+                plant.advance(self._command[step, grasp], 1, self._fresh[step, grasp])
+        bad = plant.warnings().any(axis=1)
+        if bad.any():
+            row = int(np.flatnonzero(bad)[0])
+            values = ", ".join(f"{name}={value[row]:.4g}" for name, value in base.items())
+            raise PhysicsError(
+                f"grasp {self.grasps[grasp[row]].name} diverged with {values}; narrow the gripper's bounds"
+            )
+        return Motion(grasp, position.swapaxes(0, 1), pad_force.swapaxes(0, 1), object_position.T)
+
+    def read(
+        self, motion: Motion, rows: np.ndarray, force_scale: np.ndarray, effects: Sequence[EffectOn] = ()
+    ) -> Readings:
+        """Reads rows of a motion through sensors.
+
+        Args:
+          motion: what happened.
+          rows: which row of the motion each reading is of, ``(n,)``; the same row may be read in several ways.
+          force_scale: f_α, ``(n,)``.
+          effects: those that change what is read; their rows count readings.
+        """
+        steps, grasp = self.sample_steps[motion.grasp[rows]], motion.grasp[rows]
+        each = np.asarray(rows)[:, None]
+        position, objects = motion.position[each, steps], motion.object_position[each, steps]
+        if not effects:
+            return Readings(position, motion.pad_force[each, steps] * force_scale[:, None, None], objects)
+        force = motion.pad_force[rows] * force_scale[:, None, None]
+        true_position = motion.position[rows] if any("read_position" in e.effect.hooks() for e in effects) else None
+        live = sorted(
+            ((e.effect(e.values, self.dt, e.variant), e.rows) for e in effects), key=lambda pair: pair[0].rank
+        )
+        for step in range(self._steps):
+            for effect, which in live:
+                force[which, step] = effect.read_force(force[which, step])
+                if true_position is not None:
+                    true_position[which, step] = effect.read_position(true_position[which, step])
+        count = np.arange(len(grasp))[:, None]
+        if true_position is not None:
+            position = true_position[count, steps]
+        return Readings(position, force[count, steps], objects)
+
+
+def start_position(grasp: MeasuredGrasp, open_m: float) -> np.ndarray:
+    """Where the fingers stood at the first sample, metres, ``(2,)``.
+
+    An encoder may be off and is noisy: within a millimetre of the open end, or of the first command, they stood there.
+    """
+    start = np.clip(grasp.position_m[0], 0.0, open_m)
+    for anchor in (grasp.command_m[0], np.full(2, open_m)):
+        start = np.where(np.abs(grasp.position_m[0] - anchor) < _AT_REST_M, anchor, start)
+    return np.clip(start, 0.0, open_m)
+
+
+def _cut(effect: EffectOn, part: slice) -> EffectOn:
+    inside = (effect.rows >= part.start) & (effect.rows < part.stop)
+    return EffectOn(effect.effect, effect.variant, effect.rows[inside] - part.start, effect.values[inside])

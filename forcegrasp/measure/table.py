@@ -1,0 +1,83 @@
+"""A table of named columns with the place of every cell, whatever file it came from."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+
+from forcegrasp.errors import MeasurementError, closest
+from forcegrasp.measure.folder import MAX_NAME, show
+
+
+@dataclass(frozen=True)
+class Columns:
+    """The columns that a file may have."""
+
+    text: tuple[str, ...]
+    numbers: tuple[str, ...]
+    optional: tuple[str, ...] = ()  #: need not be there
+    blank: tuple[str, ...] = ()  #: may have empty cells
+
+    def check_header(self, path: Path, names: Sequence[str], row: str = "") -> None:
+        """Raises MeasurementError unless these are columns of such a file, each once, and none is missing."""
+        known = self.text + self.numbers
+        if len(names) == 1 and any(mark in names[0] for mark in ";\t|"):
+            raise MeasurementError(f"{show(path)}:{row} columns must be separated by commas; save it as plain CSV")
+        for name in names:
+            if name not in known:
+                hint = closest(name, known) if name else "; every column needs a name"
+                raise MeasurementError(f"{show(path)}:{row} unknown column {show(name)}{hint}")
+            if list(names).count(name) > 1:
+                raise MeasurementError(f"{show(path)}:{row} column {name} is there twice; remove one")
+        for name in known:
+            if name not in names and name not in self.optional:
+                raise MeasurementError(f"{show(path)}:{row} column {name} is missing; add it")
+
+
+@dataclass(frozen=True)
+class Table:
+    """Columns of a file: text as pl.String and numbers as pl.Float64."""
+
+    path: Path
+    frame: pl.DataFrame
+    first_row: int  #: what an editor (CSV) or a viewer (Parquet) shows as the number of the first row of data
+
+    def refuse(self, index: int, column: str, problem: str) -> MeasurementError:
+        """The error to raise about one cell; ``index`` counts rows from 0."""
+        return MeasurementError(f"{show(self.path)}: row {self.first_row + index}, column {column}: {problem}")
+
+    def check_cells(self, columns: Columns) -> None:
+        """Raises MeasurementError about the first cell that is empty, not finite, or no proper name."""
+        if not self.frame.height:
+            raise MeasurementError(f"{show(self.path)}: holds no rows; fill it or remove the set")
+        for name, cells in self.frame.to_dict().items():
+            empty = cells.is_null() if name in columns.numbers else cells.is_null() | (cells == "")
+            if name not in columns.blank and empty.any():
+                raise self.refuse(_first(empty), name, "is empty; fill it in")
+            if name in columns.numbers:
+                wrong = ~cells.is_finite().fill_null(True)
+                if wrong.any():
+                    raise self.refuse(_first(wrong), name, f"{cells[_first(wrong)]} is no finite number; drop the row")
+            else:
+                for value in cells.unique(maintain_order=True).drop_nulls():
+                    problem = _problem_of_name(value)
+                    if problem:
+                        raise self.refuse(_first(cells == value), name, problem)
+
+
+def _first(mask: pl.Series) -> int:
+    return int(np.flatnonzero(mask.fill_null(False).to_numpy())[0])
+
+
+def _problem_of_name(value: str) -> str:
+    if len(value) > MAX_NAME:
+        return f"{show(value)} has {len(value)} characters; {MAX_NAME} may be used"
+    if not value.isprintable():
+        return f"{show(value)} holds characters that can't be printed; remove them"
+    if value != value.strip():
+        return f"{show(value)} has spaces at its ends; remove them"
+    return ""

@@ -1,0 +1,239 @@
+"""What every effect of the catalogue owes, in each of its variants: a new one is covered by being registered."""
+
+from __future__ import annotations
+
+import functools
+import re
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from forcegrasp.effects import STAGES, Effect, catalogue, get_effect
+
+from .rollouts import RICH, Trace, Use, make_plant, play, rollout, start
+
+CASES = [pytest.param(e, v, id=f"{e.name}-{v}".rstrip("-")) for e in catalogue().values() for v in e.variants]
+SIZES = [
+    pytest.param(e, v, p, id="-".join(filter(None, (e.name, v, p.name))))
+    for e in catalogue().values()
+    for v in e.variants
+    for p in e.parameters
+]
+EFFECTS = [pytest.param(e, id=e.name) for e in catalogue().values()]
+TIERS = ("fast", "reference")
+
+
+@functools.cache
+def bare(tier: str) -> Trace:
+    return rollout(3, tier=tier)
+
+
+def everything() -> list[Use]:
+    """All effects at typical sizes."""
+    return [(e, e.typical_values(), "", (0, 1)) for e in catalogue().values()]
+
+
+@functools.cache
+def full() -> Trace:
+    return rollout(2, everything())
+
+
+def grown(effect: type[Effect], name: str, factor: float) -> np.ndarray:
+    """Typical values, one of them so many times as far from its null value; an infinite one is divided."""
+    values = effect.typical_values()
+    index = [p.name for p in effect.parameters].index(name)
+    p = effect.parameters[index]
+    values[index] = p.typical / factor if np.isinf(p.null) else p.null + factor * (p.typical - p.null)
+    assert p.low <= values[index] <= p.high
+    return values
+
+
+# --- identity ------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("tier", TIERS)
+@pytest.mark.parametrize(("effect", "variant"), CASES)
+def test_null_values_and_other_rows_change_no_bit(effect, variant, tier):
+    values = [effect.null_values(), effect.typical_values()]
+    trace = rollout(3, [(effect, values, variant, [0, 2])], tier)
+    assert trace.row(0) == bare(tier).row(0)
+    assert trace.row(1) == bare(tier).row(1)
+    assert trace.row(2) != bare(tier).row(2)
+
+
+@pytest.mark.parametrize(("effect", "variant"), CASES)
+def test_null_values_change_no_bit_among_other_effects(effect, variant):
+    trace = rollout(2, [*everything(), (effect, effect.null_values(), variant, [0, 1])])
+    assert all(trace.row(row) == full().row(row) for row in (0, 1))
+
+
+@pytest.mark.parametrize("tier", TIERS)
+def test_all_null_values_at_once_change_no_bit(tier):
+    trace = rollout(3, [(e, e.null_values(), "", range(3)) for e in catalogue().values()], tier)
+    for row in range(3):
+        assert trace.row(row) == bare(tier).row(row)
+
+
+def test_none_changes_no_bit():
+    trace = rollout(3, [(get_effect("none"), np.empty((3, 0)), "", range(3))])
+    assert all(trace.row(row) == bare("fast").row(row) for row in range(3))
+
+
+# --- sensitivity ---------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("effect", "variant", "parameter"), SIZES)
+def test_every_parameter_counts(effect, variant, parameter):
+    """A size that is put back to its null value, or a shape that is doubled, is seen."""
+    index = effect.parameters.index(parameter)
+    changed = effect.typical_values()
+    changed[index] = parameter.null if parameter.typical != parameter.null else 2 * parameter.typical
+    trace = rollout(2, [(effect, [effect.typical_values(), changed], variant, [0, 1])], offset_m=np.full(2, 0.001))
+    assert trace.row(0) != trace.row(1)
+
+
+@pytest.mark.parametrize(("effect", "variant", "parameter"), SIZES)
+def test_more_of_it_changes_more(effect, variant, parameter):
+    if parameter.typical == parameter.null:
+        return  # a shape, not a size
+    others = np.array([p.null if p != parameter and p.typical != p.null else p.typical for p in effect.parameters])
+    index = effect.parameters.index(parameter)
+    distances = []
+    for factor in (1, 2, 4):
+        others[index] = grown(effect, parameter.name, factor)[index]
+        distances.append(rollout(3, [(effect, others, variant, range(3))]).distance(bare("fast")))
+    assert distances[0] > 0
+    assert np.all(np.diff(distances) > 0), distances
+
+
+@pytest.mark.parametrize(("effect", "variant"), CASES)
+def test_extremes_are_simulated_without_a_warning(effect, variant):
+    bounds = [[p.low for p in effect.parameters], [p.high for p in effect.parameters]]
+    trace = rollout(4, [(effect, np.repeat(bounds, 2, axis=0), variant, range(4))])
+    assert all(np.isfinite(values).all() for values in vars(trace).values())
+    assert np.abs(trace.true_position).max() < 0.06
+
+
+def test_variants_differ():
+    for effect in catalogue().values():
+        if len(effect.variants) == 1:
+            continue
+        traces = [rollout(1, [(effect, effect.typical_values(), v, [0])]) for v in effect.variants]
+        rows = [trace.row(0) for trace in traces]
+        assert all(rows[i] != rows[j] for i in range(len(rows)) for j in range(i)), effect.name
+
+
+# --- rows and resets -----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("effect", "variant"), CASES)
+def test_rows_of_a_batch_are_as_if_alone(effect, variant):
+    values, offsets = np.array([effect.typical_values()] * 2), np.array([0.001, -0.0005])
+    for i, p in enumerate(effect.parameters):
+        values[1, i] = grown(effect, p.name, 2)[i] if p.typical != p.null else 2 * p.typical
+    together = rollout(2, [(effect, values, variant, [0, 1])], offset_m=offsets)
+    for row in (0, 1):
+        alone = rollout(1, [(effect, values[row], variant, [0])], offset_m=offsets[[row]])
+        assert alone.row(0) == together.row(row)
+
+
+@pytest.mark.parametrize(("effect", "variant"), CASES)
+def test_a_reset_forgets_its_rows_and_no_others(effect, variant):
+    """Rows that are reset in the middle of a grasp start as on a fresh plant; the others go on as if nothing were."""
+    uses = [(effect, effect.typical_values(), variant, [0, 1, 2])]
+    fresh, when = rollout(3, uses), 18  # in the partial release
+    plant = make_plant(3, uses)
+    start(plant, range(3))
+    play(plant, RICH[:when])
+    kept = plant.measured_force[0].copy(), plant.measured_position[0].copy()
+    start(plant, [1, 2])
+    assert np.array_equal(kept, (plant.measured_force[0], plant.measured_position[0]))
+    commands = np.stack([np.roll(RICH, -when, axis=0), RICH, RICH], axis=1)
+    after = play(plant, commands)
+    left = len(RICH) - when
+    assert after.row(1) == fresh.row(1)
+    assert after.row(2) == fresh.row(2)
+    for name, values in vars(after).items():
+        assert values[:left, 0].tobytes() == getattr(fresh, name)[when:, 0].tobytes(), name
+
+
+@pytest.mark.parametrize(("effect", "variant"), CASES)
+def test_a_plant_whose_effects_are_taken_away_is_a_bare_one(effect, variant):
+    plant = make_plant(3, [(effect, effect.typical_values(), variant, range(3))])
+    start(plant, range(3))
+    play(plant, RICH[:20])
+    plant.attach([])
+    start(plant, range(3))
+    trace = play(plant)
+    assert all(trace.row(row) == bare("fast").row(row) for row in range(3))
+
+
+def test_the_order_of_attaching_does_not_matter():
+    assert full().row(0) == rollout(2, everything()[::-1]).row(0)
+
+
+# --- what it says about itself -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("effect", EFFECTS)
+def test_metadata(effect):
+    for text in (effect.symptom, effect.formula, effect.source, effect.separates, *(p.doc for p in effect.parameters)):
+        assert text.strip() == text
+        assert text
+    assert re.fullmatch(r"[a-z]+(_[a-z]+)*", effect.name)
+    assert effect.stage in STAGES
+    assert effect.parameters
+    assert effect.hooks()
+    assert effect.name not in effect.look_alikes
+    assert set(effect.look_alikes) <= set(catalogue())
+    first = (effect.__doc__ or "").splitlines()[0]
+    assert first.endswith(".")
+    for variant in filter(None, effect.variants):
+        assert f"``{variant}``" in effect.__doc__
+
+
+@pytest.mark.parametrize(("effect", "variant", "parameter"), SIZES)
+def test_parameters(effect, variant, parameter):
+    p = parameter
+    assert p.unit
+    assert p.name.endswith({"1": "", "m/N": "_m_n", "N/s": "_n_s", "m/s": "_m_s"}.get(p.unit, f"_{p.unit.lower()}"))
+    assert p.low < p.typical < p.high
+    assert all(p.low <= size <= p.high for size in p.trials)
+    assert np.isinf(p.null) or p.low <= p.null <= p.high
+    if p.logarithmic:
+        assert p.low > 0
+
+
+@pytest.mark.parametrize("effect", EFFECTS)
+def test_trials_lie_within_the_bounds(effect):
+    trials, low, high = effect.trials(), *np.array([(p.low, p.high) for p in effect.parameters]).T
+    assert trials.ndim == 2
+    assert trials.shape[1] == len(effect.parameters)
+    assert np.all((trials >= low) & (trials <= high))
+    assert not (trials == effect.null_values()).all(axis=1).any()
+
+
+@pytest.mark.parametrize("effect", EFFECTS)
+def test_look_alikes_are_mutual_or_explained(effect):
+    assert effect.separates or not effect.look_alikes
+
+
+@pytest.mark.parametrize("effect", EFFECTS)
+def test_wrong_use_is_refused(effect):
+    with pytest.raises(ValueError, match=effect.name):
+        effect(np.zeros((2, len(effect.parameters) + 1)), 0.002)
+    with pytest.raises(ValueError, match="no variant 'nonsense'"):
+        effect(effect.typical_values()[None], 0.002, "nonsense")
+
+
+def test_no_torch():
+    program = """
+import sys
+for name in ("torch", "torchrl", "tensordict"):
+    sys.modules[name] = None  # importing it raises
+import forcegrasp.effects
+assert len(forcegrasp.effects.catalogue()) > 20
+"""
+    subprocess.run([sys.executable, "-c", program], check=True)

@@ -1,0 +1,377 @@
+"""Descriptions of grippers: what they mean in the simulated plant, and what is wrong with broken ones."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+import yaml
+
+from forcegrasp.errors import ConfigError
+from forcegrasp.physics.gripper import Gripper, load_gripper
+from forcegrasp.physics.plant import Plant, write_base
+
+SECOND = Path(__file__).parents[1] / "grippers" / "second.yaml"
+GRIPPERS = ("tiago", str(SECOND))
+OBJECTS = {
+    "box": ("box", "0.02 0.03 0.03"),
+    "cylinder": ("cylinder", "0.02 0.03"),
+    "sphere": ("sphere", "0.02"),
+}
+RAIL = '<joint name="rail" type="slide" axis="1 0 0" damping="2" frictionloss="0.1"/>'
+
+
+def _copy(folder: Path, description: dict | None = None, swap: dict[str, str] | None = None) -> Path:
+    """Writes the second gripper, or another description of it, with text of its MJCF swapped; returns its path."""
+    scene = SECOND.with_suffix(".xml").read_text()
+    for old, new in (swap or {}).items():
+        assert old in scene
+        scene = scene.replace(old, new)
+    (folder / "second.xml").write_text(scene)
+    path = folder / "second.yaml"
+    path.write_text(SECOND.read_text() if description is None else yaml.safe_dump(description))
+    return path
+
+
+def _object(kind: str, radius: float | None = None) -> dict[str, str]:
+    shape, size = OBJECTS[kind]
+    if radius is not None:
+        size = " ".join([repr(radius), *size.split()[1:]])
+    return {'type="box" size="0.02 0.03 0.03"': f'type="{shape}" size="{size}"'}
+
+
+def _plant(gripper: Gripper, n: int, tier: str = "reference", **base: list[float]) -> Plant:
+    """Open fingers around objects of these base parameters."""
+    plant, ids = Plant(gripper, n, tier, threads=1), np.arange(n)
+    offset = write_base(plant, ids, {name: np.array(values) for name, values in base.items()})
+    plant.reset(ids, offset, np.full((n, 2), gripper.open_m))
+    return plant
+
+
+def _close(plant: Plant, seconds: float = 1.0) -> np.ndarray:
+    """Closes fully; returns positions, forces and the object's position over time, ``(steps, n, 5)``."""
+    seen = []
+    for _ in range(round(seconds / plant.dt / 10)):
+        plant.advance(np.zeros((plant.n, 2)), 10)
+        seen.append(np.concatenate([plant.position, plant.force, plant.object_position[:, None]], axis=1))
+    assert not plant.warnings().any()
+    return np.stack(seen)
+
+
+@pytest.mark.parametrize("name", GRIPPERS)
+def test_closes_on_the_object_with_sane_forces(name):
+    gripper = load_gripper(name)
+    plant = _plant(gripper, 1)
+    assert plant.position[0] == pytest.approx([gripper.open_m] * 2)
+    start = plant.velocity.copy()
+    seen = _close(plant, 0.04)
+    assert (start == 0).all()
+    assert (plant.velocity < 0).all()
+    assert (seen[-1, 0, :2] < gripper.open_m - 1e-5).all()
+    seen = _close(plant, 4.0)
+    radius = gripper.parameters["radius_m"].nominal
+    assert seen[-1, 0, :2] == pytest.approx([radius] * 2, abs=0.006)
+    assert (seen[-1, 0, 2:4] > 0.2).all()
+    assert (seen[-1, 0, 2:4] < 20).all()
+
+
+@pytest.mark.parametrize("name", GRIPPERS)
+def test_command_holds_where_it_says(name):
+    gripper = load_gripper(name)
+    plant = _plant(gripper, 1)
+    command = np.array([[0.030, 0.038]])
+    plant.advance(command, round(4 / plant.dt))
+    assert plant.position == pytest.approx(command, abs=3e-4)  # the second one's drives rub a little
+
+
+@pytest.mark.parametrize("name", GRIPPERS)
+def test_positive_offset_is_towards_the_right_finger(name):
+    plant = _plant(load_gripper(name), 3, offset_m=[0.0, 0.004, -0.004])
+    assert plant.object_position == pytest.approx([0, 0.004, -0.004], abs=1e-9)
+    touching = _close(plant, 4.0)[:, :, 2:4] > 0.01
+    left, right = np.moveaxis(touching.argmax(axis=0), -1, 0)
+    assert touching.any(axis=0).all()
+    assert right[1] < left[1]
+    assert left[2] < right[2]
+
+
+@pytest.mark.parametrize("free", [False, True], ids=["slide", "free"])
+@pytest.mark.parametrize("kind", OBJECTS)
+@pytest.mark.parametrize("tier", ["reference", "fast"])
+def test_radius_writes_are_the_compilers(tmp_path, kind, free, tier):
+    """To the last bit: model and rollout of a scene that had that radius from the start."""
+    swap = {RAIL: '<freejoint name="rail"/>', "<option": '<option gravity="0 0 0"'} if free else {}
+    description = yaml.safe_load(SECOND.read_text()) | {"fast": "sphere"}
+    radius = 0.027123456789
+    (tmp_path / "compiled").mkdir()
+    scene = _copy(tmp_path, description, swap | _object(kind))
+    written = _plant(load_gripper(str(scene)), 2, tier, radius_m=[0.02, radius])
+    scene = _copy(tmp_path / "compiled", description, swap | _object(kind, radius))
+    compiled = _plant(load_gripper(str(scene)), 1, tier)
+    for plant in (written, compiled):
+        plant.write_radius(np.arange(plant.n), np.array([0.02, radius][-plant.n :]))
+        plant.reset(np.arange(plant.n), np.zeros(plant.n))
+    one, other = written.batch.get_model(1), compiled.batch.get_model(0)
+    names = [name for name in dir(other) if isinstance(getattr(other, name), np.ndarray)]
+    assert {"body_inertia", "geom_size", "geom_rbound", "geom_aabb", "body_invweight0"} <= {*names}
+    assert [name for name in names if not np.array_equal(getattr(one, name), getattr(other, name))] == []
+    assert not np.array_equal(written.batch.get_model(0).geom_size, other.geom_size)
+    np.testing.assert_array_equal(_close(written)[:, 1], _close(compiled)[:, 0])
+
+
+def test_radius_leaves_an_inertia_of_its_own_alone(tmp_path):
+    own = '<inertial pos="0 0 0" mass="0.6" diaginertia="1e-3 2e-3 2.5e-3"/>'
+    gripper = load_gripper(str(_copy(tmp_path, swap={RAIL: own + RAIL})))
+    plant = _plant(gripper, 2, radius_m=[0.02, 0.03])
+    body = plant.model.body("thing").id
+    np.testing.assert_array_equal(plant.batch.get_model(1).body_inertia[body], [1e-3, 2e-3, 2.5e-3])
+
+
+def test_object_may_stand_anywhere_in_the_world(tmp_path):
+    """With a free joint, too, an offset counts from where the scene puts the object."""
+    free = {RAIL: '<freejoint name="rail"/>', "<option": '<option gravity="0 0 0"'}
+    plant = _plant(load_gripper(str(_copy(tmp_path, swap=free))), 1, offset_m=[0.005])
+    assert plant.object_position == pytest.approx([0.005], abs=1e-12)
+    assert _close(plant, 3.0)[-1, 0] == pytest.approx([0.018, 0.018, 4.5, 4.5, 0], abs=0.1)
+
+
+@pytest.mark.parametrize("name", GRIPPERS)
+def test_every_base_parameter_changes_a_rollout(name):
+    gripper = load_gripper(name)
+    names = list(gripper.parameters)
+    base = {key: np.full(1 + len(names), gripper.parameters[key].nominal) for key in names}
+    for row, key in enumerate(names, start=1):
+        parameter = gripper.parameters[key]
+        base[key][row] = parameter.nominal + 0.2 * (parameter.high - parameter.nominal)
+    seen = _close(_plant(gripper, 1 + len(names), **base), 3.0)
+    alone = _close(_plant(gripper, 1, **{key: values[:1] for key, values in base.items()}), 3.0)
+    np.testing.assert_array_equal(alone[:, 0], seen[:, 0])
+    assert [key for row, key in enumerate(names, 1) if np.array_equal(seen[:, row], seen[:, 0])] == []
+
+
+@pytest.mark.parametrize("name", GRIPPERS)
+def test_nominal_values_are_the_scenes(name):
+    gripper = load_gripper(name)
+    nominal = {key: [p.nominal] for key, p in gripper.parameters.items() if key != "force_scale"}
+    np.testing.assert_array_equal(_close(_plant(gripper, 1, **nominal), 3.0), _close(_plant(gripper, 1), 3.0))
+
+
+def test_writes_go_to_their_columns_with_their_sign():
+    plant = _plant(load_gripper(str(SECOND)), 2, servo_stiffness=[300, 400], joint_damping=[30, 50])
+    model = plant.batch.get_model(1)
+    assert model.actuator_gainprm[:, 0].tolist() == [400, 400]
+    assert model.actuator_biasprm[:, :3].tolist() == [[0, -400, -20]] * 2
+    assert model.dof_damping.tolist() == [2, 50, 50]
+
+
+def test_descriptions_are_read_afresh(tmp_path):
+    path = _copy(tmp_path)
+    load_gripper("second.yaml", tmp_path)
+    _copy(tmp_path, swap={'name="drive_west"': 'name="drive"'})
+    with pytest.raises(ConfigError, match="has no 'drive_west'; did you mean"):
+        load_gripper(str(path))
+
+
+# --- broken descriptions ----------------------------------------------------------------------------------------------
+
+_DAMPING = "parameters.joint_damping"
+
+#: key, its new value (``...`` removes it), what the message must name
+BROKEN_VALUES = [
+    *((key, ..., f"{key}: missing") for key in ("format", "name", "model", "fingers", "object", "parameters")),
+    *((f"fingers.{key}", ..., f"fingers.{key}: missing") for key in ("joints", "actuators", "closed", "open")),
+    ("object.axis", ..., "object.axis: missing"),
+    (f"{_DAMPING}.unit", ..., f"{_DAMPING}.unit: missing"),
+    ("parameters.radius_m", ..., "parameters.radius_m: missing"),
+    ("modle", "second.xml", "modle: unknown; did you mean model"),
+    ("fingers.opened", 0.05, "fingers.opened: unknown"),
+    ("object.shape", "box", "object.shape: unknown"),
+    (f"{_DAMPING}.min", 1, f"{_DAMPING}.min: unknown"),
+    ("format", "forcegrasp-gripper/9", "format: must be forcegrasp-gripper/1"),
+    ("name", 7, "name=7: must be text"),
+    ("name", ["a"], "name=['a']: must be text"),
+    ("model", None, "model=None: must be text"),
+    ("model", "nowhere.xml", "nowhere.xml: MuJoCo refuses it"),
+    ("model", "second.yaml", "MuJoCo refuses it"),
+    ("fast", "cube", "fast: must be none or sphere"),
+    ("fingers", ["west", "east"], "fingers: must map"),
+    ("object", "thing", "object: must map"),
+    ("parameters", [], "parameters: must be a mapping"),
+    ("fingers.joints", "west", "fingers.joints: must be two names"),
+    ("fingers.joints", ["west", "east", "north"], "fingers.joints: must be two names"),
+    ("fingers.joints", ["west", "west"], "fingers.joints: must be two names"),
+    ("fingers.joints", ["west", 3], "fingers.joints=3: must be text"),
+    ("fingers.joints", ["west", "easst"], "fingers.joints: second.xml has no 'easst'; did you mean east"),
+    ("fingers.joints", ["west", "rail"], "fingers.joints: 'rail' must open towards +x, as the right finger"),
+    ("fingers.joints", ["east", "west"], "fingers.joints: 'east' must open towards -x, as the left finger"),
+    ("fingers.actuators", ["drive_west", "drive_est"], "fingers.actuators: second.xml has no 'drive_est'"),
+    ("fingers.actuators", ["drive_east", "drive_west"], "fingers.actuators: 'drive_east' must drive the left finger"),
+    ("fingers.force_sensors", ["touch_west", "touch"], "fingers.force_sensors: second.xml has no 'touch'"),
+    ("fingers.closed", "0.05 m", "fingers.closed=0.05 m: must be a number"),
+    ("fingers.closed", "5e-2", "fingers.closed=5e-2: must be a number; YAML wants 1.0e-3 for 1e-3"),
+    ("fingers.closed", True, "fingers.closed=True: must be a number"),
+    ("fingers.closed", float("nan"), "fingers.closed=nan: must be a number"),
+    ("fingers.closed", 10**400, "must be a number"),
+    ("fingers.closed", 0.0, "fingers.open: must differ from fingers.closed"),
+    ("fingers.closed", 50, "fingers.closed=50: the left joint goes from 0 to 0.05 m"),
+    ("fingers.closed", -0.05, "fingers.joints: 'west' must open towards -x"),
+    ("object.axis", "w", "object.axis: must be x, y or z"),
+    ("object.axis", ["x"], "object.axis: must be x, y or z"),
+    ("object.axis", "y", "fingers.joints: 'west' must open towards -y"),
+    ("object.joint", "thing", "object.joint: second.xml has no 'thing'"),
+    ("object.joint", "west", "object.geom: 'thing' must be on the body that 'west' moves"),
+    ("object.joint", "east", "object.joint: 'east' must be a free joint, or a slide joint towards +x"),
+    ("object.geom", "things", "object.geom: second.xml has no 'things'; did you mean thing"),
+    ("object.geom", "west", "object.geom: 'west' must be on the body that 'rail' moves"),
+    (_DAMPING, 40, f"{_DAMPING}: must map"),
+    (f"{_DAMPING}.nominal", 500, f"{_DAMPING}.nominal=500: must lie between low=10 and high=120"),
+    (f"{_DAMPING}.low", "ten", f"{_DAMPING}.low=ten: must be a number"),
+    (f"{_DAMPING}.high", None, f"{_DAMPING}.high=None: must be a number"),
+    (f"{_DAMPING}.unit", 3, f"{_DAMPING}.unit=3: must be text"),
+    (f"{_DAMPING}.scope", "finger", f"{_DAMPING}.scope=finger: must be one of gripper, object, grasp"),
+    (f"{_DAMPING}.writes", [], f"{_DAMPING}.writes: must name a field"),
+    (f"{_DAMPING}.writes", "dof_damping", f"{_DAMPING}.writes: must be a list"),
+    (f"{_DAMPING}.writes", 3, f"{_DAMPING}.writes: must be a list"),
+    (f"{_DAMPING}.writes", ["damping"], f"{_DAMPING}.writes: 'damping' must look like"),
+    (f"{_DAMPING}.writes", ["dof_damping x"], f"{_DAMPING}.writes: 'dof_damping x' must look like"),
+    (f"{_DAMPING}.writes", [{"dof_damping": 0}], "must look like"),
+    (f"{_DAMPING}.writes", ["body_mass"], "'body_mass' must look like"),
+    (f"{_DAMPING}.writes", ["dof_dampin"], "in MuJoCo's model; did you mean dof_damping"),
+    (f"{_DAMPING}.writes", ["geom_type"], "geom_type is no field of numbers"),
+    (f"{_DAMPING}.writes", ["dof_damping 0"], "dof_damping needs no column"),
+    (f"{_DAMPING}.writes", ["geom_solimp"], "geom_solimp needs a column from 0 to 4"),
+    (f"{_DAMPING}.writes", ["geom_solimp 5"], "geom_solimp needs a column from 0 to 4"),
+    ("parameters.radius_m.writes", ["geom_size 0"], "parameters.radius_m.writes: must be []"),
+    ("parameters.radius_m.low", -0.01, "parameters.radius_m.low: must be positive"),
+]
+
+
+def _refusal(path: Path) -> str:
+    with pytest.raises(ConfigError) as caught:
+        load_gripper(str(path))
+    message = str(caught.value)
+    assert "\n" not in message
+    assert message.startswith(str(path.parent))
+    assert len(message) < len(str(path)) + 400
+    return message
+
+
+@pytest.mark.parametrize(("key", "value", "expected"), BROKEN_VALUES)
+def test_broken_value_is_one_line_with_file_and_key(tmp_path, key, value, expected):
+    description = yaml.safe_load(SECOND.read_text())
+    *parents, last = key.split(".")
+    place = description
+    for parent in parents:
+        place = place[parent]
+    if value is ...:
+        del place[last]
+    else:
+        place[last] = value
+    assert expected in _refusal(_copy(tmp_path, description))
+
+
+@pytest.mark.parametrize(
+    ("content", "expected"),
+    [
+        (b"", "the file: must map"),
+        (b"- a\n- b\n", "the file: must map"),
+        (b"just text", "the file: must map"),
+        (b"fingers: {joints: [a, b\nobject: 3", "line 2"),
+        (b"a: b: c", "mapping values are not allowed"),
+        (b"name: !!python/object/apply:os.system ['true']", "could not determine a constructor"),
+        (b"a: 1\n---\nb: 2", "expected a single document"),
+        (b"? [1, 2]\n: x", "unhashable"),
+        (b"name: 2020-13-45", "month must be in 1..12"),
+        (b"\x89PNG\r\n\x1a\n\x00\xff", "could not read the gripper description"),
+        ("name: ä".encode("utf-16"), "could not read the gripper description"),
+        (b"[" * 5000, "nested too deeply"),
+    ],
+)
+def test_broken_file_is_one_line(tmp_path, content, expected):
+    path = tmp_path / "second.yaml"
+    path.write_bytes(content)
+    assert expected in _refusal(path)
+
+
+WEST = '<joint name="west"/>'
+TOUCH = '<touch name="touch_east" site="east"/>'
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "expected"),
+    [
+        ("</mujoco>", "", "MuJoCo refuses it"),
+        ("<mujoco", "\x00\x01", "MuJoCo refuses it"),
+        ('axis="1 0 0" range', 'axis="0 0 0" range', "MuJoCo refuses it"),
+        (WEST, '<joint name="west" type="hinge"/>', "fingers.joints: 'west' must be a slide joint"),
+        (WEST, '<joint name="west" axis="0 0 1"/>', "fingers.joints: 'west' must open towards -x"),
+        (WEST, '<joint name="west" axis="-1 0 0"/>', "fingers.joints: 'west' must open towards -x"),
+        (WEST, '<joint name="west" range="0 0.04"/>', "fingers.closed=0.05: the left joint goes from 0 to 0.04 m"),
+        ('ctrlrange="0 0.05"', 'ctrlrange="0.01 0.05"', "fingers.open=0: the left actuator goes from 0.01 to 0.05 m"),
+        ('name="drive_east" joint="east"', 'name="drive_east" joint="west"', "'drive_east' must drive the right"),
+        ('<position class="finger" name="drive_east"', '<motor name="drive_east"', "must be a position servo"),
+        ('name="drive_east"', 'name="drive_east" gear="50"', "must be a position servo"),
+        (TOUCH, '<jointpos name="touch_east" joint="east"/>', "must be a touch sensor"),
+        (TOUCH, '<force name="touch_east" site="east"/>', "must be a touch sensor"),
+        (
+            TOUCH,
+            '<contact name="touch_east" geom1="thing" geom2="east" num="1" data="force" reduce="netforce"/>',
+            "fingers.force_sensors: 'touch_east' must be a touch sensor, or a contact sensor with data='force'",
+        ),
+        (RAIL, RAIL.replace("1 0 0", "-1 0 0"), "'rail' must be a free joint, or a slide joint towards +x"),
+        (RAIL, RAIL.replace("slide", "ball"), "object.joint: 'rail' must be a free joint"),
+        ('type="box" size="0.02 0.03 0.03"', 'type="capsule" size="0.02 0.03"', "'thing' must be a cylinder, a sphere"),
+    ],
+)
+def test_broken_scene_is_one_line(tmp_path, old, new, expected):
+    assert expected in _refusal(_copy(tmp_path, swap={old: new}))
+
+
+def test_fast_tier_that_does_not_compile_is_refused(tmp_path):
+    description = yaml.safe_load(SECOND.read_text()) | {"fast": "sphere"}
+    swap = {'<geom name="west"/>': '<geom name="thing_pads"/>'}
+    assert "MuJoCo refuses it" in _refusal(_copy(tmp_path, description, swap))
+
+
+def test_missing_description(tmp_path):
+    assert "No such file" in _refusal(tmp_path / "second.yaml")
+    assert "Is a directory" in _refusal(_folder(tmp_path / "folder.yaml"))
+    with pytest.raises(ConfigError, match=r"gripper=tiaga: no such gripper; did you mean tiago\?; or give"):
+        load_gripper("tiaga")
+
+
+def _folder(path: Path) -> Path:
+    path.mkdir()
+    return path
+
+
+def test_there_are_many_kinds_of_mistakes():
+    assert len({re.sub(r"=.*?:", "", expected) for *_, expected in BROKEN_VALUES}) >= 40
+
+
+def test_contact_sensor_reads_as_a_touch_sensor_does(tmp_path):
+    """A contact's force in its own axes: the normal comes first and is positive, whichever body is named first."""
+    sensors = {
+        f'<touch name="touch_{side}" site="{side}"/>': f'<contact name="touch_{side}" body{1 + flip}="thing"'
+        f' body{2 - flip}="{side}" num="8" data="force"/>'
+        for flip, side in enumerate(("west", "east"))
+    }
+    other = _close(_plant(load_gripper(str(_copy(tmp_path, swap=sensors))), 1))
+    np.testing.assert_allclose(other, _close(_plant(load_gripper(str(SECOND)), 1)), atol=1e-6)
+
+
+def test_mjcf_shortcuts_are_undone_without_a_trace():
+    """The compiler lets a pad at its body's origin follow the body; shifts need its own position to be read."""
+    gripper = load_gripper(str(SECOND))
+    model = gripper.compile()
+    assert model.geom("west").sameframe[0] == mujoco.mjtSameFrame.mjSAMEFRAME_BODY
+    data = mujoco.MjData(model)
+    data.ctrl[:] = gripper.closed
+    mujoco.mj_step(model, data, 1000)
+    plant = _plant(gripper, 1)
+    plant.advance(np.zeros((1, 2)), 1000)
+    assert plant.batch.get_model(0).geom("west").sameframe[0] == mujoco.mjtSameFrame.mjSAMEFRAME_BODYROT
+    np.testing.assert_array_equal(plant.batch.bind("qpos")[0], data.qpos)
