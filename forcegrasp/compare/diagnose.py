@@ -116,7 +116,9 @@ def diagnose(
     steps: list[Step] = []
     while len(steps) < MOST_EFFECTS:
         known = {effect for effect, _ in fit.problem.effects}
-        step = _look_further(target, fit, simulators, [e for e in effects if e not in known], folds, numerical, rng, progress)
+        step = _look_further(
+            target, fit, simulators, [e for e in effects if e not in known], folds, numerical, rng, progress
+        )
         steps.append(step)
         if step.verdict == "none":
             break
@@ -197,17 +199,20 @@ def _refit(
     held: np.ndarray,
     null: np.ndarray,
 ) -> Candidate:
-    old = fit.problem
-    problem = Problem(old.gripper, old.grasps, [*old.effects, (score.effect, score.variant)])
-    added = [e.coordinate(v) for e, v in zip(problem.entries[len(old) :], score.values, strict=True)]
-    refit = fit_once(target, problem, simulators, np.r_[fit.vector, added], fit.correction, rounds=1)
+    refit = refine([score], target, fit, simulators)
     after = heldout_residual(refit, target, folds)
     gains = log_likelihood(after) - log_likelihood(held)
     fall = max((1 - rms(after, target, w) / rms(held, target, w) for w in cells(target)), default=0.0)
     p_family = (1 + int(np.sum(null >= score.gain))) / (1 + len(null))
-    return Candidate(
-        score.effect, score.variant, refit, p_family, gains, rms(after, target), fall, score.signature
-    )
+    return Candidate(score.effect, score.variant, refit, p_family, gains, rms(after, target), fall, score.signature)
+
+
+def refine(scores: Sequence[Score], target: Target, fit: Fit, simulators: Simulators) -> Fit:
+    """Fits everything again with one more effect, from where its best signature puts it."""
+    score, old = scores[0], fit.problem
+    problem = Problem(old.gripper, old.grasps, [*old.effects, (score.effect, score.variant)])
+    added = [e.coordinate(v) for e, v in zip(problem.entries[len(old) :], score.values, strict=True)]
+    return fit_once(target, problem, simulators, np.r_[fit.vector, added], fit.correction, rounds=1)
 
 
 def cells(target: Target, least: int = 40) -> list[np.ndarray]:
@@ -224,9 +229,7 @@ def cells(target: Target, least: int = 40) -> list[np.ndarray]:
 def _convincing(candidate: Candidate) -> bool:
     gains = candidate.gains[np.isfinite(candidate.gains)]
     spread = gains.std(ddof=1) * np.sqrt(len(gains)) if len(gains) > 1 else np.inf
-    return (
-        candidate.p_family <= ALARM and gains.sum() > max(spread, 5.0) and candidate.largest_fall >= LEAST_GAIN
-    )
+    return candidate.p_family <= ALARM and gains.sum() > max(spread, 5.0) and candidate.largest_fall >= LEAST_GAIN
 
 
 def _equal(winner: Candidate, other: Candidate) -> bool:

@@ -15,6 +15,8 @@ from forcegrasp.measure.replay import Replay
 
 # Step of the finite differences in a problem's coordinates: far above the chaos of the contacts, within the bend.
 _STEP = 0.02
+# Relative change of the cost at which a fit ends, and the largest number of simulations until then.
+_TOLERANCE, _EVALUATIONS = 1e-5, 25
 
 
 class Simulators:
@@ -66,8 +68,7 @@ def fit_once(
     start: np.ndarray,
     correction: np.ndarray | None = None,
     rounds: int = 2,
-    evaluations: int = 25,
-    tolerance: float = 1e-5,
+    free: np.ndarray | None = None,
 ) -> Fit:
     """Fits from one start.
 
@@ -78,33 +79,37 @@ def fit_once(
       start: coordinates to start from, ``(p,)``.
       correction: exact minus cheap prediction near the start; found there if not given.
       rounds: how often the correction is renewed; with 0 it stays as given.
-      evaluations: largest number of simulations of each round.
-      tolerance: relative change of cost at which a round ends.
+      free: which coordinates may change, ``(p,)``; all by default.
     """
     cheap = _Remembered(lambda x: _with_slopes(problem, simulators.cheap, target, x))
     inside = np.clip(start, problem.low + 1e-9, problem.high - 1e-9)
+    free = np.ones(len(problem), bool) if free is None else free
     exact_is_cheap = simulators.exact is simulators.cheap
     if correction is None:
         correction = 0.0 if exact_is_cheap else _difference(problem, simulators, inside)
     total = 0
-    for turn in range(max(1, rounds)):
-        shift = correction
+    for turn in range(max(1, rounds) if free.any() else 0):
 
-        def residuals(x: np.ndarray, shift=shift) -> np.ndarray:
-            return -target.residual(cheap(x)[0] + shift).ravel()
+        def whole(part: np.ndarray, known=inside) -> np.ndarray:
+            vector = known.copy()
+            vector[free] = part
+            return vector
+
+        def residuals(part: np.ndarray, whole=whole, shift=correction) -> np.ndarray:
+            return -target.residual(cheap(whole(part))[0] + shift).ravel()
 
         solution = least_squares(
             residuals,
-            inside,
-            jac=lambda x: cheap(x)[1].reshape(-1, len(problem)),
-            bounds=(problem.low, problem.high),
+            inside[free],
+            jac=lambda part, whole=whole: cheap(whole(part))[1].reshape(-1, len(problem))[:, free],
+            bounds=(problem.low[free], problem.high[free]),
             x_scale="jac",
-            ftol=tolerance,
+            ftol=_TOLERANCE,
             xtol=1e-6,
             gtol=1e-10,
-            max_nfev=evaluations,
+            max_nfev=_EVALUATIONS,
         )
-        inside, total = solution.x, total + solution.nfev
+        inside, total = whole(solution.x), total + solution.nfev
         if exact_is_cheap or rounds == 0:
             break
         renewed = _difference(problem, simulators, inside)
@@ -118,7 +123,7 @@ def fit_once(
     flat = jacobian.reshape(-1, len(problem))
     norms = np.maximum(np.linalg.norm(flat, axis=0), 1e-12)
     slope = flat.T @ residual.ravel() / norms
-    blocked = ((inside <= problem.low + 1e-6) & (slope < 0)) | ((inside >= problem.high - 1e-6) & (slope > 0))
+    blocked = ~free | ((inside <= problem.low + 1e-6) & (slope < 0)) | ((inside >= problem.high - 1e-6) & (slope > 0))
     correction = np.broadcast_to(correction, predicted.shape)
     return Fit(
         problem, inside, predicted, residual, jacobian, correction, float(np.abs(slope[~blocked]).max(initial=0)), total

@@ -61,5 +61,7 @@ def warnings(fit: Fit, errors: np.ndarray) -> list[str]:
     for i, j in zip(*np.triu_indices(len(sigma), k=1), strict=True):
         if abs(correlation[i, j]) > _CONFOUNDED:
             one, other = fit.problem.entries[i].name, fit.problem.entries[j].name
-            lines.append(f"{one} and {other} are confounded (correlation {correlation[i, j]:.3f}): only together are they fixed")
+            lines.append(
+                f"{one} and {other} are confounded (correlation {correlation[i, j]:.3f}): only together are they fixed"
+            )
     return lines

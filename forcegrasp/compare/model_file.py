@@ -63,7 +63,7 @@ def write_model(model: Model, path: Path) -> None:
     """
     content: dict[str, Any] = {
         "format": FORMAT,
-        "gripper": _gripper_name(model.gripper, path),
+        "gripper": _gripper_name(model.gripper),
         "mujoco": mujoco.__version__,
         "data": dict(model.data),
         "base": {name: _dump(v) for name, v in model.base.items()},
@@ -114,7 +114,9 @@ def read_model(path: Path) -> Model:
     missing = {n for n, p in gripper.parameters.items() if p.scope == "gripper"} - set(base)
     if missing:
         raise ConfigError(f"{path}: base.{min(missing)}: missing")
-    objects = {str(o): _read_all(path, f"objects.{o}", v, gripper, "object") for o, v in _map(path, "objects", raw).items()}
+    objects = {
+        str(o): _read_all(path, f"objects.{o}", v, gripper, "object") for o, v in _map(path, "objects", raw).items()
+    }
     grasps = {str(g): _read_all(path, f"grasps.{g}", v, gripper, "grasp") for g, v in _map(path, "grasps", raw).items()}
     effects = tuple(_read_effect(path, name, entry) for name, entry in _map(path, "effects", raw).items())
     data = {str(k): str(v) for k, v in _map(path, "data", raw).items()}
@@ -142,9 +144,8 @@ def _read_effect(path: Path, name: str, entry: Any) -> FoundEffect:
             raise ConfigError(f"{path}: {where}.{parameter.name}: missing")
         fitted = _read_number(path, f"{where}.{parameter.name}", entry[parameter.name], parameter.unit)
         if not (parameter.low <= fitted.low <= fitted.high <= parameter.high or fitted.value == parameter.null):
-            raise ConfigError(
-                f"{path}: {where}.{parameter.name}: must lie in [{parameter.low:g}, {parameter.high:g}] {parameter.unit}"
-            )
+            limits = f"[{parameter.low:g}, {parameter.high:g}] {parameter.unit}"
+            raise ConfigError(f"{path}: {where}.{parameter.name}: must lie in {limits}")
         parameters[parameter.name] = fitted
     return FoundEffect(effect, variant or effect.variants[0], parameters)
 
@@ -197,12 +198,8 @@ def _renamed(prefix: str, call):
         raise ConfigError(f"{prefix}{error}") from error
 
 
-def _gripper_name(gripper: Gripper, path: Path) -> str:
-    from forcegrasp.physics.gripper import shipped_folder
-
-    if gripper.path.parent == shipped_folder():
-        return gripper.path.stem
-    return str(gripper.path.resolve())
+def _gripper_name(gripper: Gripper) -> str:
+    return gripper.path.stem if gripper.is_shipped else str(gripper.path.resolve())
 
 
 class _Numbers(dict):
@@ -219,5 +216,8 @@ _Flat.ignore_aliases = lambda self, data: True
 
 def _dump(number: Fitted) -> _Numbers:
     return _Numbers(
-        value=float(f"{number.value:.8g}"), low=float(f"{number.low:.8g}"), high=float(f"{number.high:.8g}"), unit=number.unit
+        value=float(f"{number.value:.8g}"),
+        low=float(f"{number.low:.8g}"),
+        high=float(f"{number.high:.8g}"),
+        unit=number.unit,
     )

@@ -43,7 +43,9 @@ def predict(replay: Replay, cases: Sequence[Case]) -> np.ndarray:
     simulated = [cases[index] for index in sorted(first.values())]
     place = {cases[index].simulation_key(): n for n, index in enumerate(sorted(first.values()))}
     count = len(replay.grasps)
-    base = {name: np.concatenate([c.base[name] for c in simulated]) for name in simulated[0].base if name != "force_scale"}
+    base = {
+        name: np.concatenate([c.base[name] for c in simulated]) for name in simulated[0].base if name != "force_scale"
+    }
     grasp = np.tile(np.arange(count), len(simulated))
     motion = replay.simulate(grasp, base, _spread(simulated, count, reads_only=False))
     rows = np.concatenate([np.arange(count) + place[key] * count for key in keys])

@@ -51,8 +51,10 @@ def numerical_error(fit: Fit, target: Target) -> list[np.ndarray]:
     problem = fit.problem
     case = [problem.case(fit.vector)]
     exact = predict(Replay(problem.gripper, problem.grasps), case)[0]
-    variants = (Replay(problem.gripper, problem.grasps, step_factor=0.5),
-                Replay(problem.gripper, problem.grasps, other_collisions=True))
+    variants = (
+        Replay(problem.gripper, problem.grasps, step_factor=0.5),
+        Replay(problem.gripper, problem.grasps, other_collisions=True),
+    )
     return [np.where(target.mask[..., None], (predict(v, case)[0] - exact) / target.sigma, 0.0) for v in variants]
 
 

@@ -89,6 +89,12 @@ class Effect:
         return self.plant.position[self.rows]
 
     @property
+    def encoder(self) -> np.ndarray:
+        """What the gripper's own driver reads as positions, metres, ``(rows, 2)``; as recorded, if it was."""
+        known = self.plant.recorded_position
+        return (self.plant.measured_position if known is None else known)[self.rows]
+
+    @property
     def velocity(self) -> np.ndarray:
         """True finger velocities of the effect's rows, m/s, ``(rows, 2)``; positive opens."""
         return self.plant.velocity[self.rows]

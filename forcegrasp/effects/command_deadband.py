@@ -10,7 +10,8 @@ from forcegrasp.effects.base import Effect, Parameter
 class CommandDeadband(Effect):
     """A command that asks for too little is dropped; the last one that was passed on stays in force.
 
-    ``position``: too near to where the finger is, as in TIAGo's driver. ``held``: too near to the command in force.
+    ``position``: too near to where the encoder says the finger is, as in TIAGo's driver. ``held``: too near to the
+    command in force.
     """
 
     name = "command_deadband"
@@ -33,9 +34,8 @@ class CommandDeadband(Effect):
         self._held[which] = np.nan
 
     def command(self, command: np.ndarray, fresh: np.ndarray) -> np.ndarray:
-        position = self.position
-        self._held = np.where(np.isnan(self._held), position, self._held)
-        from_where = position if self.variant == "position" else self._held
+        self._held = np.where(np.isnan(self._held), self.position, self._held)
+        from_where = self.encoder if self.variant == "position" else self._held
         sent = (np.abs(command - from_where) > self["threshold_m"]) & fresh[:, None]
         self._held = np.where(sent, command, self._held)
         return np.where(self["threshold_m"] > 0, self._held, command)

@@ -92,20 +92,24 @@ def _wrong_way(answers: list[np.ndarray]) -> bool:
     """Whether forces clearly grow with opening, all grasps together; a lag may hide, but not reverse this."""
     product, force, opening = np.moveaxis(np.sum(answers, axis=0), 2, 0)
     alike = product / np.sqrt(np.maximum(force * opening, 1e-300))
-    return all(row.max() > 0.3 and row.max() > 2 * max(-row.min(), 0.0) for row in alike)
+    as_read, without_drift = alike
+    return bool(as_read.max() > max(0.2, -2 * as_read.min()) and without_drift.max() > max(0.0, -without_drift.min()))
 
 
 def _check_fingers(measured: MeasurementSet, reach: float) -> None:
     """An object off to the right is touched by the right finger first, if both close alike."""
     right, wrong = [], []
+    alive = np.any([feels(grasp.force_n) for grasp in measured.grasps], axis=0).all()
     for grasp in measured.grasps:
         offset = grasp.offset_m
         if offset is None or abs(offset) < 0.05 * reach:
             continue
         onsets = [_onset(grasp.time_s, force, measured.force_std_n) for force in grasp.force_n.T]
-        if None in onsets:
+        touched = [onset for onset in onsets if onset is not None]
+        if not touched or (len(touched) == 1 and (grasp.radius_m is None or not alive)):
             continue
-        first, (left_at, right_at) = min(onsets), grasp.time_s[onsets]
+        first = min(touched)
+        left_at, right_at = (np.inf if onset is None else grasp.time_s[onset] for onset in onsets)
         unlike = np.abs(np.diff(grasp.command_m[: first + 1], axis=1)).max() > 0.02 * reach
         unlike |= np.abs(np.diff(grasp.position_m[first])).max() > 0.05 * reach
         lead = 0.1 + 2 * float(np.median(np.diff(grasp.time_s)))
@@ -113,7 +117,7 @@ def _check_fingers(measured: MeasurementSet, reach: float) -> None:
             continue
         if (left_at < right_at) == (offset < 0):
             right.append(grasp)
-        elif _too_open_for_both(grasp, first) or (grasp.radius_m is None and abs(left_at - right_at) > 3 * lead):
+        elif _too_open_for_both(grasp, first, reach) or (grasp.radius_m is None and abs(left_at - right_at) > 3 * lead):
             wrong.append(grasp)
     if len(wrong) > 1 and len(wrong) >= 0.8 * len(wrong + right):
         raise MeasurementError(
@@ -169,8 +173,9 @@ def _onset(time: np.ndarray, force: np.ndarray, std: float | None) -> int | None
     return int(run.argmax()) if run.any() else None
 
 
-def _too_open_for_both(grasp: MeasuredGrasp, index: int) -> bool:
+def _too_open_for_both(grasp: MeasuredGrasp, index: int, reach: float) -> bool:
     """Whether the fingers are too far apart for the object to be between both: just one of them can touch it."""
     if grasp.radius_m is None or grasp.offset_m is None:
         return False
-    return bool(grasp.position_m[index].sum() > 2 * grasp.radius_m + abs(grasp.offset_m))
+    spare = 0.03 * reach + 0.5 * abs(grasp.offset_m)
+    return bool(grasp.position_m[index].sum() > 2 * grasp.radius_m + spare)

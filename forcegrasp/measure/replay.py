@@ -60,6 +60,7 @@ class Replay:
       tier: physics tier.
       step_factor: multiplies the physics step; ½ tells how exact the integration is.
       other_collisions: uses MuJoCo's other collision code; tells how exact the contacts are.
+      encoders_known: the grasps hold measured positions, which the gripper's own driver may have acted on.
     """
 
     def __init__(
@@ -69,6 +70,7 @@ class Replay:
         tier: str = "reference",
         step_factor: float = 1.0,
         other_collisions: bool = False,
+        encoders_known: bool = True,
     ) -> None:
         self.gripper, self.grasps, self.tier = gripper, tuple(grasps), tier
         self._step_factor, self._other_collisions = step_factor, other_collisions
@@ -80,15 +82,21 @@ class Replay:
         self.sample_steps = np.stack([np.pad(start, (0, samples - len(start)), "edge") for start in starts])
         #: which samples there are, ``(grasps, samples)``
         self.mask = np.stack([np.arange(samples) < len(start) for start in starts])
-        self._command = np.stack([self._held(g, start) for g, start in zip(self.grasps, starts, strict=True)], axis=1)
+        self._command = np.stack(
+            [self._at_steps(g.command_m, s) for g, s in zip(self.grasps, starts, strict=True)], axis=1
+        )
+        self._encoder = np.stack(
+            [self._at_steps(g.position_m, s) for g, s in zip(self.grasps, starts, strict=True)], axis=1
+        )
+        self._encoders_known = encoders_known
         self._fresh = np.zeros(self._command.shape[:2], bool)
         for index, start in enumerate(starts):
             self._fresh[start, index] = True
         self.start_m = np.stack([start_position(g, gripper.open_m) for g in self.grasps])
 
-    def _held(self, grasp: MeasuredGrasp, start: np.ndarray) -> np.ndarray:
-        sample_at = np.searchsorted(start, np.arange(self._steps), side="right") - 1
-        return grasp.command_m[sample_at]
+    def _at_steps(self, values: np.ndarray, starts: np.ndarray) -> np.ndarray:
+        """The sample in force at each physics step."""
+        return values[np.searchsorted(starts, np.arange(self._steps), side="right") - 1]
 
     def simulate(self, grasp: np.ndarray, base: Mapping[str, np.ndarray], effects: Sequence[EffectOn] = ()) -> Motion:
         """Simulates rows at once, each one grasp with its own parameters.
@@ -120,6 +128,8 @@ class Replay:
             position[step], pad_force[step] = plant.position, plant.force
             object_position[step] = plant.object_position
             if step < self._steps - 1:
+                if self._encoders_known:
+                    plant.recorded_position = self._encoder[step, grasp]
                 plant.advance(self._command[step, grasp], 1, self._fresh[step, grasp])
         bad = plant.warnings().any(axis=1)
         if bad.any():

@@ -74,6 +74,11 @@ class Gripper:
         """Position of a fully open finger, metres; fully closed is 0."""
         return abs(self.open - self.closed)
 
+    @property
+    def is_shipped(self) -> bool:
+        """Whether it comes with the package, and so is known by its name."""
+        return self.path.parent == shipped_folder()
+
     def compile(self, tier: str = "reference") -> mujoco.MjModel:
         """Returns the scene's model.
 

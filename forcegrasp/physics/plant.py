@@ -94,6 +94,8 @@ class Plant:
         self.object_push_n = np.zeros(n)
         self.measured_force = np.zeros((n, 2))  #: what the force sensors say, newtons
         self.measured_position = np.zeros((n, 2))  #: what the encoders say, metres
+        #: What the encoders said when a real gripper was recorded, metres, ``(n, 2)``; None if only simulated.
+        self.recorded_position: np.ndarray | None = None
 
     def _prepare(self, model: mujoco.MjModel) -> None:
         """Undoes the compiler's shortcuts past fields that effects change; what is simulated stays the same."""

@@ -20,6 +20,11 @@ MISTAKES = [
     (["eval"], "did you mean evaluate"),
     (["seed=1"], "no verb 'seed=1'"),
     (["--version=1"], "no verb"),
+    (["effect"], "did you mean effects"),
+    (["effects", "backlsh"], "did you mean backlash"),
+    (["effects", "friction"], "coulomb_friction"),
+    (["effects", ""], "known: "),
+    (["effects", "backlash", "adhesion"], "one name at a time"),
     # presets
     (["train", "experiment=no_id"], "did you mean no_ib"),
     (["train", "experiment="], "known: ib, no_curriculum"),

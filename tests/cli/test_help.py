@@ -38,12 +38,16 @@ def test_version(capsys):
     assert printed(capsys, "--version").strip() == __version__
 
 
-def test_every_verb_has_options():
-    assert set(SCHEMAS) == set(VERBS)
+def test_every_verb_has_help(capsys):
+    assert set(SCHEMAS) <= set(VERBS)
+    for verb in VERBS:
+        first, empty, usage = printed(capsys, verb, "--help").splitlines()[:3]
+        assert (first.startswith(f"forcegrasp {verb}: "), empty) == (True, "")
+        assert usage.startswith(f"usage: forcegrasp {verb} [")
 
 
 @pytest.mark.parametrize("arguments", [["--help"], ["-h"], ["seed=1", "--help"]])
-@pytest.mark.parametrize("verb", VERBS)
+@pytest.mark.parametrize("verb", SCHEMAS)
 def test_help_of_a_verb_names_every_option_and_preset(capsys, verb, arguments):
     out = printed(capsys, verb, *arguments)
     for name, entry, default in leaves(SCHEMAS[verb]):
@@ -64,7 +68,7 @@ def test_help_of_train_explains_what_is_no_option(capsys):
         assert word in out
 
 
-@pytest.mark.parametrize("arguments", [["--help"], ["train", "--help"], ["evaluate", "--help"]])
+@pytest.mark.parametrize("arguments", [["--help"], *([verb, "--help"] for verb in VERBS)])
 def test_help_is_quick(arguments):
     """Because nothing heavy is imported for it."""
     program = (

@@ -33,7 +33,9 @@ def send(effect: Effect, command: np.ndarray, position: np.ndarray | float = 0.0
     position = np.broadcast_to(position, command.shape)
     out = []
     for i, u in enumerate(command):
-        effect.attach(SimpleNamespace(position=np.full((1, 2), position[i])), np.array([0]))
+        q = np.full((1, 2), position[i])
+        stub = SimpleNamespace(position=q, measured_position=q, recorded_position=None)
+        effect.attach(stub, np.array([0]))
         out.append(effect.command(np.full((1, 2), u), np.array([i % every == 0]))[0, 0])
     return np.array(out)
 
@@ -77,6 +79,15 @@ def test_command_deadband_drops_small_changes():
     near, dropped = send(make("command_deadband", 0.00035), ramp, position=0.005), np.abs(ramp - 0.005) <= 0.00035
     assert np.array_equal(near[~dropped], ramp[~dropped])
     assert near[dropped] == pytest.approx(0.0046)  # the last one before
+
+
+def test_command_deadband_goes_by_the_encoder():
+    effect, new = make("command_deadband", 0.001), np.array([True])
+    stub = SimpleNamespace(position=np.full((1, 2), 0.01), measured_position=np.full((1, 2), 0.0102))
+    for recorded, dropped in ((None, True), (np.full((1, 2), 0.0097), False)):
+        stub.recorded_position = recorded
+        sent = effect.attach(stub, np.array([0])).command(np.full((1, 2), 0.0111), new)
+        assert np.all((sent == 0.01) == dropped)
 
 
 def test_command_deadband_decides_on_new_commands_only():

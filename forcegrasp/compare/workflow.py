@@ -1,0 +1,195 @@
+"""What the verbs do: compare, fit, diagnose and add, from a folder of measurements to a result."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from forcegrasp.compare.base_fit import BaseFit, check_gradient, fit_base
+from forcegrasp.compare.comparison import Comparison
+from forcegrasp.compare.diagnose import Diagnosis, diagnose, numerical_floor, refine
+from forcegrasp.compare.fit import Fit, Simulators, fit_once
+from forcegrasp.compare.heldout import heldout_residual, make_folds, rms
+from forcegrasp.compare.intervals import intervals, standard_errors, warnings
+from forcegrasp.compare.model_file import Fitted, FoundEffect, Model
+from forcegrasp.compare.problem import Problem
+from forcegrasp.compare.score import Background, numerical_error, score_effects
+from forcegrasp.compare.target import Target, make_target
+from forcegrasp.effects import Effect, catalogue
+from forcegrasp.errors import ConfigError, MeasurementError
+from forcegrasp.measure import FinalForceTable, MeasurementSet, check_set, check_table, read_set
+from forcegrasp.physics.gripper import Gripper, load_gripper
+
+#: A diagnosis needs so many grasps: with fewer, nothing can be held out.
+LEAST_GRASPS = 6
+
+Progress = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Loaded:
+    """A measurement set that was read and checked."""
+
+    measured: MeasurementSet | FinalForceTable
+    gripper: Gripper
+    warnings: list[str]
+
+
+def load(path: Path) -> Loaded:
+    """Reads and checks a set.
+
+    Raises:
+      MeasurementError: if the set can't be right.
+      ConfigError: if its gripper is unknown.
+    """
+    measured = read_set(path)
+    gripper = load_gripper(measured.gripper, measured.path)
+    check = check_table if isinstance(measured, FinalForceTable) else check_set
+    return Loaded(measured, gripper, check(measured, gripper.open_m))
+
+
+def fit_model(loaded: Loaded, seed: int, progress: Progress) -> tuple[Target, Simulators, BaseFit]:
+    """Fits the base model to a set, from several starts."""
+    target = make_target(loaded.measured)
+    problem = Problem(loaded.gripper, target.grasps)
+    simulators = Simulators(problem)
+    return target, simulators, fit_base(target, problem, simulators, np.random.default_rng(seed), progress)
+
+
+def apply_model(loaded: Loaded, model: Model, progress: Progress, refit: bool) -> tuple[Target, Simulators, BaseFit]:
+    """Puts a model beside a set: as it is, but for objects and grasps that it does not know, or fitted again from there.
+
+    Raises:
+      ConfigError: if the model is of another gripper.
+    """
+    if model.gripper.name != loaded.gripper.name:
+        raise ConfigError(f"model: is of gripper {model.gripper.name}, the set is of {loaded.gripper.name}")
+    target = make_target(loaded.measured)
+    problem = Problem(loaded.gripper, target.grasps, [(e.effect, e.variant) for e in model.effects])
+    simulators = Simulators(problem)
+    vector, unknown = _coordinates(problem, model)
+    if unknown.any() and not refit:
+        names = ", ".join(e.name for e, u in zip(problem.entries, unknown, strict=True) if u)
+        progress(f"the model does not say {names}: fitted")
+    free = np.ones(len(problem), bool) if refit else unknown
+    return target, simulators, check_gradient(fit_once(target, problem, simulators, vector, free=free), target)
+
+
+def compare(loaded: Loaded, model: Model | None, seed: int, progress: Progress) -> tuple[Comparison, Model, list[str]]:
+    """Where a model fails; without one, where the base model fails after fitting it."""
+    if model is None:
+        target, _, base = fit_model(loaded, seed, progress)
+        notes = [] if base.converged else [f"the base model is not fitted: {base.reason}"]
+    else:
+        target, _, base = apply_model(loaded, model, progress, refit=False)
+        notes = []
+    fit, same = base.fit, model is None or model.data.get("fingerprint") == loaded.measured.fingerprint
+    # a model that has not seen this set is tested on all of it
+    held = heldout_residual(fit, target, make_folds(target.grasps)) if same else fit.residual
+    numerical = numerical_error(fit, target)
+    comparison = Comparison(target, fit.predicted, fit.residual, held, numerical_floor(numerical, target))
+    return comparison, model or model_of(fit, loaded, numerical), notes
+
+
+def diagnose_set(
+    loaded: Loaded, model: Model | None, names: list[str], seed: int, progress: Progress
+) -> tuple[Diagnosis, Simulators]:
+    """Which effects are missing.
+
+    Raises:
+      MeasurementError: if there are too few grasps to hold any out.
+      ConfigError: if an effect is unknown.
+    """
+    if len(loaded.measured.grasps) < LEAST_GRASPS:
+        raise MeasurementError(
+            f"{loaded.measured.path}: {len(loaded.measured.grasps)} grasps are too few for a diagnosis,"
+            f" {LEAST_GRASPS} are needed; record more (forcegrasp record shows a plan)"
+        )
+    if model is None:
+        target, simulators, base = fit_model(loaded, seed, progress)
+    else:
+        target, simulators, base = apply_model(loaded, model, progress, refit=True)
+    chosen = [effect for name, effect in catalogue().items() if not names or name in names]
+    rng = np.random.default_rng(seed + 1)
+    return diagnose(target, base, simulators, chosen, rng, progress), simulators
+
+
+@dataclass(frozen=True)
+class Added:
+    """A model with an effect added, against the same model without it."""
+
+    target: Target
+    before: Fit
+    after: Fit
+    error_before: float  #: held-out rms residual ÷ noise
+    error_after: float
+    model: Model
+
+
+def add_effect(loaded: Loaded, model: Model, effect: type[Effect], progress: Progress) -> Added:
+    """Fits a model again, without and with one more effect.
+
+    Raises:
+      ConfigError: if the model has the effect, or the effect leaves no trace in these data.
+    """
+    if any(e.effect is effect for e in model.effects):
+        raise ConfigError(f"effect={effect.name}: the model has it already")
+    target, simulators, base = apply_model(loaded, model, progress, refit=True)
+    before, folds = base.fit, make_folds(target.grasps)
+    progress(
+        f"without {effect.name}: {rms(heldout_residual(before, target, folds), target):.3f} × noise on held-out grasps"
+    )
+    groups = score_effects(before, target, simulators, Background(before, []), [effect])
+    if not groups:
+        raise ConfigError(
+            f"effect={effect.name}: leaves no trace in these data at any size; record grasps that show it"
+        )
+    fits = [refine(group, target, before, simulators) for group in groups]
+    after = min(fits, key=lambda f: f.cost)
+    errors = [rms(heldout_residual(f, target, folds), target) for f in (before, after)]
+    return Added(target, before, after, *errors, model_of(after, loaded, numerical_error(after, target)))
+
+
+def model_of(fit: Fit, loaded: Loaded, numerical: list[np.ndarray]) -> Model:
+    """A fit as a model that can be written."""
+    problem, errors = fit.problem, standard_errors(fit, numerical)
+    base: dict[str, Fitted] = {}
+    objects: dict[str, dict[str, Fitted]] = {}
+    grasps: dict[str, dict[str, Fitted]] = {}
+    effects: list[dict[str, Fitted]] = [{} for _ in problem.effects]
+    for entry, (value, low, high) in zip(problem.entries, intervals(fit, errors), strict=True):
+        fitted = Fitted(value, low, high, entry.unit)
+        if entry.effect >= 0:
+            effects[entry.effect][entry.parameter] = fitted
+            continue
+        scope = loaded.gripper.parameters[entry.parameter].scope
+        first = problem.grasps[int(np.flatnonzero(entry.members)[0])]
+        if scope == "gripper":
+            base[entry.parameter] = fitted
+        elif scope == "object":
+            objects.setdefault(first.object, {})[entry.parameter] = fitted
+        else:
+            grasps.setdefault(first.name, {})[entry.parameter] = fitted
+    found = tuple(FoundEffect(e, v, p) for (e, v), p in zip(problem.effects, effects, strict=True))
+    data = {"set": loaded.measured.name, "fingerprint": loaded.measured.fingerprint}
+    return Model(loaded.gripper, base, objects, grasps, found, data, tuple(warnings(fit, errors)))
+
+
+def _coordinates(problem: Problem, model: Model) -> tuple[np.ndarray, np.ndarray]:
+    """A model's numbers as a problem's coordinates, and which of them the model does not have."""
+    vector, unknown = problem.start(), np.zeros(len(problem), bool)
+    for index, entry in enumerate(problem.entries):
+        first = problem.grasps[int(np.flatnonzero(entry.members)[0])]
+        if entry.effect >= 0:
+            places = [model.effects[entry.effect].parameters]
+        else:
+            places = [model.base, model.objects.get(first.object, {}), model.grasps.get(first.name, {})]
+        fitted = next((place[entry.parameter] for place in places if entry.parameter in place), None)
+        if fitted is None:
+            unknown[index] = True
+        else:
+            vector[index] = entry.coordinate(fitted.value)
+    return vector, unknown

@@ -1,0 +1,147 @@
+"""Makes a measurement set from the simulator: planned grasps, sensor noise, and effects if any are asked for."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from forcegrasp.effects import Effect, get_effect
+from forcegrasp.errors import ConfigError, closest
+from forcegrasp.measure.plans import PERIOD_S, SAMPLES, make_plan
+from forcegrasp.measure.replay import EffectOn, Replay
+from forcegrasp.measure.schema import MeasuredGrasp, MeasurementSet, fingerprint_of_set
+from forcegrasp.physics.gripper import BaseParameter, Gripper
+
+# Objects' radii, as shares of the open finger's position: both fingers reach them, and they fit in.
+_RADII = (0.4, 0.75)
+# Objects differ from the nominal one by up to this factor, either way.
+_OBJECT_FACTOR = 2.0
+
+
+@dataclasses.dataclass(frozen=True)
+class Recorded:
+    """A set, and the truth that its files don't tell."""
+
+    measured: MeasurementSet
+    base: dict[str, np.ndarray]  #: true base parameters of each grasp, ``(G,)``
+
+
+def record(
+    gripper: Gripper,
+    plan: str,
+    *,
+    grasps: int,
+    objects: int,
+    effects: Sequence[tuple[type[Effect], str, np.ndarray]],
+    known: dict[str, float],
+    off_nominal: float,
+    position_std_m: float,
+    force_std_n: float,
+    seed: int,
+) -> Recorded:
+    """Simulates a measurement set.
+
+    Args:
+      gripper: what is simulated.
+      plan: a name out of :data:`~forcegrasp.measure.plans.PLANS`.
+      grasps: how many.
+      objects: number of objects that are grasped in turn; their parameters are drawn.
+      effects: each with its variant and its parameters.
+      known: base parameters of the gripper that are not drawn.
+      off_nominal: largest share by which the other ones differ from nominal.
+      position_std_m: noise of the positions.
+      force_std_n: noise of the forces.
+      seed: of everything random.
+    """
+    rng = np.random.default_rng(seed)
+    parameters = gripper.parameters.values()
+    of_gripper = {
+        p.name: known.get(p.name, _clip(p, p.nominal * (1 + off_nominal * rng.uniform(-1, 1))))
+        for p in parameters
+        if p.scope == "gripper"
+    }
+    of_objects = {p.name: _draw(p, objects, rng) for p in parameters if p.scope == "object" and p.name != "radius_m"}
+    radii = rng.uniform(*_RADII, objects) * gripper.open_m
+    planned = make_plan(plan, radii, grasps, gripper.open_m, rng)
+    thing = np.array([p.object for p in planned])
+    base = {name: np.full(grasps, value) for name, value in of_gripper.items()}
+    base |= {name: values[thing] for name, values in of_objects.items()}
+    base |= {"radius_m": radii[thing], "offset_m": np.array([p.offset_m for p in planned])}
+    time, rest = np.arange(SAMPLES) * PERIOD_S, np.full((SAMPLES, 2), gripper.open_m)
+    bare = [
+        MeasuredGrasp(
+            f"g{index:03}", f"object_{p.object + 1}", "simulated", float(radii[p.object]), p.offset_m, None,
+            time, p.command_m, rest, np.zeros((SAMPLES, 2)), None,
+        )
+        for index, p in enumerate(planned)
+    ]  # fmt: skip
+    rows = np.arange(grasps)
+    replay = Replay(gripper, bare, encoders_known=False)
+    on = [
+        EffectOn(effect, variant, rows, np.repeat(values[None], grasps, axis=0)) for effect, variant, values in effects
+    ]
+    motion = replay.simulate(
+        rows, {n: v for n, v in base.items() if n != "force_scale"}, [e for e in on if not e.effect.reads_only()]
+    )
+    last = [e for e in on if e.effect.name == "quantisation"]  # a converter rounds the noise, too
+    readings = replay.read(
+        motion, rows, base["force_scale"], [e for e in on if e.effect.reads_only() and e not in last]
+    )
+    position = readings.position + position_std_m * rng.standard_normal(readings.position.shape)
+    force = readings.force + force_std_n * rng.standard_normal(readings.force.shape)
+    for rounding in last:
+        live = rounding.effect(rounding.values, replay.dt)
+        position = np.stack([live.read_position(position[:, s]) for s in range(SAMPLES)], axis=1)
+        force = np.stack([live.read_force(force[:, s]) for s in range(SAMPLES)], axis=1)
+    full = tuple(dataclasses.replace(g, position_m=position[i], force_n=force[i]) for i, g in enumerate(bare))
+    name = gripper.path.stem if gripper.is_shipped else str(gripper.path.resolve())
+    fingerprint = fingerprint_of_set(name, position_std_m, force_std_n, full)
+    source = f"simulated by forcegrasp record, plan {plan}, seed {seed}"
+    measured = MeasurementSet(Path(), "", name, source, "", position_std_m, force_std_n, full, fingerprint)
+    return Recorded(measured, base)
+
+
+def parse_effect(text: str) -> tuple[type[Effect], str, np.ndarray]:
+    """Reads ``NAME [VARIANT] [PARAMETER=VALUE ...]``; what is not given is typical.
+
+    Raises:
+      ConfigError: if there is no such effect, variant or parameter, or a value is out of bounds.
+    """
+    name, *words = text.split() or [""]
+    effect, variant = get_effect(name), ""
+    values = dict(zip((p.name for p in effect.parameters), effect.typical_values(), strict=True))
+    bounds = {p.name: p for p in effect.parameters}
+    for word in words:
+        key, equals, number = word.partition("=")
+        if not equals and key in effect.variants:
+            variant = key
+        elif not equals or key not in bounds:
+            raise ConfigError(
+                f"effects: {name} has no {key!r}{closest(key, [*bounds, *filter(None, effect.variants)])}"
+            )
+        else:
+            values[key] = _number(name, bounds[key], number)
+    return effect, variant or effect.variants[0], np.array([values[p.name] for p in effect.parameters])
+
+
+def _number(name: str, parameter, text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError as error:
+        raise ConfigError(f"effects: {name} {parameter.name}={text}: must be a number in {parameter.unit}") from error
+    if not (parameter.low <= value <= parameter.high or value == parameter.null):
+        limits = f"[{parameter.low:g}, {parameter.high:g}]"
+        raise ConfigError(f"effects: {name} {parameter.name}={text}: must lie in {limits} {parameter.unit}")
+    return value
+
+
+def _draw(parameter: BaseParameter, count: int, rng: np.random.Generator) -> np.ndarray:
+    factor = _OBJECT_FACTOR ** rng.uniform(-1, 1, count)
+    return np.array([_clip(parameter, parameter.nominal * f) for f in factor])
+
+
+def _clip(parameter: BaseParameter, value: float) -> float:
+    return float(np.clip(value, parameter.low, parameter.high))

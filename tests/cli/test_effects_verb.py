@@ -1,0 +1,66 @@
+"""``forcegrasp effects`` tells all there is to know, and is quick."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+
+from forcegrasp.cli.main import main
+from forcegrasp.effects import STAGES, catalogue, get_effect
+
+
+def printed(capsys, *arguments: str) -> str:
+    assert main(["effects", *arguments]) == 0
+    captured = capsys.readouterr()
+    assert not captured.err
+    assert max(map(len, captured.out.splitlines())) <= 120
+    return captured.out
+
+
+def words(text: str) -> str:
+    """Text without its line breaks."""
+    return " ".join(text.split())
+
+
+def test_the_list_has_every_effect_under_its_stage(capsys):
+    out = printed(capsys)
+    heads = [line for line in out.splitlines() if line in STAGES]
+    assert heads == list(STAGES)
+    for effect in catalogue().values():
+        part = out.partition(f"\n  {effect.name}\n")[2].partition("\n\n")[0]
+        assert words(effect.symptom) in words(part)
+        above = out.partition(f"\n  {effect.name}\n")[0].splitlines()
+        assert [line for line in above if line in STAGES][-1] == effect.stage
+        for p in effect.parameters:
+            line = next(line for line in part.splitlines() if line.split()[0] == p.name)
+            unit = "" if p.unit == "1" else f" {p.unit}"
+            assert f" {p.doc}: {p.low:g} to {p.high:g}{unit}, typical {p.typical:g}" in line
+
+
+@pytest.mark.parametrize("name", [*catalogue(), "none"])
+def test_one_in_full(capsys, name):
+    effect, out = get_effect(name), words(printed(capsys, name))
+    assert out.startswith(f"{name}: {effect.__doc__.splitlines()[0]} ")
+    for text in (effect.stage, effect.symptom, effect.formula, effect.source, effect.separates):
+        assert words(text) in out
+    assert all(word in out for word in (*effect.variants, *effect.look_alikes))
+    for p in effect.parameters:
+        assert f"{p.name} {p.doc}: {p.low:g} to {p.high:g}" in out
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["-h"], ["backlash", "--help"]])
+def test_help(capsys, arguments):
+    out = printed(capsys, *arguments)
+    assert out.startswith("forcegrasp effects: ")
+    assert "usage: forcegrasp effects [NAME]" in out
+
+
+def test_imports_nothing_heavy():
+    program = (
+        "import sys; from forcegrasp.cli.main import main; main(['effects']); main(['effects', 'backlash']);"
+        "sys.exit(' '.join({'torch', 'torchrl', 'matplotlib', 'scipy', 'hydra'} & set(sys.modules)) or 0)"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr

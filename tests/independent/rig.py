@@ -1,0 +1,241 @@
+"""Records grasps of a simulated TIAGo hand, with physical effects hidden in it, as a measurement set.
+
+By hand: ``python -m tests.independent.rig OUT coulomb_friction=medium --seed 1``
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import json
+from collections.abc import Callable, Iterable
+from dataclasses import asdict, dataclass, fields
+from functools import partial, reduce
+from pathlib import Path
+
+import numpy as np
+import yaml
+
+from .catalogue import CATALOGUE, OUTSIDE, VARIANTS, build_effects
+from .effect import Effect, State
+from .penalty import PenaltyPlant
+from .plan import Setup, draw_setup
+from .scene import PAD_FACE_M, SAMPLE_S, STEP_S, MujocoPlant, Servo
+
+__all__ = ["CATALOGUE", "OUTSIDE", "VARIANTS", "Recording", "Truth", "draw_setup", "record", "simulate"]
+
+POSITION_STD_M, FORCE_STD_N = 2.7e-5, 0.013
+
+PLANTS: dict[str, Callable] = {
+    "mujoco": MujocoPlant,
+    "mujoco_multiccd": partial(MujocoPlant, multiccd=True),
+    "penalty": PenaltyPlant,
+    "hertz": partial(PenaltyPlant, power=1.5),
+}
+_COLUMNS = ["grasp", "t_s", "qdes_l_m", "qdes_r_m", "q_l_m", "q_r_m", "f_l_n", "f_r_n"]
+
+
+@dataclass(frozen=True)
+class Recording:
+    """What was read, ``(grasps, samples, 2)``; the object's place ``(grasps, samples)``, which no robot knows."""
+
+    q: np.ndarray
+    f: np.ndarray
+    o: np.ndarray
+
+
+@dataclass(frozen=True)
+class Truth:
+    """What is hidden in a set."""
+
+    seed: int
+    plan: str
+    contact: str
+    position_gain: float
+    b2: float
+    objects: dict[str, dict[str, float]]  # name → radius, rho, f_alpha
+    grasps: list[dict]  # object, offset and session of each
+    effects: dict[str, dict[str, float]]  # name → the rig's own parameters
+    position_std_m: float
+    force_std_n: float
+
+
+def record(
+    folder: str | Path,
+    effects: dict[str, str | dict] | None = None,
+    seed: int = 0,
+    grasps: int = 24,
+    plan: str = "rich",
+    contact: str = "mujoco",
+    noise: bool = True,
+    samples: int = 150,
+) -> Truth:
+    """Writes a measurement set to ``folder``, and beside it, as ``<folder>.truth.json``, what is hidden in it.
+
+    Args:
+      effects: name → "small", "medium" or "large", or the effect's own parameters.
+      seed: of the base parameters, plan and noise; sets of one seed differ in their effects only.
+      plan: "rich" or "close_and_hold".
+      contact: one of :data:`PLANTS`; all but the first are another contact law than the model's.
+    """
+    folder = Path(folder)
+    setup = draw_setup(seed, grasps, plan, samples)
+    hidden = build_effects(effects or {})
+    recording = simulate(setup, hidden, seed, contact, noise)
+    _write(folder, setup, recording)
+    placed = zip(setup.thing, setup.offset, setup.session, strict=True)
+    truth = Truth(
+        seed, plan, contact, setup.servo.gain, setup.servo.b2,
+        {t.name: {"radius_m": t.radius, "rho_m": t.rho, "f_alpha": t.f_alpha} for t in setup.things},
+        [{"object": setup.things[i].name, "offset_m": float(o), "session": int(day)} for i, o, day in placed],
+        {name: _parameters(effect) for name, effect in hidden.items()},
+        POSITION_STD_M if noise else 0.0, FORCE_STD_N if noise else 0.0,
+    )  # fmt: skip
+    folder.with_name(folder.name + ".truth.json").write_text(json.dumps(asdict(truth), indent=1))
+    return truth
+
+
+def simulate(
+    setup: Setup, effects: dict[str, Effect], seed: int = 0, contact: str = "mujoco", noise: bool = True
+) -> Recording:
+    """Runs all grasps of a set side by side."""
+    n, samples = setup.commands.shape[:2]
+    rng = np.random.default_rng([seed, 2])
+    noise_q, noise_f = rng.normal(0, [[[[POSITION_STD_M]]], [[[FORCE_STD_N]]]], (2, n, samples, 2)) * noise
+    for i, effect in enumerate(effects.values()):
+        effect.start(n, np.random.default_rng([seed, 3, i]))
+    hooks = _Hooks(effects.values())
+    servo = hooks.chain("servo")(setup.servo)
+    hand = _Hand(setup, servo, contact, hooks, [e for e in effects.values() if e.drivetrain])
+    sense, encode, digitise = hooks.chain("force"), hooks.chain("position"), hooks.all("digitise")
+    send, drive = hooks.chain("send"), hooks.chain("setpoint")
+
+    s, q, f, o = hand.state, [], [], []
+    force = sense(s.f, s)
+    for k in range(samples):
+        reading = encode(s.q, s) + noise_q[:, k], force + noise_f[:, k]
+        for store in digitise:
+            reading = store(*reading)
+        q.append(reading[0])
+        f.append(reading[1])
+        o.append(s.o)
+        sent = send(setup.commands[:, k], reading[0])
+        for _ in range(round(SAMPLE_S / STEP_S)):
+            s.setpoint = drive(sent, s)
+            hand.step()
+            force = sense(s.f, s)
+    hand.plant.check()
+    return Recording(np.stack(q, 1), np.stack(f, 1), np.stack(o, 1))
+
+
+class _Hooks:
+    """The hooks that effects override, so that the others cost nothing."""
+
+    def __init__(self, effects: Iterable[Effect]) -> None:
+        self._effects = list(effects)
+
+    def all(self, hook: str) -> list[Callable]:
+        return [getattr(e, hook) for e in self._effects if getattr(type(e), hook) is not getattr(Effect, hook)]
+
+    def chain(self, hook: str) -> Callable:
+        """One effect's result is the next one's input."""
+        steps = self.all(hook)
+        return lambda value, *rest: reduce(lambda v, step: step(v, *rest), steps, value)
+
+    def total(self, hook: str, zero: np.ndarray) -> Callable:
+        """Forces add up."""
+        steps = self.all(hook)
+        return lambda s: sum((step(s) for step in steps), zero)
+
+
+class _Hand:
+    """The plant, the forces that effects add to it, and the motors where they are not part of it."""
+
+    def __init__(self, setup: Setup, servo: Servo, contact: str, hooks: _Hooks, drivetrains: list) -> None:
+        if len(drivetrains) > 1:
+            raise ValueError("one effect between motor and pad at a time")
+        n = len(setup.commands)
+        self._drivetrain = drivetrains[0] if drivetrains else None
+        self._radius, self._gain = setup.per_grasp("radius")[:, None], setup.per_grasp("f_alpha")[:, None]
+        rho = setup.per_grasp("rho")
+        self.plant = PLANTS[contact](rho, self._radius[:, 0], setup.offset, None if self._drivetrain else servo)
+        nothing = np.zeros((n, 2))
+        self._motor, self._press = hooks.total("motor", nothing), hooks.total("press", nothing)
+        self._table = hooks.total("table", np.zeros(n))
+        p = self.plant
+        self.state = State(servo, p.q, p.v, p.o, p.ov, nothing, nothing, setup.commands[:, 0])
+        self._look()
+
+    def step(self) -> None:
+        s, plant = self.state, self.plant
+        motor, press, table = self._motor(s), self._press(s), self._table(s)
+        if self._drivetrain is None:
+            plant.step(s.setpoint, motor, press, table)
+            s.q, s.v = plant.q, plant.v
+        else:
+            on_pad, on_motor = self._drivetrain.couple(s, plant.q, plant.v, plant.load)
+            plant.step(s.setpoint, on_pad, press, table)
+            drag = self._drivetrain.guide_on_motor * s.v
+            s.v = s.v + STEP_S * (s.motor_force() + motor + on_motor - drag) / self._drivetrain.motor_kg
+            s.q = s.q + STEP_S * s.v
+        s.time += STEP_S
+        self._look()
+
+    def _look(self) -> None:
+        s, plant = self.state, self.plant
+        s.o, s.ov, s.f = plant.o, plant.ov, plant.touch * self._gain
+        # The left finger meets the object's lower side along y, the right one its upper side.
+        s.depth = self._radius - plant.q - PAD_FACE_M - s.o[:, None] * [1.0, -1.0]
+
+
+def _parameters(effect: Effect) -> dict[str, float]:
+    return {f.name: float(getattr(effect, f.name)) for f in fields(effect) if f.init}
+
+
+def _write(folder: Path, setup: Setup, recording: Recording) -> None:
+    folder.mkdir(parents=True, exist_ok=True)
+    meta = {
+        "format": "forcegrasp-measurements/1", "kind": "grasps", "gripper": "tiago",
+        "source": "independent simulated rig", "license": "CC0-1.0",
+        "position_std_m": POSITION_STD_M, "force_std_n": FORCE_STD_N,
+    }  # fmt: skip
+    (folder / "meta.yaml").write_text(yaml.safe_dump(meta, sort_keys=False))
+    with (folder / "grasps.csv").open("w", newline="") as file:
+        rows = csv.writer(file)
+        rows.writerow(["grasp", "object", "session", "object_radius_m", "object_offset_m"])
+        for grasp, (i, offset) in enumerate(zip(setup.thing, setup.offset, strict=True)):
+            thing = setup.things[i]
+            rows.writerow([grasp, thing.name, f"session_{setup.session[grasp]}", thing.radius, float(offset)])
+    with (folder / "samples.csv").open("w", newline="") as file:
+        rows = csv.writer(file)
+        rows.writerow(_COLUMNS)
+        values = np.concatenate([setup.commands, recording.q, recording.f], axis=2)
+        for grasp, series in enumerate(values):
+            for k, row in enumerate(series):
+                rows.writerow([grasp, f"{k * SAMPLE_S:.2f}", *(f"{x:.9g}" for x in row)])
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("effects", nargs="*", help="effect=size, or effect=parameter:value,parameter:value")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--grasps", type=int, default=24)
+    parser.add_argument("--samples", type=int, default=150)
+    parser.add_argument("--plan", default="rich", choices=["rich", "close_and_hold"])
+    parser.add_argument("--contact", default="mujoco", choices=sorted(PLANTS))
+    parser.add_argument("--no-noise", action="store_true")
+    args = parser.parse_args()
+    chosen: dict[str, str | dict] = {}
+    for item in args.effects:
+        name, _, value = item.partition("=")
+        pairs = [pair.split(":") for pair in value.split(",")]
+        chosen[name] = {key: float(x) for key, x in pairs} if ":" in value else value
+    truth = record(
+        args.folder, chosen, args.seed, args.grasps, args.plan, args.contact, not args.no_noise, args.samples
+    )
+    print(json.dumps(asdict(truth), indent=1))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,197 @@
+"""The rig does what its effects say; the same MuJoCo scene as the authors', independently written."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from .catalogue import CATALOGUE, CLASSES, OUTSIDE, VARIANT_OF, VARIANTS, build_effects
+from .plan import Setup, Thing, draw_setup
+from .rig import FORCE_STD_N, PLANTS, POSITION_STD_M, record, simulate
+from .scene import Servo, compile_model
+
+GAIN, F_ALPHA, OFFSET = 100.0, 2.0, 0.003
+# When the commands of the little grasp below are sent, and where they have settled.
+NEAR, NUDGE, SQUEEZE, EASE, RELEASE, END = 2, 17, 26, 46, 56, 68
+
+
+@cache
+def little_setup() -> Setup:
+    """A centred and an off-centre object: approach, nudge, squeeze, ease, release, all in steps."""
+    path = np.empty(END)
+    levels = {0: 0.045, NEAR: 0.03, NUDGE: 0.0298, SQUEEZE: 0.0232, EASE: 0.0234, RELEASE: 0.03}
+    for start, level in levels.items():
+        path[start:] = level
+    commands = np.broadcast_to(path[None, :, None], (2, END, 2)).copy()
+    things = [Thing("thing", 0.025, 0.005, F_ALPHA)]
+    return Setup(Servo(GAIN, -9.0), things, np.array([0, 0]), np.array([0.0, OFFSET]), np.array([1, 1]), commands)
+
+
+@cache
+def rig(name: str = "", size: str = "medium", **parameters: float):
+    """The little grasp, without noise, with one effect."""
+    chosen = {name: parameters or size} if name else {}
+    return simulate(little_setup(), build_effects(chosen), contact="penalty", noise=False)
+
+
+def test_null_effects_change_no_bit() -> None:
+    everything = {name: kind() for name, kind in CLASSES.items()}
+    setup = draw_setup(3, 3, "rich", 40)
+    for contact in ("mujoco", "penalty"):
+        plain, null = (simulate(setup, effects, 3, contact) for effects in ({}, everything))
+        np.testing.assert_array_equal(plain.q, null.q)
+        np.testing.assert_array_equal(plain.f, null.f)
+
+
+@pytest.mark.parametrize("name", sorted(CATALOGUE | VARIANTS | OUTSIDE))
+def test_every_effect_shows(name: str) -> None:
+    plain, hidden = rig(), rig(name, "large")
+    assert np.isfinite([hidden.q, hidden.f]).all()
+    largest = max(np.max(abs(hidden.q - plain.q)) / POSITION_STD_M, np.max(abs(hidden.f - plain.f)) / FORCE_STD_N)
+    assert largest > 3
+
+
+def test_names() -> None:
+    assert set(CATALOGUE) | set(VARIANTS) | set(OUTSIDE) == set(CLASSES)
+    assert set(VARIANT_OF) == set(VARIANTS)
+    assert set(VARIANT_OF.values()) <= set(CATALOGUE)
+
+
+def test_symptoms_of_the_command() -> None:
+    plain = rig()
+    late = rig("command_delay", latency=0.08)
+    np.testing.assert_allclose(late.q[:, 2:], plain.q[:, :-2], atol=1e-12)
+    np.testing.assert_allclose(late.f[:1, 2:], plain.f[:1, :-2], atol=1e-9)
+    assert np.all(plain.q[:, NUDGE] - plain.q[:, SQUEEZE] > 1.5e-4)
+    band = rig("command_deadband", band=3e-4)
+    assert np.all(abs(band.q[:, NUDGE] - band.q[:, SQUEEZE]) < 3e-5)
+    slow = rig("rate_limit", speed=0.02)
+    assert np.max(abs(np.diff(slow.q[0], axis=0))) < 0.02 * 0.04 * 1.1
+
+
+def test_symptoms_of_the_drive() -> None:
+    plain, settled = rig(), [NUDGE, SQUEEZE, EASE, RELEASE]
+    friction = rig("coulomb_friction", level=0.03)
+    np.testing.assert_allclose(friction.q[:, NUDGE] - 0.03, 0.03 / GAIN, rtol=0.2)  # short of a closing command
+    assert np.all(friction.q[:, END - 1] < 0.03 - 1e-4)  # and of an opening one
+    stiction = rig("stiction", breakaway=0.05, sliding=0.01)
+    assert np.all(abs(stiction.q[:, NUDGE] - stiction.q[:, SQUEEZE]) < 3e-5)  # 0.2 mm · 100 N/m: it sticks
+    lagging = rig("actuator_lag", time_constant=0.05)
+    assert np.all(lagging.q[:, NEAR + 1 : NEAR + 5] > plain.q[:, NEAR + 1 : NEAR + 5])
+    np.testing.assert_allclose(lagging.q[0, settled], plain.q[0, settled], atol=2e-5)
+    limited = rig("force_limit", limit=0.05)
+    np.testing.assert_allclose(limited.f[0, EASE], 0.05 * F_ALPHA, rtol=0.1)
+    assert np.all(plain.f[0, EASE] > 0.06 * F_ALPHA)
+
+
+def test_symptoms_between_motor_and_pad() -> None:
+    plain = rig()
+    play = rig("backlash", gap=2e-4)
+    assert np.all(plain.f[0, EASE] - plain.f[0, RELEASE] > 0.02)
+    np.testing.assert_allclose(play.f[0, EASE], play.f[0, RELEASE], atol=0.004)  # the play eats the easing
+    bent = rig("finger_compliance", compliance=1e-3)
+    np.testing.assert_allclose(bent.q[0, SQUEEZE], plain.q[0, SQUEEZE], atol=2e-5)  # no load, no bending
+    assert np.all(bent.q[:, EASE] < plain.q[:, EASE] - 2e-5)
+
+
+def test_symptoms_of_contact_and_object() -> None:
+    plain, touched = rig(), SQUEEZE + 8
+    assert np.all(rig("stiffening_contact").q[:, EASE] > plain.q[:, EASE])
+
+    def decay(recording) -> np.ndarray:
+        return recording.f[0, touched] - recording.f[0, EASE]
+
+    assert np.all(decay(rig("viscoelastic_contact")) > decay(plain) + 0.005)
+    assert np.min(rig("adhesion", "large").f) < -0.05
+    assert np.min(plain.f) >= 0
+    pushed = abs(rig().o[1, EASE] - OFFSET)
+    assert abs(rig("object_friction", level=0.05).o[1, EASE] - OFFSET) < pushed - 1e-4
+
+
+def test_symptoms_of_the_sensors() -> None:
+    plain = rig()
+    for name in CATALOGUE:
+        if name.startswith("force_") and name != "force_limit":
+            np.testing.assert_array_equal(rig(name, "large").q, plain.q)
+    np.testing.assert_allclose(rig("force_delay", latency=0.08).f[:, 2:], plain.f[:, :-2], atol=1e-12)
+    rising = plain.f > np.roll(plain.f, 1, axis=1) + 0.01
+    assert np.all(rig("force_lag").f[rising] < plain.f[rising])
+    np.testing.assert_allclose(rig("force_bias", left=0.1, right=0.2).f - plain.f, np.full_like(plain.f, [0.1, 0.2]))
+    drift = rig("force_drift", left=0.1, right=0.0).f - plain.f
+    np.testing.assert_allclose(drift[:, -1], [[0.1 * (END - 1) * 0.04, 0.0]] * 2)
+    np.testing.assert_allclose(rig("force_deadzone", threshold=0.1).f, np.maximum(plain.f - 0.1, 0.0), atol=1e-12)
+    np.testing.assert_allclose(rig("force_saturation", full_scale=0.1).f, np.minimum(plain.f, 0.1))
+    ring = rig("force_hysteresis", spread=0.2).f
+    peak = np.argmax(plain.f[0, :, 0])
+    np.testing.assert_allclose(ring[0, :peak], plain.f[0, :peak])  # loading
+    assert np.all(ring[0, RELEASE] > 1.05 * plain.f[0, RELEASE])  # unloading
+    np.testing.assert_allclose(rig("force_crosstalk", share=0.1).f, plain.f + 0.1 * plain.f[:, :, ::-1])
+    np.testing.assert_allclose(rig("force_gain_asymmetry", right_excess=0.1).f, plain.f * [1.0, 1.1])
+    bias = rig("encoder_bias", left=1e-4, right=0.0)
+    np.testing.assert_allclose(bias.q - plain.q, np.full_like(plain.q, [1e-4, 0.0]))
+    few = rig("quantisation", "large")
+    assert len(np.unique(few.f.round(9))) < 6
+
+
+def test_scene_constants() -> None:
+    for servo in (Servo(), None):
+        model = compile_model(0.005, 0.025, 0.0, servo)
+        assert model.body("object").invweight0[0] == pytest.approx(2.5)
+        for name in ("left", "right"):
+            assert model.body(name).invweight0[0] == pytest.approx(1.58745, rel=1e-5)
+        assert model.dof_invweight0[-1] == pytest.approx(4.76236, rel=1e-5)
+
+
+def test_motor_outside_mujoco_is_the_same_motor() -> None:
+    """Where something gives way, the motor is integrated here: with next to no play it must move the same."""
+    setup = draw_setup(5, 2, "rich", 40)
+    plain, stiff = (
+        simulate(setup, build_effects(chosen), contact="mujoco", noise=False)
+        for chosen in ({}, {"backlash": {"gap": 1e-9}})
+    )
+    assert np.max(abs(stiff.q - plain.q)) < 3e-5
+
+
+def test_record(tmp_path: Path) -> None:
+    folders = [tmp_path / name for name in ("a", "b", "c")]
+    for folder, seed in zip(folders, (1, 1, 2), strict=True):
+        truth = record(folder, {"force_lag": "small"}, seed, grasps=4, contact="penalty", samples=50)
+    first, again, other = ((folder / "samples.csv").read_text() for folder in folders)
+    assert first == again != other
+    assert sorted(p.name for p in folders[0].iterdir()) == ["grasps.csv", "meta.yaml", "samples.csv"]
+    assert json.loads((tmp_path / "c.truth.json").read_text())["effects"] == truth.effects
+    assert truth.effects == {"force_lag": {"time_constant": 0.01}}
+    assert yaml.safe_load((folders[0] / "meta.yaml").read_text())["format"] == "forcegrasp-measurements/1"
+    rows = list(csv.DictReader(first.splitlines()))
+    assert len(rows) == 4 * 50
+    assert all(0 <= float(row["qdes_l_m"]) <= 0.045 for row in rows)
+
+
+@pytest.mark.parametrize(("contact", "plan"), [*((name, "rich") for name in PLANTS), ("penalty", "close_and_hold")])
+def test_tiers_and_plans(contact: str, plan: str) -> None:
+    recording = simulate(draw_setup(2, 2, plan, 60), {}, contact=contact, noise=False)
+    assert recording.f.max() > 0.01
+    assert -1e-3 < recording.q.min() < recording.q.max() < 0.046
+
+
+def test_authors_trajectory() -> None:
+    folder = Path(os.environ.get("FORCEGRASP_REFERENCE") or Path(__file__).parents[3] / "shared" / "reference")
+    if not (folder / "kappa_0.50.csv").exists():
+        pytest.skip(f"no reference in {folder}: set FORCEGRASP_REFERENCE")
+    theirs = np.genfromtxt(folder / "kappa_0.50.csv", delimiter=",", names=True)
+    commands, q, f = (
+        np.stack([theirs[name.format(side)] for side in "lr"], 1) for name in ("qdes_{}_m", "q_{}_m", "f_{}_n")
+    )
+    commands = np.concatenate([commands, commands[-1:]])[None]  # their rows are what follows a command
+    things = [Thing("kappa_0.50", 0.035, 0.0065, 2.75)]
+    setup = Setup(Servo(100.0, -9.0), things, np.array([0]), np.array([0.0]), np.array([1]), commands)
+    ours = simulate(setup, {}, noise=False)
+    assert np.mean(abs(ours.q[0, 1:] - q)) < 2e-5
+    assert np.mean(abs(ours.f[0, 1:] - f)) < 5e-3
