@@ -226,6 +226,71 @@ class TrainConfig:
 
 
 @dataclass
+class RecordConfig:
+    """`forcegrasp record`."""
+
+    plan: str = option(
+        "rich",
+        "which grasps: rich has several speeds, pauses, reversals, partial releases, holds and off-centre objects;"
+        " close_and_hold is the paper's",
+        choices=("rich", "close_and_hold"),
+    )
+    out: str = option("", "folder for the set; must not exist or be empty; runs/record_TIME if empty")
+    effects: list[str] = option([], "effects to record with, each 'NAME [VARIANT] [PARAMETER=VALUE ...]'")
+    gripper: str = option("tiago", "gripper by name, or the path of a description")
+    model: str = option("", "model file whose base parameters and effects to record with")
+    grasps: int = option(24, "grasps in the set", low=1, high=10_000)
+    objects: int = option(4, "objects, grasped in turn; their parameters are drawn", low=1, high=1000)
+    off_nominal: float = option(
+        0.15, "largest share by which the gripper's base parameters differ from nominal", low=0, high=0.5
+    )
+    position_std_m: float = option(2.7e-5, "noise of the positions", unit="m", source="paper", low=0, high=0.01)
+    force_std_n: float = option(0.013, "noise of the forces", unit="N", source="paper", low=0, high=1)
+    samples: str = option("csv", "file format of the samples", choices=("csv", "parquet"))
+    seed: int = option(0, "seed of objects, plan and noise", low=0, high=2**31 - 1)
+
+
+@dataclass
+class CompareConfig:
+    """`forcegrasp compare`."""
+
+    data: str = option("", "folder of the measurement set")
+    model: str = option("", "model file; the gripper's base model, fitted to the set, if empty")
+    out: str = option("", "where to write report.html and compare.json; runs/compare_TIME if empty")
+    seed: int = option(0, "seed of the fit's starts", low=0, high=2**31 - 1)
+
+
+@dataclass
+class FitConfig:
+    """`forcegrasp fit`."""
+
+    data: str = option("", "folder of the measurement set")
+    out: str = option("", "model file to write; runs/fit_TIME/model.yaml if empty")
+    seed: int = option(0, "seed of the fit's starts", low=0, high=2**31 - 1)
+
+
+@dataclass
+class DiagnoseConfig:
+    """`forcegrasp diagnose`."""
+
+    data: str = option("", "folder of the measurement set")
+    model: str = option("", "model file to start from; the base model is fitted to the set if empty")
+    out: str = option("", "where to write report.html and diagnosis.json; runs/diagnose_TIME if empty")
+    effects: list[str] = option([], "effects to consider; all of the catalogue if empty")
+    seed: int = option(0, "seed of the fit's starts and of the null distribution", low=0, high=2**31 - 1)
+
+
+@dataclass
+class AddConfig:
+    """`forcegrasp add`."""
+
+    data: str = option("", "folder of the measurement set")
+    model: str = option("", "model file to add to")
+    effect: str = option("", "effect to add, see forcegrasp effects")
+    out: str = option("", "model file to write; runs/add_TIME/model.yaml if empty")
+
+
+@dataclass
 class EvaluateConfig:
     """`forcegrasp evaluate`."""
 
@@ -274,7 +339,7 @@ def validate(config: Any, path: str = "") -> None:
         is_range = str(entry.type) == "list[float]"
         if is_range and (len(value) != 2 or value[0] > value[1]):
             raise ConfigError(f"{name}={value}: must be [low, high] with low ≤ high ({meta['doc']})")
-        if listed and not value:
+        if listed and not value and entry.default_factory():
             raise ConfigError(f"{name}=[]: must not be empty ({meta['doc']})")
         for item in value if listed else [value]:
             if meta["choices"] and item not in meta["choices"]:

@@ -10,6 +10,11 @@ from forcegrasp import __version__
 from forcegrasp.errors import ForcegraspError, closest
 
 VERBS = {
+    "record": "make a measurement set from the simulator, with effects hidden in it if you like",
+    "compare": "show where a model fails on measured grasps, in units and as a multiple of the sensor noise",
+    "fit": "fit a gripper's base model to measured grasps and write it as a file",
+    "diagnose": "find out which physical effect a model lacks, and which grasp to record next",
+    "add": "add an effect to a model, fit it again, and see the error fall",
     "train": "learn a grasp-force policy with PPO, or resume a run",
     "evaluate": "compare policies and controllers on the same simulated grasps",
     "effects": "list the physical effects that a simulator may lack, or explain one",
@@ -29,6 +34,14 @@ examples
   forcegrasp train resume=runs/RUN                         go on with an interrupted run
   forcegrasp evaluate 'policies=[runs/RUN,force_pi]'
   forcegrasp effects backlash                              what it looks like, and what looks like it
+
+from measurements to a better model (a set is a folder of CSV files; forcegrasp record shows one)
+  forcegrasp record out=my_set 'effects=[backlash]'        or record your own gripper
+  forcegrasp compare data=my_set                           where does the model fail?
+  forcegrasp fit data=my_set out=model.yaml
+  forcegrasp diagnose data=my_set model=model.yaml         which effect is missing?
+  forcegrasp add data=my_set model=model.yaml effect=backlash out=better.yaml
+  forcegrasp compare data=my_set model=better.yaml         the error fell
 
 Every verb explains its options with --help. Exit status: 0 done, 2 bad input, 130 interrupted (and saved).
 """

@@ -7,12 +7,29 @@ from collections.abc import Iterator
 from importlib.resources import files
 from typing import Any
 
-from forcegrasp.config import EvaluateConfig, TrainConfig, validate
+from forcegrasp.config import (
+    AddConfig,
+    CompareConfig,
+    DiagnoseConfig,
+    EvaluateConfig,
+    FitConfig,
+    RecordConfig,
+    TrainConfig,
+    validate,
+)
 from forcegrasp.errors import ConfigError, closest
 
 #: The key with which a Hydra config would name a Python object; put together, as it may stand nowhere in this project.
 OBJECT_KEY = "_".join(("", "target", ""))
-SCHEMAS: dict[str, type] = {"train": TrainConfig, "evaluate": EvaluateConfig}
+SCHEMAS: dict[str, type] = {
+    "record": RecordConfig,
+    "compare": CompareConfig,
+    "fit": FitConfig,
+    "diagnose": DiagnoseConfig,
+    "add": AddConfig,
+    "train": TrainConfig,
+    "evaluate": EvaluateConfig,
+}
 
 
 def compose(verb: str, overrides: list[str]) -> Any:

@@ -21,12 +21,14 @@ MOST_EFFECTS = 4
 ALARM = 0.01
 #: An effect must lower the error of some signal in some phase by this share.
 LEAST_GAIN = 0.02
-#: Share of the error beyond the noise that must be explained for effects to be the answer; below it is "unknown".
-EXPLAINED = 0.7
+#: An effect must explain this share of the mean square beyond the noise.
+LEAST_SHARE = 0.25
+#: Effects must explain this share of it together to be the answer; below it is "unknown".
+EXPLAINED = 0.5
 # Refitted per step: signatures only rank.
-_REFITTED = 6
+_REFITTED = 5
 # A signature this much worse than the best is not refitted.
-_HOPELESS = 0.15
+_HOPELESS = 0.2
 # Effects whose signatures are that parallel can't be told apart, whatever the likelihood says.
 _PARALLEL = 0.995
 
@@ -41,6 +43,7 @@ class Candidate:
     p_family: float  #: probability that the best signature of sensor noise does as well
     gains: np.ndarray  #: change of each held-out grasp's log-likelihood, ``(G,)``
     error_after: float  #: held-out rms residual ÷ noise
+    share: float  #: share of the mean square beyond the noise that it explains
     largest_fall: float  #: largest share by which the error of a signal in a phase falls
     signature: np.ndarray  #: unit vector, ``(N,)``
 
@@ -122,7 +125,7 @@ def diagnose(
         steps.append(step)
         if step.verdict == "none":
             break
-        fit = step.candidates[0].fit
+        fit = polish(step.candidates[0].fit, target, simulators)
         progress(f"found {step.effects[0]}: held-out error {step.error_before:.2f} → {step.error_after:.2f} × noise")
         if step.error_after <= floor:
             break
@@ -148,10 +151,14 @@ def _verdict(found: list[Step], before: float, after: float, floor: float) -> st
     at_floor = after <= max(floor, 1.02)
     if not found:
         return "explained" if before <= max(floor, 1.02) * 1.03 else "unknown"
-    share = (before**2 - after**2) / max(before**2 - 1, 1e-9)
-    if not at_floor and share < EXPLAINED:
+    if not at_floor and _share(before, after) < EXPLAINED:
         return "unknown"
     return "one_of" if len(found) == 1 and found[0].verdict == "one_of" else "effect"
+
+
+def _share(before: float, after: float) -> float:
+    """Share of the mean square beyond the noise that is gone."""
+    return (before**2 - after**2) / max(before**2 - 1, 1e-9)
 
 
 def _look_further(
@@ -203,8 +210,11 @@ def _refit(
     after = heldout_residual(refit, target, folds)
     gains = log_likelihood(after) - log_likelihood(held)
     fall = max((1 - rms(after, target, w) / rms(held, target, w) for w in cells(target)), default=0.0)
+    before, behind = rms(held, target), rms(after, target)
     p_family = (1 + int(np.sum(null >= score.gain))) / (1 + len(null))
-    return Candidate(score.effect, score.variant, refit, p_family, gains, rms(after, target), fall, score.signature)
+    return Candidate(
+        score.effect, score.variant, refit, p_family, gains, behind, _share(before, behind), fall, score.signature
+    )
 
 
 def refine(scores: Sequence[Score], target: Target, fit: Fit, simulators: Simulators) -> Fit:
@@ -212,7 +222,13 @@ def refine(scores: Sequence[Score], target: Target, fit: Fit, simulators: Simula
     score, old = scores[0], fit.problem
     problem = Problem(old.gripper, old.grasps, [*old.effects, (score.effect, score.variant)])
     added = [e.coordinate(v) for e, v in zip(problem.entries[len(old) :], score.values, strict=True)]
-    return fit_once(target, problem, simulators, np.r_[fit.vector, added], fit.correction, rounds=1)
+    start = np.r_[fit.vector, added]
+    return fit_once(target, problem, simulators, start, fit.correction, rounds=0, known_slopes=fit.jacobian)
+
+
+def polish(fit: Fit, target: Target, simulators: Simulators) -> Fit:
+    """Goes on from a refined fit with slopes and correction of its own."""
+    return fit_once(target, fit.problem, simulators, fit.vector, fit.correction, rounds=1)
 
 
 def cells(target: Target, least: int = 40) -> list[np.ndarray]:
@@ -229,7 +245,12 @@ def cells(target: Target, least: int = 40) -> list[np.ndarray]:
 def _convincing(candidate: Candidate) -> bool:
     gains = candidate.gains[np.isfinite(candidate.gains)]
     spread = gains.std(ddof=1) * np.sqrt(len(gains)) if len(gains) > 1 else np.inf
-    return candidate.p_family <= ALARM and gains.sum() > max(spread, 5.0) and candidate.largest_fall >= LEAST_GAIN
+    return (
+        candidate.p_family <= ALARM
+        and gains.sum() > max(spread, 5.0)
+        and candidate.largest_fall >= LEAST_GAIN
+        and candidate.share >= LEAST_SHARE
+    )
 
 
 def _equal(winner: Candidate, other: Candidate) -> bool:

@@ -51,9 +51,7 @@ _ONSETS = {
     "force_deadzone": Cause(
         "the sensor hides a force of that size (its `subtract` form)", lambda o: {"threshold_n": o.reading_n}
     ),
-    "force_drift": Cause(
-        "a zero that has fallen by the end of each hold; free-air readings would be negative", _none
-    ),
+    "force_drift": Cause("a zero that has fallen by the end of each hold; free-air readings would be negative", _none),
     "force_bias": Cause(
         "a zero that is too low; free-air readings would be negative unless they are cut",
         lambda o: {"left_n": -o.reading_n, "right_n": -o.reading_n},

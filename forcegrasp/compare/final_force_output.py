@@ -179,7 +179,8 @@ def facts(analysis: TableAnalysis) -> list[str]:
         sure = analysis.slopes_differ_p < 0.05
         judged = "no one slope fits all objects" if sure else "one slope for all objects can't be ruled out"
         text.append(
-            f"slopes differ by a factor of {value:.2f} [{low:.2f}, {high:.2f}]: {judged} (p = {analysis.slopes_differ_p:.2g})"
+            f"slopes differ by a factor of {value:.2f} [{low:.2f}, {high:.2f}]: {judged}"
+            f" (p = {analysis.slopes_differ_p:.2g})"
         )
     kappas = {name: analysis.kappa(name) for name in analysis.rows}
     if analysis.has_kappa:
@@ -189,8 +190,8 @@ def facts(analysis: TableAnalysis) -> list[str]:
         inside = all(soft <= scale <= hard for scale in scales)
         text.append(
             f"κ of the paper's coupling under the base law: {named}; f_α {min(scales):.2f} to {max(scales):.2f} lies"
-            f" {'within' if inside else 'not within'} the range [{soft:g}, {hard:g}] that the paper randomises, and covers"
-            f" {max(0.0, min(max(scales), hard) - max(min(scales), soft)) / (hard - soft):.0%} of it"
+            f" {'within' if inside else 'not within'} the range [{soft:g}, {hard:g}] that the paper randomises, and"
+            f" covers {max(0.0, min(max(scales), hard) - max(min(scales), soft)) / (hard - soft):.0%} of it"
         )
     if analysis.shared:
         travel, force = analysis.shared["travel"], analysis.shared["force"]
@@ -220,15 +221,17 @@ def sections(analysis: TableAnalysis) -> list[Section]:
     count = ", ".join(f"{name} {len(rows.force_n)}" for name, rows in analysis.rows.items())
     body = [
         Text(f"{analysis.verdict}: {analysis.reason}.", strong=True),
-        Picture(draw(analysis), "Measured final forces with the base law (dashed) and the best shape; below, residuals."),
+        Picture(
+            draw(analysis), "Measured final forces with the base law (dashed) and the best shape; below, residuals."
+        ),
         fitted,
         *(Text(f"{sentence[0].upper()}{sentence[1:]}.") for sentence in facts(analysis)),
         *(Text(f"{name} was left out: {why}.") for name, why in analysis.skipped.items()),
     ]
     doubt = Text(
         f"Rows per object: {count}. Noise {analysis.noise_n:.3f} N, {analysis.noise_from}. Intervals are percentiles of"
-        " 999 resampled sets of residuals; with so few rows they are rough. Gains are of the log-likelihood of rows left"
-        " out; p is the share of tables after the base law on which any shape does as well."
+        " 999 resampled sets of residuals; with so few rows they are rough. Gains are of the log-likelihood of rows"
+        " left out; p is the share of tables after the base law on which any shape does as well."
     )
     result = [Section("Final forces", body), Section("Shapes that were tried", [shapes, doubt])]
     return [*result, _limits(analysis)]

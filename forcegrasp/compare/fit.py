@@ -16,7 +16,7 @@ from forcegrasp.measure.replay import Replay
 # Step of the finite differences in a problem's coordinates: far above the chaos of the contacts, within the bend.
 _STEP = 0.02
 # Relative change of the cost at which a fit ends, and the largest number of simulations until then.
-_TOLERANCE, _EVALUATIONS = 1e-5, 25
+_TOLERANCE, _EVALUATIONS = 1e-4, 15
 
 
 class Simulators:
@@ -69,6 +69,7 @@ def fit_once(
     correction: np.ndarray | None = None,
     rounds: int = 2,
     free: np.ndarray | None = None,
+    known_slopes: np.ndarray | None = None,
 ) -> Fit:
     """Fits from one start.
 
@@ -80,8 +81,10 @@ def fit_once(
       correction: exact minus cheap prediction near the start; found there if not given.
       rounds: how often the correction is renewed; with 0 it stays as given.
       free: which coordinates may change, ``(p,)``; all by default.
+      known_slopes: of the first k coordinates from an earlier fit nearby, ``(G, S, 4, k)``; they are kept, which spares
+        most of the simulations.
     """
-    cheap = _Remembered(lambda x: _with_slopes(problem, simulators.cheap, target, x))
+    cheap = _Remembered(lambda x: _with_slopes(problem, simulators.cheap, target, x, known_slopes))
     inside = np.clip(start, problem.low + 1e-9, problem.high - 1e-9)
     free = np.ones(len(problem), bool) if free is None else free
     exact_is_cheap = simulators.exact is simulators.cheap
@@ -135,9 +138,12 @@ def _difference(problem: Problem, simulators: Simulators, vector: np.ndarray) ->
     return predict(simulators.exact, case)[0] - predict(simulators.cheap, case)[0]
 
 
-def _with_slopes(problem: Problem, replay: Replay, target: Target, vector: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _with_slopes(
+    problem: Problem, replay: Replay, target: Target, vector: np.ndarray, known: np.ndarray | None
+) -> tuple[np.ndarray, np.ndarray]:
     """Prediction ``(G, S, 4)`` and its slopes ÷ noise ``(G, S, 4, p)`` by one-sided differences, in one simulation."""
-    groups = problem.columns()
+    count = 0 if known is None else known.shape[-1]
+    groups = [group for group in problem.columns() if min(group) >= count]
     step = np.where(vector + _STEP > problem.high, -_STEP, _STEP)
     step = np.where(np.abs(problem.high - problem.low) < 2 * _STEP, (problem.high - problem.low) / 4, step)
     varied = [vector]
@@ -153,6 +159,8 @@ def _with_slopes(problem: Problem, replay: Replay, target: Target, vector: np.nd
             slopes[members, :, :, index] = change[members] / step[index]
     slopes /= target.sigma[:, None]
     slopes[~target.mask] = 0
+    if count:
+        slopes[..., :count] = known
     return signals[0], slopes
 
 

@@ -12,6 +12,9 @@ from forcegrasp.measure.schema import MeasuredGrasp
 
 #: Number of folds where a set does not say which grasps to check with.
 FOLDS = 6
+# What one unit of a coordinate costs in a fold's step, in squared residuals: a parameter that the other grasps don't
+# fix stays where it is.
+_RIDGE = 1.0
 # Residuals beyond this many σ count linearly: one bad grasp must not decide.
 _HEAVY = 6.0
 
@@ -43,7 +46,7 @@ def heldout_residual(fit: Fit, target: Target, folds: Sequence[np.ndarray]) -> n
         rest = np.setdiff1d(np.arange(len(target.grasps)), fold)
         if len(rest) == 0:
             continue
-        step = np.linalg.lstsq(inner[rest].sum(axis=0) + 1e-9 * np.eye(p), slope[rest].sum(axis=0), rcond=None)[0]
+        step = np.linalg.lstsq(inner[rest].sum(axis=0) + _RIDGE * np.eye(p), slope[rest].sum(axis=0), rcond=None)[0]
         held[fold] = residual[fold] - jacobian[fold] @ step
     return held
 

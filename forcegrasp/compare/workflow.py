@@ -10,7 +10,7 @@ import numpy as np
 
 from forcegrasp.compare.base_fit import BaseFit, check_gradient, fit_base
 from forcegrasp.compare.comparison import Comparison
-from forcegrasp.compare.diagnose import Diagnosis, diagnose, numerical_floor, refine
+from forcegrasp.compare.diagnose import Diagnosis, diagnose, numerical_floor, polish, refine
 from forcegrasp.compare.fit import Fit, Simulators, fit_once
 from forcegrasp.compare.heldout import heldout_residual, make_folds, rms
 from forcegrasp.compare.intervals import intervals, standard_errors, warnings
@@ -60,7 +60,7 @@ def fit_model(loaded: Loaded, seed: int, progress: Progress) -> tuple[Target, Si
 
 
 def apply_model(loaded: Loaded, model: Model, progress: Progress, refit: bool) -> tuple[Target, Simulators, BaseFit]:
-    """Puts a model beside a set: as it is, but for objects and grasps that it does not know, or fitted again from there.
+    """Puts a model beside a set: as it is but for objects and grasps it does not know, or fitted again from there.
 
     Raises:
       ConfigError: if the model is of another gripper.
@@ -148,7 +148,7 @@ def add_effect(loaded: Loaded, model: Model, effect: type[Effect], progress: Pro
             f"effect={effect.name}: leaves no trace in these data at any size; record grasps that show it"
         )
     fits = [refine(group, target, before, simulators) for group in groups]
-    after = min(fits, key=lambda f: f.cost)
+    after = polish(min(fits, key=lambda f: f.cost), target, simulators)
     errors = [rms(heldout_residual(f, target, folds), target) for f in (before, after)]
     return Added(target, before, after, *errors, model_of(after, loaded, numerical_error(after, target)))
 

@@ -8,25 +8,41 @@ from forcegrasp.effects.base import Effect, Parameter
 
 
 class Adhesion(Effect):
-    """A pull between pad and object for as long as they touch."""
+    """A pull between pad and object while they touch, which fades as they are torn apart."""
 
     name = "adhesion"
     stage = "contact"
-    symptom = "negative force at release; the pad lets go late"
-    formula = "F = F_contact − F_a while in contact"
-    source = "constant adhesive force; MuJoCo's `adhesion` does it once per contact point"
+    symptom = "negative force at light touches and at release; the pad lets go late"
+    formula = "F = F_contact − F_a while in contact, −F_a max(0, 1 − gap / d) after it"
+    source = "adhesive force with a tear-off distance; MuJoCo's `adhesion` has none and acts once per contact point"
     look_alikes = ("backlash", "force_deadzone", "force_bias")
     separates = "full releases, slow enough to be sampled"
-    parameters = (Parameter("force_n", "adhesive force F_a", "N", 0.0, 0.5, 0.03, trials=(0.005, 0.02, 0.06)),)
+    parameters = (
+        Parameter("force_n", "adhesive force F_a", "N", 0.0, 0.5, 0.03, trials=(0.005, 0.02, 0.06)),
+        Parameter("distance_m", "tear-off distance d", "m", 0.0, 0.002, 2e-4, null=2e-4, trials=(2e-4,)),
+    )
     order = 2
 
+    def reset(self, which: np.ndarray) -> None:
+        if not hasattr(self, "_surface"):
+            self._surface, self._bonded = np.zeros((len(self.values), 2)), np.zeros((len(self.values), 2), bool)
+        self._surface[which], self._bonded[which] = -np.inf, False
+
     def _pull(self, force: np.ndarray) -> np.ndarray:
-        return np.where(force > 0, self["force_n"], 0.0)
+        plant, rows = self.plant, self.rows
+        # how far a pad stands from the object's middle; the right finger stands on its positive side
+        reach = plant.position[rows] + plant.pad_shift_m[rows] + plant.object_position[rows, None] * np.array([1, -1])
+        # The object's surface is where it was first felt: a contact that opens has no force left long before it ends.
+        self._surface = np.where(force > 0, np.maximum(self._surface, reach), self._surface)
+        gap = np.maximum(reach - self._surface, 0.0)
+        distance = np.maximum(self["distance_m"], 1e-9)
+        self._bonded = (self._bonded | (force > 0)) & (gap < distance)
+        return np.where(self._bonded, self["force_n"] * (1 - np.minimum(gap / distance, 1.0)), 0.0)
 
     def act(self) -> None:
         pull = self._pull(self.pad_force)
         self.plant.finger_push_n[self.rows] -= pull  # towards closing, onto the object
-        self.plant.object_push_n[self.rows] += pull[:, 1] - pull[:, 0]  # the right finger stands on its positive side
+        self.plant.object_push_n[self.rows] += pull[:, 1] - pull[:, 0]
 
     def interaction(self, force: np.ndarray) -> np.ndarray:
         return force - self._pull(force)

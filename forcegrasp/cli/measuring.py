@@ -1,0 +1,115 @@
+"""What compare, fit, diagnose and add do alike: check where they are to write, read the set, write the report."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from forcegrasp.cli.results import write_json
+from forcegrasp.errors import ConfigError
+
+if TYPE_CHECKING:
+    from forcegrasp.compare.report import Section
+    from forcegrasp.compare.workflow import Loaded
+
+
+def check_folder(folder: Path) -> Path:
+    """Returns a folder that results can be written into, whether it is there or not.
+
+    Raises:
+      ConfigError: if it can't be: before hours of work, and not after.
+    """
+    there = next(place for place in (folder, *folder.absolute().parents) if place.exists())
+    if not there.is_dir():
+        raise ConfigError(f"out={folder}: could not write, {there} is a file; name a folder")
+    if not os.access(there, os.W_OK):
+        raise ConfigError(f"out={folder}: could not write, {there} is not writable; name another folder")
+    return folder
+
+
+def check_file(file: Path) -> Path:
+    """Returns a path that a model can be written to.
+
+    Raises:
+      ConfigError: if it can't be.
+    """
+    if file.is_dir():
+        raise ConfigError(f"out={file}: could not write, it is a folder; name a file: out={file / 'model.yaml'}")
+    check_folder(file.absolute().parent)
+    return file
+
+
+def tell_warnings(loaded: Loaded) -> None:
+    """Prints what is odd about a set."""
+    for warning in loaded.warnings:
+        print(f"warning: {warning}")
+
+
+def write_results(
+    out: Path, name: str, content: dict[str, Any], title: str, lead: str, sections: Sequence[Section], loaded: Loaded
+) -> None:
+    """Writes the report and the JSON file beside it, and says where."""
+    import mujoco
+
+    from forcegrasp.compare.report import Section, Text, write_report
+
+    if loaded.warnings:
+        sections = [*sections, Section("Odd in this set", [Text(warning) for warning in loaded.warnings])]
+    measured = loaded.measured
+    facts = {"set": str(measured.path), "gripper": measured.gripper, "source": measured.source}
+    facts |= {"fingerprint": measured.fingerprint, "mujoco": mujoco.__version__}
+    write_json(out / f"{name}.json", content)
+    report = write_report(out / "report.html", title, lead, sections, facts)
+    print(f"report: {report}, figures: {out / f'{name}.json'}")
+
+
+def is_table(loaded: Loaded) -> bool:
+    """Whether a set is a table of final forces."""
+    from forcegrasp.measure import FinalForceTable
+
+    return isinstance(loaded.measured, FinalForceTable)
+
+
+def refuse_table(loaded: Loaded, verb: str) -> None:
+    """Refuses a table of final forces.
+
+    Raises:
+      ConfigError: if the set is one.
+    """
+    if is_table(loaded):
+        raise ConfigError(
+            f"data={loaded.measured.path}: is a table of final forces, which fixes no model: it has no motion. "
+            f"forcegrasp {verb} needs grasps; forcegrasp compare and forcegrasp diagnose read the table"
+        )
+
+
+def report_table(loaded: Loaded, name: str, out: Path, **unused: object) -> None:
+    """Analyses a table of final forces, prints and writes what was found.
+
+    Args:
+      loaded: the set.
+      name: "compare" or "diagnosis".
+      out: where to write.
+      unused: options that mean nothing to a table.
+
+    Raises:
+      ConfigError: if one of those is given.
+    """
+    for option, value in unused.items():
+        if value:
+            raise ConfigError(
+                f"{option}: {loaded.measured.path} is a table of final forces, which is held against the static law and"
+                f" all shapes that effects give it; leave {option}= out"
+            )
+    from forcegrasp.compare.final_force import analyse_table
+
+    tell_warnings(loaded)
+    analysis = analyse_table(loaded.measured, loaded.gripper)
+    for line in analysis.lines():
+        print(line)
+    content = analysis.compare_json() if name == "compare" else analysis.diagnosis_json()
+    question = "Where the static law fails" if name == "compare" else "What the static law lacks"
+    lead = f"{analysis.verdict.replace('_', ' ')}: {analysis.reason}."
+    write_results(out, name, content, f"{question}: {loaded.measured.name}", lead, analysis.sections(), loaded)

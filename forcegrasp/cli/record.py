@@ -1,0 +1,63 @@
+"""``forcegrasp record``: a measurement set from the simulator."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+from forcegrasp.cli.options import compose, help_text
+from forcegrasp.cli.results import default_out
+from forcegrasp.errors import ConfigError
+
+PURPOSE = "make a measurement set from the simulator, with effects hidden in it if you like"
+NOTES = """
+  effects=[backlash,'force_lag time_constant_s=0.1']
+                   effects of a typical size, or of the size given; forcegrasp effects lists them. The set does not tell
+                   them: what forcegrasp diagnose says can be held against them
+"""
+
+
+def main(arguments: list[str]) -> int:
+    """Runs the verb; returns the exit status."""
+    if any(a in ("-h", "--help") for a in arguments):
+        print(help_text("record", PURPOSE, NOTES), end="")
+        return 0
+    config = compose("record", arguments)
+
+    from forcegrasp.compare.model_file import read_model
+    from forcegrasp.measure import write_set
+    from forcegrasp.measure.record import parse_effect, record
+    from forcegrasp.physics.gripper import load_gripper
+
+    out = default_out("record", config.out)
+    effects, known = [parse_effect(text) for text in config.effects], {}
+    gripper = load_gripper(config.gripper)
+    if config.model:
+        model = read_model(Path(config.model))
+        if model.gripper.name != gripper.name:
+            raise ConfigError(f"model={config.model}: is of gripper {model.gripper.name}, not {gripper.name}")
+        known = {name: fitted.value for name, fitted in model.base.items()}
+        effects = [*((e.effect, e.variant, e.values) for e in model.effects), *effects]
+    names = [effect.name for effect, _, _ in effects]
+    for name in names:
+        if names.count(name) > 1:
+            raise ConfigError(f"effects: {name} is there twice")
+    print(f"recording {config.grasps} grasps" + (f" with {', '.join(names)}" if names else ""))
+    recorded = record(
+        gripper,
+        config.plan,
+        grasps=config.grasps,
+        objects=min(config.objects, config.grasps),
+        effects=effects,
+        known=known,
+        off_nominal=config.off_nominal,
+        position_std_m=config.position_std_m,
+        force_std_n=config.force_std_n,
+        seed=config.seed,
+    )
+    measured = recorded.measured
+    if not gripper.is_shipped:
+        measured = dataclasses.replace(measured, gripper=str(gripper.path.resolve()))
+    write_set(measured, out, config.samples)
+    print(f"wrote {out}. See where the model fails: forcegrasp compare data={out}")
+    return 0

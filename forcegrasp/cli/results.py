@@ -1,0 +1,62 @@
+"""What the measuring verbs share: where results go, what is printed while they work."""
+
+from __future__ import annotations
+
+import json
+import math
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from forcegrasp.errors import ConfigError
+
+
+def default_out(verb: str, out: str) -> Path:
+    """The folder that was asked for, or a new run directory's."""
+    return Path(out) if out else Path(f"runs/{verb}_{time.strftime('%Y-%m-%d_%H-%M-%S')}")
+
+
+def need(value: str, option: str, example: str) -> Path:
+    """A path that must be given.
+
+    Raises:
+      ConfigError: if it is empty.
+    """
+    if not value.strip():
+        raise ConfigError(f"{option} is missing: {option}={example}")
+    return Path(value)
+
+
+def narrator() -> Callable[[str], None]:
+    """Prints what is going on, with the seconds since the start."""
+    start = time.monotonic()
+
+    def tell(text: str) -> None:
+        print(f"  [{time.monotonic() - start:4.0f} s] {text}", flush=True)
+
+    return tell
+
+
+def write_json(path: Path, content: dict[str, Any]) -> None:
+    """Writes a result; numbers that are not finite become null.
+
+    Raises:
+      ConfigError: if the file can't be written.
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(json.dumps(_finite(content), indent=2, ensure_ascii=False, allow_nan=False) + "\n", "utf-8")
+    except OSError as error:
+        raise ConfigError(f"out={path.parent}: could not write ({error.strerror})") from error
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {str(key): _finite(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_finite(item) for item in value]
+    if isinstance(value, float) or hasattr(value, "dtype"):
+        number = float(value)
+        return number if math.isfinite(number) else None
+    return value
