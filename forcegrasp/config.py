@@ -210,6 +210,7 @@ class TrainConfig:
     """`forcegrasp train`."""
 
     seed: int = option(0, "seed of everything random", low=0, high=2**31 - 1)
+    model: str = option("", "model file of forcegrasp fit or add: train with its effects, within fitted intervals")
     physics: PhysicsConfig = field(default_factory=lambda: PhysicsConfig(tier="fast"))
     grasp: GraspConfig = field(default_factory=GraspConfig)
     sensors: SensorConfig = field(default_factory=SensorConfig)
@@ -303,6 +304,7 @@ class EvaluateConfig:
     )
     trials: int = option(50, "grasps per softness value and policy; the paper had 200", low=2, high=1_000_000)
     seed: int = option(1000, "seed of the grasps; the same grasps for every policy", low=0, high=2**31 - 1)
+    model: str = option("", "model file of forcegrasp fit or add to simulate the grasps with")
     physics: PhysicsConfig = field(default_factory=PhysicsConfig)
     grasp: GraspConfig = field(default_factory=GraspConfig)
     sensors: SensorConfig = field(default_factory=SensorConfig)

@@ -27,7 +27,7 @@ def main(arguments: list[str]) -> int:
 
     from forcegrasp.cli.measuring import check_folder, is_table, report_table, tell_warnings, write_results
     from forcegrasp.compare import compare_output, workflow
-    from forcegrasp.compare.model_file import read_model
+    from forcegrasp.effects.model_file import read_model
 
     out = check_folder(default_out("compare", config.out))
     loaded = workflow.load(data)

@@ -8,11 +8,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from forcegrasp.cli.results import write_json
-from forcegrasp.errors import ConfigError
+from forcegrasp.errors import ConfigError, closest
 
 if TYPE_CHECKING:
     from forcegrasp.compare.report import Section
     from forcegrasp.compare.workflow import Loaded
+    from forcegrasp.effects import Effect
 
 
 def check_folder(folder: Path) -> Path:
@@ -113,3 +114,18 @@ def report_table(loaded: Loaded, name: str, out: Path, **unused: object) -> None
     question = "Where the static law fails" if name == "compare" else "What the static law lacks"
     lead = f"{analysis.verdict.replace('_', ' ')}: {analysis.reason}."
     write_results(out, name, content, f"{question}: {loaded.measured.name}", lead, analysis.sections(), loaded)
+
+
+def check_effects(option: str, names: Sequence[str]) -> list[type[Effect]]:
+    """Effects of the catalogue by name.
+
+    Raises:
+      ConfigError: names the option, and the closest known ones.
+    """
+    from forcegrasp.effects import catalogue
+
+    known = catalogue()
+    for name in names:
+        if name not in known:
+            raise ConfigError(f"{option}={name}: no such effect{closest(name, known)}")
+    return [known[name] for name in names]

@@ -24,7 +24,7 @@ def main(arguments: list[str]) -> int:
         return 0
     config = compose("record", arguments)
 
-    from forcegrasp.compare.model_file import read_model
+    from forcegrasp.effects.model_file import read_model
     from forcegrasp.measure import write_set
     from forcegrasp.measure.record import parse_effect, record
     from forcegrasp.physics.gripper import load_gripper

@@ -43,15 +43,24 @@ def main(arguments: list[str]) -> int:
 
 def _run(overrides: list[str]) -> int:
     config, run_dir = compose_run("train", overrides)
+    _check_model(config)
 
     from forcegrasp.runs.run_dir import RunDir
 
     return _train(config, RunDir.create(run_dir, config, overrides), resume=False)
 
 
+def _check_model(config) -> None:
+    """Refuses a model that can't be read before anything is written."""
+    if config.model:
+        from forcegrasp.effects.variation import read_tiago_model
+
+        read_tiago_model(config.model)
+
+
 def _sweep(overrides: list[str]) -> int:
     for single in _single_runs(overrides):
-        compose("train", single)  # refuses bad input before anything is written
+        _check_model(compose("train", single))  # refuses bad input before anything is written
     import hydra
     from hydra.core.global_hydra import GlobalHydra
     from omegaconf import DictConfig

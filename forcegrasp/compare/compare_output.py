@@ -43,8 +43,8 @@ def noise_sentence(target: Target) -> str:
     if target.sigma_known:
         return f"{noise}, as given with the set"
     return (
-        f"{noise}; at least one is not given in meta.yaml and was estimated from the data: noise that is slow looks like"
-        " motion, so it is a lower bound, and so is the floor"
+        f"{noise}; not both are given in meta.yaml, so what is missing was estimated from the data. Noise that is slow"
+        " looks like motion: the estimate is a lower bound, and so is the floor"
     )
 
 
@@ -110,7 +110,7 @@ def answer(comparison: Comparison) -> str:
         where = "on held-out grasps"
     else:
         where = "on the grasps that it was fitted to (too few to hold any out)"
-    total = f"The model's error {where} is {value:.2f} × the sensor noise; a perfect model would leave {floor:.2f}."
+    total = f"The model's error {where} is {value:.2f} × the sensor noise; up to {floor:.2f} is noise."
     if value <= max(floor, 1.02) * AT_FLOOR:
         return f"{total} These measurements show no failure of the model."
     return (
@@ -121,7 +121,9 @@ def answer(comparison: Comparison) -> str:
 
 def printed(comparison: Comparison) -> Printed:
     """Error per phase and signal, for the terminal."""
-    table = Printed("phase", *map(words, SIGNALS), box=box.SIMPLE, title="error (× sensor noise)", title_justify="left")
+    table = Printed("error, × noise", box=box.SIMPLE_HEAD, padding=(0, 1))
+    for signal in SIGNALS:
+        table.add_column(words(signal), no_wrap=True)
     cells = {(cell.phase, cell.signal): cell for cell in comparison.cells()}
     for phase in PHASES:
         row = [cells.get((phase, signal)) for signal in SIGNALS]
@@ -131,7 +133,7 @@ def printed(comparison: Comparison) -> Printed:
     table.add_section()
     table.add_row(
         "all",
-        *(f"{amount(t[f'rms_{u.lower()}'], u)} ({t['ratio']:.1f} ×)" for t, u in zip(totals, UNITS, strict=True)),
+        *(f"{amount(t[f'rms_{u.lower()}'], u)} {t['ratio']:.1f}×" for t, u in zip(totals, UNITS, strict=True)),
     )
     return table
 
@@ -139,13 +141,15 @@ def printed(comparison: Comparison) -> Printed:
 def _printed_cell(cell: Cell | None) -> Plain:
     if cell is None:
         return Plain("–")
-    return Plain(f"{amount(cell.rms, cell.unit)} ({cell.ratio:.1f} ×)", "bold" if cell.ratio > _MARKED else "")
+    return Plain(f"{amount(cell.rms, cell.unit)} {cell.ratio:.1f}×", "bold" if cell.ratio > _MARKED else "")
 
 
 def details(comparison: Comparison) -> list[str]:
     """Lines below the table: worst grasps, what the error goes with, and the noise."""
     errors, target = comparison.by_grasp(), comparison.target
-    worst = [f"{target.grasps[i].name} on {target.grasps[i].object} ({errors[i]:.1f} ×)" for i in worst_grasps(comparison)]
+    worst = [
+        f"{target.grasps[i].name} on {target.grasps[i].object} ({errors[i]:.1f} ×)" for i in worst_grasps(comparison)
+    ]
     lines = [f"worst grasps: {', '.join(worst)}"]
     name, kind, share = comparison.explanations()[0]
     if share >= _WORTH_TELLING:
@@ -194,7 +198,14 @@ def _by_signal_and_phase(comparison: Comparison) -> Section:
     for cell in cells:
         grid[PHASES.index(cell.phase), SIGNALS.index(cell.signal)] = cell.ratio
     rows = [
-        (words(c.signal), words(c.phase), str(c.samples), amount(c.rms, c.unit), f"{c.ratio:.2f}", amount(c.bias, c.unit))
+        (
+            words(c.signal),
+            words(c.phase),
+            str(c.samples),
+            amount(c.rms, c.unit),
+            f"{c.ratio:.2f}",
+            amount(c.bias, c.unit),
+        )
         for c in cells
     ]
     head = ("signal", "phase", "samples", "rms error", "÷ noise", "mean of measured − model")
@@ -209,10 +220,10 @@ def _by_signal_and_phase(comparison: Comparison) -> Section:
                 " both: both press; hold: both press and the command rests; release: opening, until 0.2 s after.",
             ),
             Table(head, rows, frozenset(i for i, cell in enumerate(cells) if cell.ratio > _MARKED)),
-            Text(f"{noise_sentence(comparison.target).capitalize()}."),
+            Text(f"S{noise_sentence(comparison.target)[1:]}."),
             Text(
-                f"Held-out error {comparison.floor_ratio():.3f} × noise; floor {comparison.floor:.3f} × noise: the noise"
-                " itself, and what the simulation's step and collision code add."
+                f"Held-out error {comparison.floor_ratio():.3f} × noise. Floor {comparison.floor:.3f} × noise: the sensor"
+                " noise, and what what step and collision code of the simulation add."
             ),
         ],
     )
@@ -236,6 +247,7 @@ def _worst(comparison: Comparison) -> Section:
 def dependence_section(comparison: Comparison, title: str = "What the error goes with") -> Section:
     """Residuals against what they may depend on."""
     values = {name: value for name, value in comparison.covariates().items() if name in _DRAWN}
+    values["force_n"] = comparison.predicted[..., 2:]  # what was measured shares its noise with the residual
     shares = [(n, kind, share) for n, kind, share in comparison.explanations() if share >= 0.01][:8]
     rows = [(covariate_words(name), kind, f"{share:.0%}") for name, kind, share in shares]
     blocks: list = [

@@ -9,10 +9,11 @@ import numpy as np
 
 from forcegrasp.compare.base_fit import BaseFit
 from forcegrasp.compare.fit import Fit, Simulators, fit_once
+from forcegrasp.compare.floor import cells, excess, numerical_floor
 from forcegrasp.compare.heldout import heldout_residual, log_likelihood, make_folds, rms
 from forcegrasp.compare.problem import Problem
 from forcegrasp.compare.score import Background, Score, null_gains, numerical_error, score_effects
-from forcegrasp.compare.target import PHASES, Target
+from forcegrasp.compare.target import Target
 from forcegrasp.effects import Effect
 
 #: Largest number of effects that are looked for.
@@ -85,6 +86,7 @@ class Diagnosis:
     error_after: float
     numerical: tuple[np.ndarray, ...] = field(default=())  #: each ``(G, S, 4)``
     floor: float = 1.0  #: error that sensor noise and the model's own numerical error leave
+    left: str = ""  #: where there is more than that, in words; empty if nowhere
 
     def heldout(self) -> np.ndarray:
         """Residuals of held-out grasps under the final fit, ``(G, S, 4)``."""
@@ -127,31 +129,24 @@ def diagnose(
             break
         fit = polish(step.candidates[0].fit, target, simulators)
         progress(f"found {step.effects[0]}: held-out error {step.error_before:.2f} → {step.error_after:.2f} × noise")
-        if step.error_after <= floor:
+        if not excess(heldout_residual(fit, target, folds), numerical, target):
             break
-    error_after = rms(heldout_residual(fit, target, folds), target)
+    held = heldout_residual(fit, target, folds)
+    error_after, left = rms(held, target), excess(held, numerical, target)
     found = [s for s in steps if s.verdict != "none"]
-    verdict = _verdict(found, error_before, error_after, floor)
+    verdict = _verdict(found, error_before, error_after, left)
     names = tuple(s.effects[0] for s in found) if verdict == "effect" else ()
     if verdict == "one_of":
         names = found[0].effects
     return Diagnosis(
-        verdict, names, tuple(steps), base, fit, target, folds, error_before, error_after, numerical, floor
+        verdict, names, tuple(steps), base, fit, target, folds, error_before, error_after, numerical, floor, left
     )
 
 
-def numerical_floor(numerical: Sequence[np.ndarray], target: Target) -> float:
-    """Error ÷ noise that even a perfect model leaves: the sensor noise, and what integration and contacts add."""
-    squares = [np.mean(n[target.mask] ** 2) for n in numerical]
-    # Halving the step shows about half of what the step costs in all.
-    return float(np.sqrt(1 + 4 * squares[0] + squares[1]))
-
-
-def _verdict(found: list[Step], before: float, after: float, floor: float) -> str:
-    at_floor = after <= max(floor, 1.02)
+def _verdict(found: list[Step], before: float, after: float, left: str) -> str:
     if not found:
-        return "explained" if before <= max(floor, 1.02) * 1.03 else "unknown"
-    if not at_floor and _share(before, after) < EXPLAINED:
+        return "unknown" if left else "explained"
+    if left and _share(before, after) < EXPLAINED:
         return "unknown"
     return "one_of" if len(found) == 1 and found[0].verdict == "one_of" else "effect"
 
@@ -209,7 +204,7 @@ def _refit(
     refit = refine([score], target, fit, simulators)
     after = heldout_residual(refit, target, folds)
     gains = log_likelihood(after) - log_likelihood(held)
-    fall = max((1 - rms(after, target, w) / rms(held, target, w) for w in cells(target)), default=0.0)
+    fall = max((1 - rms(after, target, w) / rms(held, target, w) for _, w in cells(target)), default=0.0)
     before, behind = rms(held, target), rms(after, target)
     p_family = (1 + int(np.sum(null >= score.gain))) / (1 + len(null))
     return Candidate(
@@ -228,18 +223,7 @@ def refine(scores: Sequence[Score], target: Target, fit: Fit, simulators: Simula
 
 def polish(fit: Fit, target: Target, simulators: Simulators) -> Fit:
     """Goes on from a refined fit with slopes and correction of its own."""
-    return fit_once(target, fit.problem, simulators, fit.vector, fit.correction, rounds=1)
-
-
-def cells(target: Target, least: int = 40) -> list[np.ndarray]:
-    """Masks ``(G, S, 4)`` of positions and of forces in each phase that has at least so many samples."""
-    masks = []
-    for index in range(len(PHASES)):
-        inside = target.phase == index
-        if inside.sum() >= least:
-            for signals in ((1, 1, 0, 0), (0, 0, 1, 1)):
-                masks.append(inside[:, :, None] & np.array(signals, bool))
-    return masks
+    return fit_once(target, fit.problem, simulators, fit.vector, fit.correction, rounds=2)
 
 
 def _convincing(candidate: Candidate) -> bool:

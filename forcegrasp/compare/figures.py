@@ -21,9 +21,9 @@ AXES = {
     "time_since_contact_s": ("time since contact [s]", 1.0),
     "velocity_m_s": ("finger velocity [mm/s]", 1e3),
     "direction": ("direction of motion", 1.0),
-    "force_n": ("measured force [N]", 1.0),
+    "force_n": ("force [N]", 1.0),
     "command_m": ("command [mm]", 1e3),
-    "position_m": ("measured position [mm]", 1e3),
+    "position_m": ("position [mm]", 1e3),
     "time_s": ("time in grasp [s]", 1.0),
 }
 _POINTS = 1200  # more would only make the file large
@@ -112,6 +112,10 @@ def dependence(values: dict[str, np.ndarray], residual: np.ndarray, mask: np.nda
                 _by_direction(axes, x, y)
             else:
                 _binned(axes, x, y)
+                if name == "velocity_m_s":  # most samples are nearly at rest
+                    axes.set_xscale("symlog", linthresh=5)
+                    axes.set_xticks([-100, -10, 0, 10, 100], ["−100", "−10", "0", "10", "100"], fontsize=8)
+                    axes.set_xticks([], minor=True)
             axes.axhspan(-1, 1, color="0.92", zorder=0)
             axes.axhline(0, color="0.5", lw=0.6)
             _finish(axes, ("position", "force")[row] + " residual ÷ noise" if column == 0 else "")
@@ -152,6 +156,8 @@ def symptom(target: Target, index: int, signal: int, without: np.ndarray, having
     _finish(above, f"{NAMES[SIGNALS[signal]]} [{unit}]")
     above.legend(frameon=False, fontsize=9)
     _residual_axes(below)
+    if signal < 2:  # against the whole way of a finger nothing would be seen
+        _zoom(above, time, factor * without[: len(time), signal], factor * having[: len(time), signal])
     return figure
 
 
@@ -235,6 +241,19 @@ def _residual_axes(axes: Axes, ylabel: str = "residual ÷ noise") -> None:
     axes.axhline(0, color="0.5", lw=0.6)
     axes.set_xlabel("time in grasp [s]")
     _finish(axes, ylabel)
+
+
+def _zoom(axes: Axes, time: np.ndarray, one: np.ndarray, other: np.ndarray) -> None:
+    """Limits the axes to where two curves part."""
+    apart = np.abs(one - other)
+    where = np.flatnonzero(apart > 0.15 * apart.max()) if len(apart) else []
+    if len(where) < 2:
+        return
+    first, last = time[where[0]] - 0.3, time[where[-1]] + 0.3
+    both = np.concatenate([curve[(time >= first) & (time <= last)] for curve in (one, other)])
+    margin = max(0.15 * np.ptp(both), 3 * apart.max())
+    axes.set_xlim(max(first, time[0]), min(last, time[-1]))
+    axes.set_ylim(both.min() - margin, both.max() + margin)
 
 
 def _binned(axes: Axes, x: np.ndarray, y: np.ndarray) -> None:

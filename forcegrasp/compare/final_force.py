@@ -26,6 +26,7 @@ LEAST_GAIN = 0.02
 _NULLS = 999
 # Less than any force sensor resolves.
 _LEAST_NOISE_N = 1e-6
+_LARGEST_STEP_N = 0.1
 _SEED = 20230
 
 
@@ -185,6 +186,14 @@ def _grows(x: np.ndarray, y: np.ndarray) -> bool:
     return bool(slope > 0 and slope > t.ppf(0.95, len(x) - 2) * error)
 
 
+def _rounding(rows: Mapping[str, Rows]) -> float:
+    """Standard error of readings that were written down in steps of a power of ten, N."""
+    force, step = np.concatenate([r.force_n for r in rows.values()]), _LARGEST_STEP_N
+    while step > _LEAST_NOISE_N and not np.allclose(force / step, np.round(force / step), rtol=0, atol=1e-6):
+        step /= 10
+    return max(step / np.sqrt(12), _LEAST_NOISE_N)
+
+
 def _freedom(shape: Shape, rows: Mapping[str, Rows]) -> int:
     return max(1, sum(len(r.force_n) - len(shape.parameters) for r in rows.values()))
 
@@ -209,14 +218,15 @@ def _noise(table: FinalForceTable, rows: Mapping[str, Rows], fits: Mapping) -> t
             # Where no shape comes down to it, it is no measure of what chance does to a table.
             trusted = best / sigma**2 <= chi2.ppf(0.99, freedom)
             return sigma, source, trusted and source.startswith("given")
-    return max(scatter, _LEAST_NOISE_N), "scatter about the best shape: a lower bound, for there are no repeats", False
+    return max(scatter, _rounding(rows)), "scatter about the best shape: a lower bound, for there are no repeats", False
 
 
 def _family(rows: Mapping[str, Rows], fits: Mapping, sigma: float | None, rng: np.random.Generator) -> dict:
     """Probability of each shape's improvement, or a better one of any shape, under the base law."""
     n = sum(len(r.force_n) for r in rows.values())
     scatter = np.sqrt(sum(np.sum(fit.residual**2) for fit in fits[BASE].values()) / _freedom(BASE, rows))
-    spread = sigma or max(float(scatter), _LEAST_NOISE_N)
+    least = _rounding(rows)
+    spread = sigma or max(float(scatter), least)
     gains = {shape: np.zeros(1 + _NULLS) for shape in FURTHER}
     left = np.zeros(1 + _NULLS)  # squares that the base law leaves
     for name, r in rows.items():
@@ -227,7 +237,7 @@ def _family(rows: Mapping[str, Rows], fits: Mapping, sigma: float | None, rng: n
         for shape in FURTHER:
             gains[shape] += np.maximum(captured(shape.bases(r.delta_m), y).max(axis=0) - base, 0.0)
     for shape, gain in gains.items():
-        rest = np.maximum(left - gain, 1e-12 * spread**2)
+        rest = np.maximum(left - gain, n * least**2)  # an exact fit to rounded numbers is no miracle
         gains[shape] = gain / sigma**2 if sigma else n * np.log(np.maximum(left, rest) / rest)
     largest = np.max([gain[1:] for gain in gains.values()], axis=0)
     return {shape: (1 + int(np.sum(largest >= gain[0]))) / (1 + _NULLS) for shape, gain in gains.items()}

@@ -10,11 +10,12 @@ import numpy as np
 
 from forcegrasp.compare.base_fit import BaseFit, check_gradient, fit_base
 from forcegrasp.compare.comparison import Comparison
-from forcegrasp.compare.diagnose import Diagnosis, diagnose, numerical_floor, polish, refine
+from forcegrasp.compare.diagnose import Diagnosis, diagnose, polish, refine
 from forcegrasp.compare.fit import Fit, Simulators, fit_once
+from forcegrasp.compare.floor import numerical_floor
 from forcegrasp.compare.heldout import heldout_residual, make_folds, rms
 from forcegrasp.compare.intervals import intervals, standard_errors, warnings
-from forcegrasp.compare.model_file import Fitted, FoundEffect, Model
+from forcegrasp.effects.model_file import Fitted, FoundEffect, Model
 from forcegrasp.compare.problem import Problem
 from forcegrasp.compare.score import Background, numerical_error, score_effects
 from forcegrasp.compare.target import Target, make_target

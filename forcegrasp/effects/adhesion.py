@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from forcegrasp.effects.base import Effect, Parameter
+from forcegrasp.effects.touch import Touch
 
 
 class Adhesion(Effect):
@@ -24,17 +25,13 @@ class Adhesion(Effect):
     order = 2
 
     def reset(self, which: np.ndarray) -> None:
-        if not hasattr(self, "_surface"):
-            self._surface, self._bonded = np.zeros((len(self.values), 2)), np.zeros((len(self.values), 2), bool)
-        self._surface[which], self._bonded[which] = -np.inf, False
+        if not hasattr(self, "_touch"):
+            self._touch, self._bonded = Touch(len(self.values)), np.zeros((len(self.values), 2), bool)
+        self._touch.reset(which)
+        self._bonded[which] = False
 
     def _pull(self, force: np.ndarray) -> np.ndarray:
-        plant, rows = self.plant, self.rows
-        # how far a pad stands from the object's middle; the right finger stands on its positive side
-        reach = plant.position[rows] + plant.pad_shift_m[rows] + plant.object_position[rows, None] * np.array([1, -1])
-        # The object's surface is where it was first felt: a contact that opens has no force left long before it ends.
-        self._surface = np.where(force > 0, np.maximum(self._surface, reach), self._surface)
-        gap = np.maximum(reach - self._surface, 0.0)
+        gap = np.maximum(-self._touch.depth(self.plant, self.rows, force), 0.0)
         distance = np.maximum(self["distance_m"], 1e-9)
         self._bonded = (self._bonded | (force > 0)) & (gap < distance)
         return np.where(self._bonded, self["force_n"] * (1 - np.minimum(gap / distance, 1.0)), 0.0)

@@ -41,6 +41,8 @@ class Effect:
       values: parameter values, ``(rows, len(parameters))``.
       dt: physics step, seconds.
       variant: which of the class's ``variants``; the first by default.
+      largest: the largest parameter values that will be written into ``values`` before a later reset,
+        ``(parameters,)``; by default they stay.
 
     Raises:
       ValueError: if ``values`` has another shape, or there is no such variant.
@@ -59,7 +61,7 @@ class Effect:
     #: Position among the effects of the same stage; smaller acts first.
     order: ClassVar[int] = 0
 
-    def __init__(self, values: np.ndarray, dt: float, variant: str = "") -> None:
+    def __init__(self, values: np.ndarray, dt: float, variant: str = "", largest: np.ndarray | None = None) -> None:
         self.values = np.asarray(values, float)
         if self.values.ndim != 2 or self.values.shape[1] != len(self.parameters):
             raise ValueError(f"{self.name} takes values of shape (rows, {len(self.parameters)})")
@@ -67,6 +69,7 @@ class Effect:
         if self.variant not in self.variants:
             raise ValueError(f"{self.name} has no variant {variant!r}: {', '.join(self.variants)}")
         self.dt = dt
+        self.largest = np.zeros(len(self.parameters)) if largest is None else np.asarray(largest, float)
         self.plant: Plant | None = None
         self.rows = np.arange(len(self.values))
         #: Rows whose readings are new, ``(rows, 1)``; when others are reset, a row is read again where it stands.
@@ -77,6 +80,11 @@ class Effect:
         """A parameter as a column ``(rows, 1)``, to combine with arrays of both fingers."""
         index = [p.name for p in self.parameters].index(parameter)
         return self.values[:, index : index + 1]
+
+    def longest(self, parameter: str) -> float:
+        """The largest value that a parameter will have: what it has, unless it is drawn anew at resets."""
+        index = [p.name for p in self.parameters].index(parameter)
+        return float(max(self.values[:, index].max(initial=0.0), self.largest[index]))
 
     def attach(self, plant: Plant, rows: np.ndarray) -> Effect:
         """Puts the effect into a plant, on these rows of it."""
@@ -175,20 +183,21 @@ class DelayLine:
     """Delays a signal ``(rows, 2)`` by a real number of steps, mixing the two nearest samples.
 
     Args:
-      steps: delay of each row in steps, ``(rows,)``, at least 0.
+      rows: number of rows.
+      longest: longest delay that any of them will have, in steps.
     """
 
-    def __init__(self, steps: np.ndarray) -> None:
-        self._whole = np.floor(steps).astype(int)
-        self._part = (steps - self._whole)[:, None]
-        self._length = int(self._whole.max(initial=0)) + 2
-        self._memory = np.full((self._length, len(steps), 2), math.nan)
-        self._rows = np.arange(len(steps))
-        self._now = np.zeros(len(steps), dtype=int)
+    def __init__(self, rows: int, longest: float) -> None:
+        self._length = int(longest) + 2
+        self._memory = np.full((self._length, rows, 2), math.nan)
+        self._whole, self._now, self._rows = np.zeros(rows, int), np.zeros(rows, int), np.arange(rows)
+        self._part = np.zeros((rows, 1))
 
-    def reset(self, which: np.ndarray) -> None:
-        """Forgets the past of these rows."""
+    def reset(self, which: np.ndarray, steps: np.ndarray) -> None:
+        """Forgets the past of these rows and gives them a delay in steps, ``(len(which),)``."""
         self._memory[:, which] = math.nan
+        self._whole[which] = np.floor(steps)
+        self._part[which, 0] = steps - np.floor(steps)
 
     def __call__(self, signal: np.ndarray, past: np.ndarray | None = None, new: np.ndarray | bool = True) -> np.ndarray:
         """Takes this step's value and returns the delayed one.

@@ -22,8 +22,8 @@ class CommandDelay(Effect):
 
     def reset(self, which: np.ndarray) -> None:
         if not hasattr(self, "_line"):
-            self._line = DelayLine(self["delay_s"][:, 0] / self.dt)
-        self._line.reset(which)
+            self._line = DelayLine(len(self.values), self.longest("delay_s") / self.dt)
+        self._line.reset(which, self["delay_s"][which, 0] / self.dt)
 
     def command(self, command: np.ndarray, fresh: np.ndarray) -> np.ndarray:
         return self._line(command, past=self.position)

@@ -22,8 +22,8 @@ class ForceDelay(Effect):
 
     def reset(self, which: np.ndarray) -> None:
         if not hasattr(self, "_line"):
-            self._line = DelayLine(self["delay_s"][:, 0] / self.dt)
-        self._line.reset(which)
+            self._line = DelayLine(len(self.values), self.longest("delay_s") / self.dt)
+        self._line.reset(which, self["delay_s"][which, 0] / self.dt)
 
     def read_force(self, force: np.ndarray) -> np.ndarray:
         return self._line(force, new=self.new_reading[:, 0])

@@ -17,6 +17,7 @@ from forcegrasp.config import (
     SensorConfig,
     validate,
 )
+from forcegrasp.effects.model_file import Model
 from forcegrasp.env.grasp_env import GraspEnv
 from forcegrasp.physics import GraspParameters
 from forcegrasp.physics.sampling import OPEN_M
@@ -50,12 +51,14 @@ def build_env(
     action: ActionConfig | None = None,
     reward: RewardConfig | None = None,
     sampler: Callable[[np.random.Generator, np.ndarray], GraspParameters] | None = None,
+    model: Model | None = None,
     seed: int = 0,
 ) -> TransformedEnv:
     """Returns ``n`` grasps with ``observation`` ``(n, 10 · frames)`` in and ``action`` ``(n, 2)`` in [−1, 1] out.
 
     Readings come first (noise), then what is computed from readings (contact, error), then memory, then the stacked
     observation; on the way back the action is denormalised, then biased. Parts left out use their defaults.
+    A ``model`` fitted to measurements brings its base parameters and effects, drawn anew for every grasp.
 
     Raises:
       ConfigError: if an option is out of its range.
@@ -66,7 +69,7 @@ def build_env(
         validate(part, f"{name}.")
     transforms = [
         ObservationNoise(
-            in_keys=["joint_position", "force"],
+            in_keys=["measured_position", "measured_force"],
             out_keys=["sensed_position", "sensed_force"],
             std=[sensors.position_std_m, sensors.force_std_n],
         ),
@@ -82,7 +85,7 @@ def build_env(
     if action.inductive_bias:
         transforms.append(InductiveBias(action.bias_one_contact, action.bias_floor))
     transforms.append(ActionScale(action.max_delta_m))
-    env = TransformedEnv(GraspEnv(n, physics, grasp, reward, sampler), Compose(*transforms))
+    env = TransformedEnv(GraspEnv(n, physics, grasp, reward, sampler, model=model), Compose(*transforms))
     seed_env(env, seed)
     return env
 

@@ -12,6 +12,8 @@ from torchrl.data import Bounded, Categorical, Composite, Unbounded
 from torchrl.envs import EnvBase
 
 from forcegrasp.config import GraspConfig, PhysicsConfig, RewardConfig, validate
+from forcegrasp.effects.model_file import Model
+from forcegrasp.effects.variation import ModelVariation
 from forcegrasp.env.reward import force_reward, normalised_force_reward, object_penalty
 from forcegrasp.physics import GraspParameters, GraspSampler, GraspSimulator
 from forcegrasp.physics.sampling import OPEN_M
@@ -19,8 +21,10 @@ from forcegrasp.physics.sampling import OPEN_M
 #: The entries a step writes beside reward and done, with shape and meaning.
 OBSERVATIONS = {
     "joint_position": (2, "finger positions (left, right), metres; 0 closed, 0.045 open"),
+    "measured_position": (2, "what the encoders say, before noise (left, right), metres"),
     "commanded_position": (2, "q_des held during the step (left, right), metres"),
     "force": (2, "true fingertip forces (left, right), newtons"),
+    "measured_force": (2, "what the force sensors say, before noise (left, right), newtons"),
     "goal_force": (1, "goal force of each finger, newtons"),
     "object_position": (1, "object position along the grasp axis, metres"),
     "object_speed": (1, "|change of object position|, metres per control step"),
@@ -44,6 +48,8 @@ class GraspEnv(EnvBase):
       reward: form, weights and velocity threshold.
       sampler: what to draw grasps with instead, ``(rng, ids) -> GraspParameters``.
       seed: seed of the sampler's generator.
+      model: a fitted model to draw grippers from, with the effects found in it; nominal by default. It overrides
+        the range of b2.
 
     Raises:
       ConfigError: if an option is out of its range.
@@ -58,6 +64,7 @@ class GraspEnv(EnvBase):
         reward: RewardConfig | None = None,
         sampler: Callable[[np.random.Generator, np.ndarray], GraspParameters] | None = None,
         seed: int = 0,
+        model: Model | None = None,
     ) -> None:
         super().__init__(device="cpu", batch_size=torch.Size([n]))
         physics, grasp = physics or PhysicsConfig(), grasp or GraspConfig()
@@ -66,7 +73,8 @@ class GraspEnv(EnvBase):
             validate(part, f"{name}.")
         self.sampler = sampler or GraspSampler(grasp)
         self.episode_steps = grasp.steps
-        self.simulator = GraspSimulator(n, physics.tier, physics.threads)
+        variation = None if model is None else ModelVariation(model)
+        self.simulator = GraspSimulator(n, physics.tier, physics.threads, variation)
         self.set_seed(seed)
         self._make_specs(n)
 
@@ -88,7 +96,7 @@ class GraspEnv(EnvBase):
     def _reset(self, tensordict: TensorDictBase | None = None, **kwargs) -> TensorDictBase:
         mask = None if tensordict is None else tensordict.get("_reset", None)
         ids = np.arange(self.simulator.n) if mask is None else np.flatnonzero(mask.numpy().reshape(-1))
-        self.simulator.reset(self.sampler(self.rng, ids), ids)
+        self.simulator.reset(self.sampler(self.rng, ids), ids, self.rng)
         return self._state().update(self._done())
 
     def _step(self, tensordict: TensorDictBase) -> TensorDictBase:
@@ -116,8 +124,10 @@ class GraspEnv(EnvBase):
         return TensorDict(
             {
                 "joint_position": column(simulator.joint_position),
+                "measured_position": column(simulator.measured_position),
                 "commanded_position": column(simulator.commanded_position),
                 "force": force,
+                "measured_force": column(simulator.measured_force),
                 "goal_force": goal,
                 "object_position": column(simulator.object_position),
                 "object_speed": speed,

@@ -18,6 +18,7 @@ from tensordict.nn import TensorDictModuleBase
 
 from forcegrasp.config import ActionConfig, EvaluateConfig, ObservationConfig, RewardConfig, TrainConfig
 from forcegrasp.controllers import CONTROLLERS, make_controller
+from forcegrasp.effects.variation import read_tiago_model
 from forcegrasp.env.episodes import FIGURES, summarise
 from forcegrasp.errors import ConfigError
 from forcegrasp.evaluate.plots import force_traces, softness_boxes
@@ -80,6 +81,7 @@ def evaluate(config: EvaluateConfig, out: Path, console: Console | None = None) 
     """
     console = console or Console()
     torch.set_num_threads(1)
+    model = read_tiago_model(config.model) if config.model else None
     contestants = load_contestants(config.policies)
     grasps = kappa_grid(config.grasp, config.kappas, config.trials, config.seed)
     kappas = np.linspace(*config.grasp.kappa, config.kappas)
@@ -93,6 +95,7 @@ def evaluate(config: EvaluateConfig, out: Path, console: Console | None = None) 
             config.seed,
             physics=config.physics,
             sensors=config.sensors,
+            model=model,
             reward=RewardConfig(speed_threshold_m=config.speed_threshold_m),
             action=contestant.action,
             observation=contestant.observation,

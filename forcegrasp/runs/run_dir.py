@@ -21,6 +21,8 @@ from omegaconf.errors import OmegaConfBaseException
 from torch import Tensor
 
 from forcegrasp.config import TrainConfig, validate
+from forcegrasp.effects.model_file import Model, write_model
+from forcegrasp.effects.variation import read_tiago_model
 from forcegrasp.errors import CheckpointError, ConfigError
 from forcegrasp.runs import checkpoint
 
@@ -63,6 +65,20 @@ class RunDir:
         except OSError as error:
             raise CheckpointError(f"{run.path}: could not make the run directory ({error.strerror})") from error
         return run
+
+    def model(self, config: TrainConfig) -> Model | None:
+        """The fitted model that the run trains with, if any; the run keeps a copy, so that it can be resumed without it.
+
+        Raises:
+          ConfigError: if it can't be read.
+          CheckpointError: if the copy can't be written.
+        """
+        if not config.model:
+            return None
+        copy = self.path / "model.yaml"
+        if not copy.exists():
+            write_model(read_tiago_model(config.model), copy)
+        return read_tiago_model(copy)
 
     @classmethod
     def open(cls, path: Path | str) -> RunDir:

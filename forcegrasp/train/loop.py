@@ -17,6 +17,7 @@ from torchrl.envs import TransformedEnv
 from forcegrasp.config import TrainConfig
 from forcegrasp.controllers.policy import make_policy
 from forcegrasp.curriculum import CurriculumHook, LinearSchedule
+from forcegrasp.effects.model_file import Model
 from forcegrasp.env import build_env
 from forcegrasp.env.episodes import summarise
 from forcegrasp.runs.run_dir import RunDir
@@ -29,12 +30,13 @@ class Trainer:
 
     Args:
       config: the whole configuration.
+      model: what ``config.model`` names; nominal gripper by default.
 
     Raises:
       ConfigError: if an option is out of its range.
     """
 
-    def __init__(self, config: TrainConfig) -> None:
+    def __init__(self, config: TrainConfig, model: Model | None = None) -> None:
         self.config = config
         self.frames = self.batches = 0
         torch.set_num_threads(1)  # the physics needs the cores
@@ -48,6 +50,7 @@ class Trainer:
             observation=config.observation,
             action=config.action,
             reward=config.reward,
+            model=model,
             seed=config.seed,
         )
         schedule = LinearSchedule(config.curriculum, config.grasp, config.reward, config.ppo.total_frames)
@@ -117,7 +120,7 @@ def train(config: TrainConfig, run: RunDir, resume: bool = False) -> bool:
     Raises:
       ConfigError, CheckpointError, PhysicsError: with what to do about it.
     """
-    trainer = Trainer(config)
+    trainer = Trainer(config, run.model(config))
     total = config.ppo.total_frames
     collector = trainer.collector()
     if resume:

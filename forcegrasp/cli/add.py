@@ -1,0 +1,75 @@
+"""``forcegrasp add``: a model with one more effect."""
+
+from __future__ import annotations
+
+from forcegrasp.cli.options import compose, help_text
+from forcegrasp.cli.results import default_out, narrator, need
+from forcegrasp.errors import ConfigError
+
+PURPOSE = "add an effect to a model, fit it again, and see the error fall"
+NOTES = """
+  data=my_set      the grasps to fit to
+  model=FILE       what forcegrasp fit or add wrote
+  effect=NAME      see forcegrasp effects; forcegrasp diagnose tells which
+  out=better.yaml  is written if the error on held-out grasps falls; the report goes into runs/add_TIME
+"""
+#: The error must fall to less than this share.
+LEAST_FALL = 0.995
+
+
+def main(arguments: list[str]) -> int:
+    """Runs the verb; returns the exit status."""
+    if any(a in ("-h", "--help") for a in arguments):
+        print(help_text("add", PURPOSE, NOTES), end="")
+        return 0
+    config = compose("add", arguments)
+    data = need(config.data, "data", "my_set")
+    old = need(config.model, "model", "model.yaml")
+    need(config.effect, "effect", "backlash")
+
+    from rich.console import Console
+
+    from forcegrasp.cli.measuring import (
+        check_effects,
+        check_file,
+        check_folder,
+        refuse_table,
+        tell_warnings,
+        write_results,
+    )
+    from forcegrasp.compare import fit_output, workflow
+    from forcegrasp.effects.model_file import read_model, write_model
+
+    (effect,) = check_effects("effect", [config.effect])
+    folder = check_folder(default_out("add", ""))
+    path = check_file(folder / "model.yaml" if not config.out else need(config.out, "out", "better.yaml"))
+    loaded = workflow.load(data)
+    refuse_table(loaded, "add")
+    if len(loaded.measured.grasps) < 2:
+        raise ConfigError(f"data={data}: has one grasp, so that none can be held out to tell whether the error falls")
+    model = read_model(old)
+    tell_warnings(loaded)
+    added = workflow.add_effect(loaded, model, effect, narrator())
+    before, after = added.error_before, added.error_after
+    if not after < LEAST_FALL * before:
+        raise ConfigError(
+            f"effect={effect.name}: the error on held-out grasps does not fall ({before:.3f} × noise without,"
+            f" {after:.3f} × with it); not written. To see what helps: forcegrasp diagnose data={data} model={old}"
+        )
+    lead = fit_output.add_answer(added, effect)
+    console = Console(highlight=False)
+    console.print(fit_output.printed_fall(added))
+    console.print(fit_output.printed_parameters(added.model))
+    print("\n".join([lead, *(f"warning: {warning}" for warning in added.model.warnings)]))
+    write_model(added.model, path)
+    print(f"wrote {path}. Train with it: forcegrasp train model={path}")
+    write_results(
+        folder,
+        "add",
+        fit_output.add_json(added, effect, loaded.measured.name, path),
+        f"{effect.name} added: {loaded.measured.name}",
+        lead,
+        fit_output.add_sections(added, effect),
+        loaded,
+    )
+    return 0

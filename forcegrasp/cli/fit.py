@@ -1,0 +1,56 @@
+"""``forcegrasp fit``: a gripper's base model from measurements."""
+
+from __future__ import annotations
+
+import dataclasses
+
+from forcegrasp.cli.options import compose, help_text
+from forcegrasp.cli.results import default_out, narrator, need
+
+PURPOSE = "fit a gripper's base model to measured grasps and write it as a file"
+NOTES = """
+  data=my_set      a folder with meta.yaml, grasps.csv and samples.csv (or samples.parquet)
+  out=model.yaml   text that may be edited: values with 95 % intervals; the report goes into runs/fit_TIME
+"""
+
+
+def main(arguments: list[str]) -> int:
+    """Runs the verb; returns the exit status."""
+    if any(a in ("-h", "--help") for a in arguments):
+        print(help_text("fit", PURPOSE, NOTES), end="")
+        return 0
+    config = compose("fit", arguments)
+    data = need(config.data, "data", "my_set")
+
+    from rich.console import Console
+
+    from forcegrasp.cli.measuring import check_file, check_folder, refuse_table, tell_warnings, write_results
+    from forcegrasp.compare import fit_output, workflow
+    from forcegrasp.compare.score import numerical_error
+    from forcegrasp.effects.model_file import write_model
+
+    folder = check_folder(default_out("fit", ""))
+    path = check_file(folder / "model.yaml" if not config.out else need(config.out, "out", "model.yaml"))
+    loaded = workflow.load(data)
+    refuse_table(loaded, "fit")
+    tell_warnings(loaded)
+    target, _, base = workflow.fit_model(loaded, config.seed, narrator())
+    model = workflow.model_of(base.fit, loaded, numerical_error(base.fit, target))
+    if not base.converged:
+        model = dataclasses.replace(model, warnings=(f"the fit did not converge: {base.reason}", *model.warnings))
+    lead = fit_output.fit_answer(base, target)
+    console = Console(highlight=False)
+    console.print(fit_output.printed_parameters(model))
+    print("\n".join([lead, *(f"warning: {warning}" for warning in model.warnings)]))
+    write_model(model, path)
+    print(f"wrote {path}. Which effect is missing? forcegrasp diagnose data={data} model={path}")
+    write_results(
+        folder,
+        "fit",
+        fit_output.fit_json(base, target, model, loaded.measured.name, path),
+        f"Base model of {loaded.measured.name}",
+        lead,
+        fit_output.fit_sections(base, target, model),
+        loaded,
+    )
+    return 0

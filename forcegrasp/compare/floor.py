@@ -1,0 +1,62 @@
+"""The error that even a perfect model leaves, and whether there is more."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from forcegrasp.compare.heldout import rms
+from forcegrasp.compare.target import PHASES, Target
+
+# Room for what the estimate of the floor misses: in all, and in a single signal and phase.
+_ROOM, _ROOM_IN_CELL = 1.03, 1.15
+# A residual beyond this many σ, and three times the numerical error there, is no noise; a few may be mishaps.
+_OUTLIER, _MISHAPS = 5.0, 3
+# Cells with fewer samples say nothing.
+_LEAST_SAMPLES = 40
+
+
+def numerical_floor(numerical: Sequence[np.ndarray], target: Target, where: np.ndarray | None = None) -> float:
+    """rms residual ÷ noise that sensor noise and the model's own numerical error leave.
+
+    Args:
+      numerical: from :func:`~forcegrasp.compare.score.numerical_error`, each ``(G, S, 4)``.
+      target: the measurements.
+      where: choice of samples and signals, ``(G, S, 4)``.
+    """
+    half, other = (rms(n, target, where) for n in numerical)
+    # Halving the step shows about half of what the step costs in all.
+    return float(np.sqrt(1 + 4 * half**2 + other**2))
+
+
+def excess(residual: np.ndarray, numerical: Sequence[np.ndarray], target: Target) -> str:
+    """Where residuals show more than sensor noise and numerical error; empty if nowhere.
+
+    Args:
+      residual: in units of the noise, ``(G, S, 4)``.
+      numerical: as for :func:`numerical_floor`.
+      target: the measurements.
+    """
+    error, floor = rms(residual, target), numerical_floor(numerical, target)
+    if error > floor * _ROOM:
+        return f"{error:.2f} × noise in all, {floor:.2f} is the floor"
+    for name, where in cells(target):
+        error, floor = rms(residual, target, where), numerical_floor(numerical, target, where)
+        if error > floor * _ROOM_IN_CELL:
+            return f"{name}: {error:.2f} × noise, {floor:.2f} is the floor"
+    far = np.abs(residual) > _OUTLIER + 3 * (2 * np.abs(numerical[0]) + np.abs(numerical[1]))
+    if far.sum() > max(_MISHAPS, 2e-4 * target.mask.sum() * 4):
+        return f"{far.sum()} readings are more than {_OUTLIER:g} σ off"
+    return ""
+
+
+def cells(target: Target) -> list[tuple[str, np.ndarray]]:
+    """Positions and forces in each phase that has samples enough: name and mask ``(G, S, 4)``."""
+    found = []
+    for index, phase in enumerate(PHASES):
+        inside = target.phase == index
+        if inside.sum() >= _LEAST_SAMPLES:
+            for kind, signals in (("positions", (1, 1, 0, 0)), ("forces", (0, 0, 1, 1))):
+                found.append((f"{kind}, {phase.replace('_', ' ')}", inside[:, :, None] & np.array(signals, bool)))
+    return found

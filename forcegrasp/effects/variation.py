@@ -1,0 +1,59 @@
+"""Draws grippers from a fitted model: every episode another one within the fitted intervals."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from forcegrasp.effects.model_file import Fitted, Model, read_model
+from forcegrasp.errors import ConfigError
+from forcegrasp.physics.plant import Plant
+
+
+def read_tiago_model(path: Path | str) -> Model:
+    """Reads a model that the learning environment can simulate.
+
+    Raises:
+      ConfigError: if it can't be read, or is of another gripper.
+    """
+    model = read_model(Path(path))
+    if model.gripper.name != "tiago":
+        raise ConfigError(f"model={path}: is of gripper {model.gripper.name}; the environment simulates tiago")
+    return model
+
+
+class ModelVariation:
+    """A fitted model whose numbers are drawn uniformly from their 95 % intervals at each reset.
+
+    Args:
+      model: base parameters of the gripper, and the effects that were found.
+    """
+
+    def __init__(self, model: Model) -> None:
+        self.model = model
+
+    def attach(self, plant: Plant) -> None:
+        """Puts the model's effects into a plant, on all of its rows."""
+        rows = np.arange(plant.n)
+        self._effects = []
+        for found in self.model.effects:
+            largest = np.array([found.parameters[p.name].high for p in found.effect.parameters])
+            self._effects.append(
+                found.effect(np.repeat(found.values[None], plant.n, axis=0), plant.dt, found.variant, largest)
+            )
+        plant.attach([(effect, rows) for effect in self._effects])
+
+    def draw(self, rng: np.random.Generator, ids: np.ndarray) -> dict[str, np.ndarray]:
+        """Draws effects for these rows, and returns base parameters for them, each ``(len(ids),)``."""
+        base = {name: _within(fitted, rng, len(ids)) for name, fitted in self.model.base.items()}
+        for effect, found in zip(self._effects, self.model.effects, strict=True):
+            for column, parameter in enumerate(effect.parameters):
+                effect.values[ids, column] = _within(found.parameters[parameter.name], rng, len(ids))
+        return base
+
+
+def _within(fitted: Fitted, rng: np.random.Generator, count: int) -> np.ndarray:
+    if fitted.low == fitted.high:  # also where both are infinite
+        return np.full(count, fitted.value)
+    return rng.uniform(fitted.low, fitted.high, count)
