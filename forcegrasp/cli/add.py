@@ -58,7 +58,7 @@ def main(arguments: list[str]) -> int:
         )
     lead = fit_output.add_answer(added, effect)
     console = Console(highlight=False)
-    console.print(fit_output.printed_fall(added))
+    console.print(fit_output.printed_fall(added, effect))
     console.print(fit_output.printed_parameters(added.model))
     print("\n".join([lead, *(f"warning: {warning}" for warning in added.model.warnings)]))
     write_model(added.model, path)

@@ -26,7 +26,7 @@ def main(arguments: list[str]) -> int:
 
     from forcegrasp.cli.measuring import check_file, check_folder, refuse_table, tell_warnings, write_results
     from forcegrasp.compare import fit_output, workflow
-    from forcegrasp.compare.score import numerical_error
+    from forcegrasp.compare.floor import numerical_error
     from forcegrasp.effects.model_file import write_model
 
     folder = check_folder(default_out("fit", ""))
@@ -35,7 +35,7 @@ def main(arguments: list[str]) -> int:
     refuse_table(loaded, "fit")
     tell_warnings(loaded)
     target, _, base = workflow.fit_model(loaded, config.seed, narrator())
-    model = workflow.model_of(base.fit, loaded, numerical_error(base.fit, target))
+    model = workflow.model_of(base.fit, target, loaded, numerical_error(base.fit, target))
     if not base.converged:
         model = dataclasses.replace(model, warnings=(f"the fit did not converge: {base.reason}", *model.warnings))
     lead = fit_output.fit_answer(base, target)

@@ -15,11 +15,11 @@ from forcegrasp.compare.heldout import rms
 from forcegrasp.compare.report import Picture, Section, Table, Text
 from forcegrasp.compare.target import PHASES, SIGNALS, UNITS, Target
 
-#: Error ÷ floor up to which a model is as good as the data can tell.
-AT_FLOOR = 1.03
-#: Error ÷ noise beyond which a cell is marked.
+# Error ÷ floor up to which a model is as good as the data can tell.
+_AT_FLOOR = 1.03
+# Error ÷ noise beyond which a cell is marked.
 _MARKED = 2.0
-#: What the residual is drawn against.
+# What the residual is drawn against.
 _DRAWN = ("time_since_contact_s", "velocity_m_s", "direction", "force_n", "command_m")
 _WORST = 3
 # Share of the error below which what it goes with is no news.
@@ -39,7 +39,11 @@ def words(name: str) -> str:
 
 def noise_sentence(target: Target) -> str:
     """The sensor noise that errors are divided by, and where it is from."""
-    noise = f"sensor noise: positions {amount(target.sigma[0], 'm')}, forces {amount(target.sigma[2], 'N')}"
+    sigma, quantum = target.sensor_sigma, target.quantum
+    noise = f"sensor noise: positions {amount(sigma[0], 'm')}, forces {amount(sigma[2], 'N')}"
+    steps = [f"{kind} {amount(quantum[k], UNITS[k])}" for kind, k in (("positions", 0), ("forces", 2)) if quantum[k]]
+    if steps:
+        noise += f" (and readings come in steps: {', '.join(steps)}; that adds to the noise)"
     if target.sigma_known:
         return f"{noise}, as given with the set"
     return (
@@ -95,6 +99,11 @@ def _cell_json(cell: Cell) -> dict[str, Any]:
     return {f"rms_{unit}": cell.rms, "ratio": cell.ratio, f"bias_{unit}": cell.bias, "samples": cell.samples}
 
 
+def at_floor(error: float, floor: float) -> bool:
+    """Whether a model is as good as the data can tell."""
+    return error <= max(floor, 1.02) * _AT_FLOOR
+
+
 def worst_cell(cells: list[Cell]) -> Cell:
     """The signal and phase with the largest error ÷ noise; a handful of samples does not count."""
     many = [cell for cell in cells if cell.samples >= 40]
@@ -111,7 +120,7 @@ def answer(comparison: Comparison) -> str:
     else:
         where = "on the grasps that it was fitted to (too few to hold any out)"
     total = f"The model's error {where} is {value:.2f} × the sensor noise; up to {floor:.2f} is noise."
-    if value <= max(floor, 1.02) * AT_FLOOR:
+    if at_floor(value, floor):
         return f"{total} These measurements show no failure of the model."
     return (
         f"{total} It is largest in {words(cell.phase)}, {words(cell.signal)}: {amount(cell.rms, cell.unit)},"
@@ -121,7 +130,7 @@ def answer(comparison: Comparison) -> str:
 
 def printed(comparison: Comparison) -> Printed:
     """Error per phase and signal, for the terminal."""
-    table = Printed("error, × noise", box=box.SIMPLE_HEAD, padding=(0, 1))
+    table = Printed("phase", box=box.SIMPLE_HEAD, padding=(0, 1))
     for signal in SIGNALS:
         table.add_column(words(signal), no_wrap=True)
     cells = {(cell.phase, cell.signal): cell for cell in comparison.cells()}
@@ -152,7 +161,7 @@ def details(comparison: Comparison) -> list[str]:
     ]
     lines = [f"worst grasps: {', '.join(worst)}"]
     name, kind, share = comparison.explanations()[0]
-    if share >= _WORTH_TELLING:
+    if share >= _WORTH_TELLING and not at_floor(comparison.floor_ratio(), comparison.floor):
         lines.append(f"{share:.0%} of the {kind} error goes with {covariate_words(name)}")
     return [*lines, noise_sentence(target)]
 
@@ -222,8 +231,8 @@ def _by_signal_and_phase(comparison: Comparison) -> Section:
             Table(head, rows, frozenset(i for i, cell in enumerate(cells) if cell.ratio > _MARKED)),
             Text(f"S{noise_sentence(comparison.target)[1:]}."),
             Text(
-                f"Held-out error {comparison.floor_ratio():.3f} × noise. Floor {comparison.floor:.3f} × noise: the sensor"
-                " noise, and what what step and collision code of the simulation add."
+                f"Held-out error {comparison.floor_ratio():.3f} × noise. Floor {comparison.floor:.3f} × noise: sensor"
+                " noise, and what the simulation's own step and collision code add."
             ),
         ],
     )

@@ -9,12 +9,13 @@ import numpy as np
 
 from forcegrasp.compare.base_fit import BaseFit
 from forcegrasp.compare.fit import Fit, Simulators, fit_once
-from forcegrasp.compare.floor import cells, excess, numerical_floor
+from forcegrasp.compare.floor import beyond_fit, cells, excess, numerical_error, numerical_floor
 from forcegrasp.compare.heldout import heldout_residual, log_likelihood, make_folds, rms
 from forcegrasp.compare.problem import Problem
-from forcegrasp.compare.score import Background, Score, null_gains, numerical_error, score_effects
+from forcegrasp.compare.score import Background, Score, null_gains, score_effects
 from forcegrasp.compare.target import Target
 from forcegrasp.effects import Effect
+from forcegrasp.effects.quantisation import Quantisation
 
 #: Largest number of effects that are looked for.
 MOST_EFFECTS = 4
@@ -113,13 +114,18 @@ def diagnose(
     """
     folds = tuple(make_folds(target.grasps))
     fit = base.fit
-    error_before = rms(heldout_residual(fit, target, folds), target)
+    # what rounding adds to the noise is an error as long as nobody has noticed it
+    error_before = rms(heldout_residual(fit, target, folds) * (target.sigma / target.sensor_sigma), target)
     if not base.converged:
         return Diagnosis("not_fitted", (), (), base, fit, target, folds, error_before, error_before)
-    numerical = tuple(numerical_error(fit, target))
+    numerical = beyond_fit(fit, numerical_error(fit, target))
     floor = numerical_floor(numerical, target)
     steps: list[Step] = []
-    while len(steps) < MOST_EFFECTS:
+    if target.quantum.any():
+        error = rms(heldout_residual(fit, target, folds), target)
+        progress("found quantisation: readings are multiples of one step")
+        steps.append(Step("effect", (Quantisation.name,), (), (), error_before, error))
+    for _ in range(MOST_EFFECTS):
         known = {effect for effect, _ in fit.problem.effects}
         step = _look_further(
             target, fit, simulators, [e for e in effects if e not in known], folds, numerical, rng, progress

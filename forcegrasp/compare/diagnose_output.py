@@ -12,15 +12,22 @@ from rich.text import Text as Plain
 
 from forcegrasp.compare import figures
 from forcegrasp.compare.advice import Advice
-from forcegrasp.compare.compare_output import covariate_words, dependence_section, noise_sentence, words, worst_cell
+from forcegrasp.compare.compare_output import (
+    covariate_words,
+    dependence_section,
+    noise_sentence,
+    words,
+    worst_cell,
+)
 from forcegrasp.compare.comparison import Comparison
 from forcegrasp.compare.diagnose import Candidate, Diagnosis, Step
 from forcegrasp.compare.fit import Fit
-from forcegrasp.compare.fit_output import ADVICE, symptom_picture
+from forcegrasp.compare.fit_output import ADVICE, steps_picture, symptom_picture
 from forcegrasp.compare.intervals import intervals, standard_errors
 from forcegrasp.compare.report import Picture, Section, Table, Text
 from forcegrasp.compare.target import PHASES
 from forcegrasp.effects import Effect, get_effect
+from forcegrasp.effects.quantisation import Quantisation
 
 _PRINTED = 5
 
@@ -77,26 +84,37 @@ def _candidate_json(candidate: Candidate) -> dict[str, Any]:
 
 def ranking(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     """Effects of the first step, best first: those that were refitted, and then those whose signatures were poor."""
-    if not diagnosis.steps:
-        return []
-    first = diagnosis.steps[0]
-    rows = [_candidate_json(c) for c in first.candidates]
+    nothing = dict.fromkeys(("p_family", "heldout_gain", "floor_ratio_after", "parameters"))
+    rows: list[dict[str, Any]] = []
+    for step in diagnosis.steps:
+        if step.verdict != "none" and not step.candidates:  # found by counting values, without a fit
+            values = {name: entry[0] for name, entry in found_parameters(diagnosis)[step.effects[0]].items()}
+            found = nothing | {"floor_ratio_after": step.error_after, "parameters": values}
+            rows.append({"effect": step.effects[0], "variant": "", **found})
+    first = _first_search(diagnosis)
+    if first is None:
+        return rows
+    rows += [_candidate_json(c) for c in first.candidates]
     seen = {row["effect"] for row in rows}
     for score in first.scores:
         if score.effect.name not in seen:
             seen.add(score.effect.name)
-            nothing = dict.fromkeys(("p_family", "heldout_gain", "floor_ratio_after", "parameters"))
             rows.append({"effect": score.effect.name, "variant": score.variant, **nothing})
     return rows
 
 
 def no_trace(diagnosis: Diagnosis, tried: Sequence[type[Effect]]) -> list[str]:
     """Effects that change nothing in these grasps at any size, so that nothing can be said about them."""
-    if not diagnosis.steps:
+    first = _first_search(diagnosis)
+    if first is None:
         return []
-    scored = {score.effect.name for score in diagnosis.steps[0].scores}
+    scored = {score.effect.name for score in first.scores}
     known = {effect.name for effect, _ in diagnosis.base.fit.problem.effects}
-    return [effect.name for effect in tried if effect.name not in scored | known]
+    return [e.name for e in tried if e.name not in scored | known and len(e.trials())]
+
+
+def _first_search(diagnosis: Diagnosis) -> Step | None:
+    return next((step for step in diagnosis.steps if step.scores), None)
 
 
 def remaining(diagnosis: Diagnosis) -> Comparison:
@@ -126,7 +144,7 @@ def found_steps(diagnosis: Diagnosis) -> list[tuple[Step, Fit]]:
     for step in diagnosis.steps:
         if step.verdict != "none":
             found.append((step, fit))
-            fit = step.candidates[0].fit
+            fit = step.candidates[0].fit if step.candidates else fit
     return found
 
 
@@ -139,6 +157,9 @@ def found_parameters(diagnosis: Diagnosis) -> dict[str, dict[str, tuple[float, f
         if entry.effect >= 0:
             effect = fit.problem.effects[entry.effect][0].name
             found.setdefault(effect, {})[entry.parameter] = (*numbers, entry.unit)
+    if diagnosis.target.quantum.any():
+        steps = zip(Quantisation.parameters, map(float, diagnosis.target.quantum[[0, 2]]), strict=True)
+        found[Quantisation.name] = {p.name: (step, step, step, p.unit) for p, step in steps}
     return found
 
 
@@ -149,7 +170,7 @@ def answer(diagnosis: Diagnosis) -> str:
     found = [step.effects[0] for step, _ in found_steps(d)]
     place = f"{words(cell.signal)}, {words(cell.phase)} ({cell.ratio:.1f} × noise)"
     if d.verdict == "effect":
-        rest = "" if d.error_after <= max(d.floor, 1.02) * 1.03 else f" What is left is largest in {place}."
+        rest = "" if not d.left else f" What is left is largest in {place}."
         return f"The model lacks {_list(d.effects, 'and')}. {fall}; up to {d.floor:.2f} is noise.{rest}"
     if d.verdict == "one_of":
         return f"The model lacks {_list(d.effects, 'or')}: these data can't tell which. {fall} with the first of them."
@@ -169,16 +190,18 @@ def answer(diagnosis: Diagnosis) -> str:
 
 def printed(diagnosis: Diagnosis) -> Printed | None:
     """The best effects of each step, for the terminal."""
-    rows = [(n, step, c) for n, step in enumerate(diagnosis.steps, 1) for c in step.candidates[:_PRINTED]]
-    if not rows:
+    if not any(step.candidates or step.effects for step in diagnosis.steps):
         return None
     table = Printed("", "effect", "gain", "p", "error, × noise", "parameters", box=box.SIMPLE_HEAD)
-    for number, step, candidate in rows:
-        chosen = candidate.effect.name in step.effects
-        first = candidate is step.candidates[0]
-        name, gain, p, values = _texts(candidate)
-        cells = (str(number) if first else "", name, gain, p, _error_text(step, candidate), values)
-        table.add_row(*(Plain(cell, "bold" if chosen else "") for cell in cells))
+    for number, step in enumerate(diagnosis.steps, 1):
+        if step.effects and not step.candidates:
+            fall = f"{step.error_before:.2f} → {step.error_after:.2f}"
+            table.add_row(*(Plain(cell, "bold") for cell in (str(number), step.effects[0], "", "", fall, "")))
+        for place, candidate in enumerate(step.candidates[:_PRINTED]):
+            name, gain, p, values = _texts(candidate)
+            cells = ("" if place else str(number), name, gain, p, _error_text(step, candidate), values)
+            chosen = candidate.effect.name in step.effects
+            table.add_row(*(Plain(cell, "bold" if chosen else "") for cell in cells))
     return table
 
 
@@ -198,7 +221,7 @@ def lines(diagnosis: Diagnosis, advice: Advice | None) -> list[str]:
     """What stands below the table: symptoms, rivals, what is left, and what to record next."""
     told = []
     for step, _ in found_steps(diagnosis):
-        effect = step.candidates[0].effect
+        effect = get_effect(step.effects[0])
         told.append(f"{effect.name}: {effect.symptom}")
         told += [f"  it could also be: {_list(step.effects[1:], 'or')}"] if len(step.effects) > 1 else []
     if diagnosis.verdict in ("unknown", "effect", "one_of"):
@@ -212,7 +235,7 @@ def left_sentence(diagnosis: Diagnosis) -> str:
     """Where the rest of the error is, in words."""
     rest = where(diagnosis)
     place = f"{words(rest['signal'])}, {words(rest['phase'])}: {rest['ratio']:.1f} × noise"
-    if diagnosis.error_after <= max(diagnosis.floor, 1.02):
+    if not diagnosis.left:
         return f"what is left is noise; it is largest in {place}"
     name, share = next(iter(rest["explained_by"].items()))
     goes = f", of which {share:.0%} goes with {covariate_words(name)}" if share > 0.05 else ""
@@ -233,12 +256,15 @@ def sections(diagnosis: Diagnosis, advice: Advice | None, tried: Sequence[type[E
 
 
 def _step_section(number: int, step: Step, before: Fit, diagnosis: Diagnosis) -> Section:
-    best = step.candidates[0]
-    effect = best.effect
+    effect = get_effect(step.effects[0])
+    if step.candidates:
+        seen = symptom_picture(diagnosis.target, before, step.candidates[0].fit, effect)
+    else:
+        seen = steps_picture(diagnosis.target)
     fall = f"Held-out error {step.error_before:.2f} → {step.error_after:.2f} × noise."
     blocks: list = [
         Text(f"Symptom: {effect.symptom}. {fall}", strong=True),
-        symptom_picture(diagnosis.target, before, best.fit, effect),
+        seen,
     ]
     rows = [
         (name, f"{value:.4g}", f"{low:.4g} to {high:.4g}", "" if unit == "1" else unit)
@@ -246,9 +272,9 @@ def _step_section(number: int, step: Step, before: Fit, diagnosis: Diagnosis) ->
     ]
     if rows:
         blocks.append(Table((f"parameter of {effect.name}", "value", "95 % interval", "unit"), rows))
-    alone = len(step.candidates) == 1
+    alone = len(step.candidates) <= 1
     blocks.append(Text("What else it could be:" + (" no other effect comes near." if alone else ""), strong=True))
-    blocks.append(_candidates_table(step))
+    blocks += [_candidates_table(step)] if step.candidates else []
     if len(step.effects) > 1:
         blocks.append(Text(f"{_list(step.effects, 'and')} can't be told apart by these data."))
     blocks.append(Text(f"Looks like {_list(effect.look_alikes, 'and')}. What separates them: {effect.separates}."

@@ -192,6 +192,25 @@ def rivals(
     return figure
 
 
+def steps(target: Target, index: int, signal: int) -> Figure:
+    """Readings of one signal of one grasp around its fastest change, with lines at the multiples of their step."""
+    grasp, quantum = target.grasps[index], target.quantum[signal]
+    unit, factor = SHOWN[UNITS[signal]]
+    values, time = target.signals[index, : len(grasp.time_s), signal], grasp.time_s - grasp.time_s[0]
+    middle = int(np.argmax(np.abs(np.gradient(values)))) if len(values) > 1 else 0
+    shown = slice(max(0, middle - 25), middle + 26)
+    part = values[shown]
+    figure = Figure(figsize=(8.5, 3.2), layout="constrained")
+    axes = figure.subplots()
+    first, last = np.floor(part.min() / quantum), np.ceil(part.max() / quantum)
+    for multiple in np.linspace(first, last, min(60, int(last - first) + 1)).round():
+        axes.axhline(factor * quantum * multiple, color="0.88", lw=0.7, zorder=0)
+    axes.plot(time[shown], factor * part, ".", color=MEASURED, ms=5)
+    axes.set_xlabel("time in grasp [s]")
+    _finish(axes, f"{NAMES[SIGNALS[signal]]} [{unit}]")
+    return figure
+
+
 def intervals(rows: Sequence[tuple[str, float, float, float]]) -> Figure:
     """Where fitted parameters lie between their bounds, 0 to 1, with their 95 % intervals: (name, value, low, high)."""
     figure = Figure(figsize=(7.5, 1.0 + 0.27 * len(rows)), layout="constrained")

@@ -14,14 +14,15 @@ from rich.text import Text as Plain
 
 from forcegrasp.compare import figures
 from forcegrasp.compare.base_fit import BaseFit, rms_error
-from forcegrasp.compare.compare_output import noise_sentence, words
+from forcegrasp.compare.compare_output import amount, noise_sentence, words
 from forcegrasp.compare.fit import Fit
 from forcegrasp.compare.heldout import heldout_residual, make_folds, rms
 from forcegrasp.compare.report import Picture, Section, Table, Text
-from forcegrasp.compare.target import SIGNALS, Target
+from forcegrasp.compare.target import SIGNALS, UNITS, Target
 from forcegrasp.compare.workflow import Added
 from forcegrasp.effects import Effect
 from forcegrasp.effects.model_file import Fitted, Model
+from forcegrasp.effects.quantisation import Quantisation
 
 #: What to do about a fit that did not converge.
 ADVICE = (
@@ -164,18 +165,21 @@ def add_json(added: Added, effect: type[Effect], name: str, path: Path) -> dict[
         "set": name,
         "model": str(path),
         "effect": effect.name,
-        "variant": added.model.effects[-1].variant,
+        "variant": next((e.variant for e in added.model.effects if e.effect is effect), ""),
         "error_before": added.error_before,
         "error_after": added.error_after,
-        "signals": {signal: {"before": before, "after": after} for signal, before, after in _by_signal(added)},
+        "signals": {signal: {"before": before, "after": after} for signal, before, after in _by_signal(added, effect)},
         "parameters": parameters_json(added.model),
         "warnings": list(added.model.warnings),
         "noise_given": added.target.sigma_known,
     }
 
 
-def _by_signal(added: Added) -> list[tuple[str, float, float]]:
+def _by_signal(added: Added, effect: type[Effect]) -> list[tuple[str, float, float]]:
+    """Held-out error ÷ noise of each signal, before and after."""
     held = [held_out(fit, added.target) for fit in (added.before, added.after)]
+    if effect is Quantisation:  # what rounding adds to the noise is an error to a model that does not know it
+        held[0] = held[0] * added.target.sigma / added.target.sensor_sigma
     return [
         (signal, *(rms(residual, added.target, np.arange(4) == k) for residual in held))
         for k, signal in enumerate(SIGNALS)
@@ -191,10 +195,10 @@ def add_answer(added: Added, effect: type[Effect]) -> str:
     )
 
 
-def printed_fall(added: Added) -> Printed:
+def printed_fall(added: Added, effect: type[Effect]) -> Printed:
     """Errors before and after, for the terminal."""
     table = Printed("held-out error, × noise", "without", "with", box=box.SIMPLE_HEAD)
-    for signal, before, after in _by_signal(added):
+    for signal, before, after in _by_signal(added, effect):
         table.add_row(words(signal), f"{before:.2f}", f"{after:.2f}")
     table.add_section()
     table.add_row("all", f"{added.error_before:.2f}", f"{added.error_after:.2f}")
@@ -203,10 +207,13 @@ def printed_fall(added: Added) -> Printed:
 
 def add_sections(added: Added, effect: type[Effect]) -> list[Section]:
     """What the answer rests on."""
-    rows = [(words(signal), before, after) for signal, before, after in _by_signal(added)]
+    rows = [(words(signal), before, after) for signal, before, after in _by_signal(added, effect)]
     rows.append(("all", added.error_before, added.error_after))
     fall = Picture(figures.falls(rows), "Errors on grasps held out of the fit, without and with the effect.")
-    seen = symptom_picture(added.target, added.before, added.after, effect)
+    if effect is Quantisation:
+        seen = steps_picture(added.target)
+    else:
+        seen = symptom_picture(added.target, added.before, added.after, effect)
     return [
         Section("Before and after", [fall, Text(f"S{noise_sentence(added.target)[1:]}.")]),
         Section(f"What {effect.name} looks like here", [Text(f"Symptom: {effect.symptom}."), seen]),
@@ -224,4 +231,17 @@ def symptom_picture(target: Target, before: Fit, after: Fit, effect: type[Effect
         figures.symptom(target, index, signal, before.predicted[index], after.predicted[index], effect.name),
         f"Where {effect.name} helps most: {words(SIGNALS[signal])} of grasp {grasp.name} on {grasp.object}; error"
         f" {errors[0]:.2f} × noise without it, {errors[1]:.2f} × with it. Below: measured − model ÷ noise, band ± 2.",
+    )
+
+
+def steps_picture(target: Target) -> Picture:
+    """Readings that come in steps."""
+    signal = 2 if target.quantum[2] else 0
+    swing = np.ptp(np.where(target.mask, target.signals[..., signal], target.signals[:, :1, signal]), axis=1)
+    index = int(np.argmax(swing))
+    grasp = target.grasps[index]
+    return Picture(
+        figures.steps(target, index, signal),
+        f"Readings of {words(SIGNALS[signal])} in grasp {grasp.name}, where they change fastest: they are multiples of"
+        f" {amount(target.quantum[signal], UNITS[signal])} (grey lines).",
     )

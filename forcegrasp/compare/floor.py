@@ -6,8 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from forcegrasp.compare.fit import Fit
 from forcegrasp.compare.heldout import rms
+from forcegrasp.compare.predict import predict
 from forcegrasp.compare.target import PHASES, Target
+from forcegrasp.measure.replay import Replay
 
 # Room for what the estimate of the floor misses: in all, and in a single signal and phase.
 _ROOM, _ROOM_IN_CELL = 1.03, 1.15
@@ -17,11 +20,32 @@ _OUTLIER, _MISHAPS = 5.0, 3
 _LEAST_SAMPLES = 40
 
 
+def numerical_error(fit: Fit, target: Target) -> tuple[np.ndarray, ...]:
+    """How far the prediction moves with half the physics step, and with the other collision code, ÷ noise.
+
+    Each ``(G, S, 4)``.
+    """
+    gripper, grasps, case = fit.problem.gripper, fit.problem.grasps, [fit.problem.case(fit.vector)]
+    exact = predict(Replay(gripper, grasps), case)[0]
+    others = (Replay(gripper, grasps, step_factor=0.5), Replay(gripper, grasps, other_collisions=True))
+    return tuple(np.where(target.mask[..., None], (predict(o, case)[0] - exact) / target.sigma, 0.0) for o in others)
+
+
+def beyond_fit(fit: Fit, numerical: Sequence[np.ndarray]) -> tuple[np.ndarray, ...]:
+    """What of the numerical errors no fitted parameter makes up for, each ``(G, S, 4)``."""
+    slopes = fit.jacobian.reshape(-1, len(fit.problem))
+    left = []
+    for one in numerical:
+        shift = np.linalg.lstsq(slopes, one.ravel(), rcond=None)[0]
+        left.append(one - (slopes @ shift).reshape(one.shape))
+    return tuple(left)
+
+
 def numerical_floor(numerical: Sequence[np.ndarray], target: Target, where: np.ndarray | None = None) -> float:
     """rms residual ÷ noise that sensor noise and the model's own numerical error leave.
 
     Args:
-      numerical: from :func:`~forcegrasp.compare.score.numerical_error`, each ``(G, S, 4)``.
+      numerical: from :func:`beyond_fit`, each ``(G, S, 4)``.
       target: the measurements.
       where: choice of samples and signals, ``(G, S, 4)``.
     """

@@ -11,7 +11,6 @@ from forcegrasp.compare.fit import Fit, Simulators
 from forcegrasp.compare.predict import Applied, Case, predict
 from forcegrasp.compare.target import Target
 from forcegrasp.effects import Effect
-from forcegrasp.measure.replay import Replay
 
 # A signature stands for all smaller sizes, and for sizes up to this much larger than the one it was simulated with.
 _REACH = 3.0
@@ -41,21 +40,6 @@ class Background:
     def remove(self, vectors: np.ndarray) -> np.ndarray:
         """Takes the directions out of vectors, ``(N,)`` or ``(N, m)``."""
         return vectors - self._basis @ (self._basis.T @ vectors)
-
-
-def numerical_error(fit: Fit, target: Target) -> list[np.ndarray]:
-    """How far the prediction moves with half the physics step, and with the other collision code, ÷ noise.
-
-    What lies below this is no effect. Each ``(G, S, 4)``.
-    """
-    problem = fit.problem
-    case = [problem.case(fit.vector)]
-    exact = predict(Replay(problem.gripper, problem.grasps), case)[0]
-    variants = (
-        Replay(problem.gripper, problem.grasps, step_factor=0.5),
-        Replay(problem.gripper, problem.grasps, other_collisions=True),
-    )
-    return [np.where(target.mask[..., None], (predict(v, case)[0] - exact) / target.sigma, 0.0) for v in variants]
 
 
 def score_effects(

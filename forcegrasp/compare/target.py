@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 
 import numpy as np
 
+from forcegrasp.compare.quantised import find_step
 from forcegrasp.errors import MeasurementError
 from forcegrasp.measure.schema import MeasuredGrasp, MeasurementSet
 
@@ -14,6 +16,8 @@ SIGNALS = ("position_l", "position_r", "force_l", "force_r")
 UNITS = ("m", "m", "N", "N")
 PHASES = ("free", "first_contact", "both", "hold", "release")
 
+# Rounding to steps smaller than this many σ is hidden by the noise.
+_QUANTUM = 1.0
 # A command that has not changed for this long is held; contact is young, or just lost, for this long. Seconds.
 _HELD_S, _YOUNG_S = 0.3, 0.2
 
@@ -28,7 +32,9 @@ class Target:
     grasps: tuple[MeasuredGrasp, ...]
     signals: np.ndarray  #: ``(G, S, 4)``; 0 where there is no sample
     mask: np.ndarray  #: which samples there are, ``(G, S)``
-    sigma: np.ndarray  #: sensor noise of each signal, in its unit, ``(4,)``
+    sigma: np.ndarray  #: noise of each signal, in its unit, that of rounding included, ``(4,)``
+    sensor_sigma: np.ndarray  #: the same without rounding, ``(4,)``
+    quantum: np.ndarray  #: step that a signal's readings are multiples of, 0 if none worth noticing, ``(4,)``
     sigma_known: bool  #: whether the noise was given with the set; estimated from it otherwise
     phase: np.ndarray  #: index into :data:`PHASES`, ``(G, S)``; −1 where there is no sample
 
@@ -42,7 +48,7 @@ class Target:
         picked = tuple(self.grasps[i] for i in keep)
         longest = self.mask[keep].sum(axis=1).max()
         signals, mask, phase = (a[keep][:, :longest] for a in (self.signals, self.mask, self.phase))
-        return Target(picked, signals, mask, self.sigma, self.sigma_known, phase)
+        return dataclasses.replace(self, grasps=picked, signals=signals, mask=mask, phase=phase)
 
     def residual(self, predicted: np.ndarray) -> np.ndarray:
         """(measured − predicted) ÷ noise, ``(..., G, S, 4)``; 0 where there is no sample."""
@@ -60,11 +66,15 @@ def make_target(measured: MeasurementSet) -> Target:
         mask[index, :n] = True
     given = [measured.position_std_m, measured.position_std_m, measured.force_std_n, measured.force_std_n]
     estimated = estimate_noise(grasps)
-    sigma = np.array([e if g is None else g for g, e in zip(given, estimated, strict=True)], float)
+    sensor = np.array([e if g is None else g for g, e in zip(given, estimated, strict=True)], float)
+    steps = [find_step(signals[..., kind][mask]) for kind in ([0, 1], [2, 3])]
+    quantum = np.repeat(steps, 2)
+    quantum = np.where(quantum >= _QUANTUM * sensor, quantum, 0.0)
+    sigma = np.sqrt(sensor**2 + quantum**2 / 12)
     phase = np.full(mask.shape, -1)
     for index, grasp in enumerate(grasps):
         phase[index, : len(grasp.time_s)] = find_phases(grasp, sigma[2:])
-    return Target(grasps, signals, mask, sigma, None not in given, phase)
+    return Target(grasps, signals, mask, sigma, sensor, quantum, None not in given, phase)
 
 
 def estimate_noise(grasps: tuple[MeasuredGrasp, ...]) -> np.ndarray:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,14 +12,15 @@ from forcegrasp.compare.base_fit import BaseFit, check_gradient, fit_base
 from forcegrasp.compare.comparison import Comparison
 from forcegrasp.compare.diagnose import Diagnosis, diagnose, polish, refine
 from forcegrasp.compare.fit import Fit, Simulators, fit_once
-from forcegrasp.compare.floor import numerical_floor
+from forcegrasp.compare.floor import beyond_fit, numerical_error, numerical_floor
 from forcegrasp.compare.heldout import heldout_residual, make_folds, rms
 from forcegrasp.compare.intervals import intervals, standard_errors, warnings
-from forcegrasp.effects.model_file import Fitted, FoundEffect, Model
 from forcegrasp.compare.problem import Problem
-from forcegrasp.compare.score import Background, numerical_error, score_effects
+from forcegrasp.compare.score import Background, score_effects
 from forcegrasp.compare.target import Target, make_target
 from forcegrasp.effects import Effect, catalogue
+from forcegrasp.effects.model_file import Fitted, FoundEffect, Model
+from forcegrasp.effects.quantisation import Quantisation
 from forcegrasp.errors import ConfigError, MeasurementError
 from forcegrasp.measure import FinalForceTable, MeasurementSet, check_set, check_table, read_set
 from forcegrasp.physics.gripper import Gripper, load_gripper
@@ -69,7 +70,9 @@ def apply_model(loaded: Loaded, model: Model, progress: Progress, refit: bool) -
     if model.gripper.name != loaded.gripper.name:
         raise ConfigError(f"model: is of gripper {model.gripper.name}, the set is of {loaded.gripper.name}")
     target = make_target(loaded.measured)
-    problem = Problem(loaded.gripper, target.grasps, [(e.effect, e.variant) for e in model.effects])
+    # rounding is not fitted: the measurements show it, and it counts as noise
+    effects = [(e.effect, e.variant) for e in model.effects if e.effect is not Quantisation]
+    problem = Problem(loaded.gripper, target.grasps, effects)
     simulators = Simulators(problem)
     vector, unknown = _coordinates(problem, model)
     if unknown.any() and not refit:
@@ -91,8 +94,9 @@ def compare(loaded: Loaded, model: Model | None, seed: int, progress: Progress) 
     # a model that has not seen this set is tested on all of it
     held = heldout_residual(fit, target, make_folds(target.grasps)) if same else fit.residual
     numerical = numerical_error(fit, target)
-    comparison = Comparison(target, fit.predicted, fit.residual, held, numerical_floor(numerical, target))
-    return comparison, model or model_of(fit, loaded, numerical), notes
+    floor = numerical_floor(beyond_fit(fit, numerical), target)
+    comparison = Comparison(target, fit.predicted, fit.residual, held, floor)
+    return comparison, model or model_of(fit, target, loaded, numerical), notes
 
 
 def diagnose_set(
@@ -143,6 +147,10 @@ def add_effect(loaded: Loaded, model: Model, effect: type[Effect], progress: Pro
     progress(
         f"without {effect.name}: {rms(heldout_residual(before, target, folds), target):.3f} × noise on held-out grasps"
     )
+    if effect is Quantisation and target.quantum.any():  # it is in the noise already
+        coarse = target.sigma / target.sensor_sigma
+        errors = [rms(heldout_residual(before, target, folds) * factor, target) for factor in (coarse, 1.0)]
+        return Added(target, before, before, *errors, model_of(before, target, loaded, numerical_error(before, target)))
     groups = score_effects(before, target, simulators, Background(before, []), [effect])
     if not groups:
         raise ConfigError(
@@ -151,10 +159,10 @@ def add_effect(loaded: Loaded, model: Model, effect: type[Effect], progress: Pro
     fits = [refine(group, target, before, simulators) for group in groups]
     after = polish(min(fits, key=lambda f: f.cost), target, simulators)
     errors = [rms(heldout_residual(f, target, folds), target) for f in (before, after)]
-    return Added(target, before, after, *errors, model_of(after, loaded, numerical_error(after, target)))
+    return Added(target, before, after, *errors, model_of(after, target, loaded, numerical_error(after, target)))
 
 
-def model_of(fit: Fit, loaded: Loaded, numerical: list[np.ndarray]) -> Model:
+def model_of(fit: Fit, target: Target, loaded: Loaded, numerical: Sequence[np.ndarray]) -> Model:
     """A fit as a model that can be written."""
     problem, errors = fit.problem, standard_errors(fit, numerical)
     base: dict[str, Fitted] = {}
@@ -174,9 +182,12 @@ def model_of(fit: Fit, loaded: Loaded, numerical: list[np.ndarray]) -> Model:
             objects.setdefault(first.object, {})[entry.parameter] = fitted
         else:
             grasps.setdefault(first.name, {})[entry.parameter] = fitted
-    found = tuple(FoundEffect(e, v, p) for (e, v), p in zip(problem.effects, effects, strict=True))
+    found = [FoundEffect(e, v, p) for (e, v), p in zip(problem.effects, effects, strict=True)]
+    if target.quantum.any():
+        steps = zip(Quantisation.parameters, target.quantum[[0, 2]], strict=True)
+        found.append(FoundEffect(Quantisation, "", {p.name: Fitted(s, s, s, p.unit) for p, s in steps}))
     data = {"set": loaded.measured.name, "fingerprint": loaded.measured.fingerprint}
-    return Model(loaded.gripper, base, objects, grasps, found, data, tuple(warnings(fit, errors)))
+    return Model(loaded.gripper, base, objects, grasps, tuple(found), data, tuple(warnings(fit, errors)))
 
 
 def _coordinates(problem: Problem, model: Model) -> tuple[np.ndarray, np.ndarray]:
@@ -185,7 +196,7 @@ def _coordinates(problem: Problem, model: Model) -> tuple[np.ndarray, np.ndarray
     for index, entry in enumerate(problem.entries):
         first = problem.grasps[int(np.flatnonzero(entry.members)[0])]
         if entry.effect >= 0:
-            places = [model.effects[entry.effect].parameters]
+            places = [e.parameters for e in model.effects if e.effect is problem.effects[entry.effect][0]]
         else:
             places = [model.base, model.objects.get(first.object, {}), model.grasps.get(first.name, {})]
         fitted = next((place[entry.parameter] for place in places if entry.parameter in place), None)

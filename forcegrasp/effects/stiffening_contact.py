@@ -5,23 +5,47 @@ from __future__ import annotations
 import numpy as np
 
 from forcegrasp.effects.base import Effect, Parameter
+from forcegrasp.effects.touch import Touch
+
+#: Depth at which the cubic spring's force is given, metres.
+DEPTH_M = 0.001
 
 
 class StiffeningContact(Effect):
-    """A steeper impedance curve of the object's contact."""
+    """A steeper impedance curve of the object's contact, or a hardening spring beside it."""
 
     name = "stiffening_contact"
     stage = "contact"
     symptom = "the curve of force over squeeze is more convex than modelled"
-    formula = "d(r) with power p + Δp instead of p (MuJoCo's solimp)"
-    source = "MuJoCo's `solimp`, last number"
+    formula = "d(r) with power p + Δp instead of p (MuJoCo's solimp), and F = F_contact + F₁ (δ / 1 mm)³"
+    source = "MuJoCo's `solimp`, last number; Duffing's hardening spring"
     look_alikes = ("finger_compliance", "viscoelastic_contact")
     separates = "slow ramps to high force on soft objects"
     parameters = (
-        Parameter("extra_power", "Δp, added to the scene's power", "1", 0.0, 8.0, 1.5, trials=(0.5, 2.0, 5.0)),
+        Parameter("extra_power", "Δp, added to the scene's power", "1", 0.0, 8.0, 1.5),
+        Parameter("cubic_n", "force F₁ of the spring at a depth δ of 1 mm", "N", 0.0, 5.0, 0.05),
     )
+
+    @classmethod
+    def trials(cls) -> np.ndarray:
+        return np.array([[0.5, 0.0], [2.0, 0.0], [5.0, 0.0], [0.0, 0.01], [0.0, 0.04], [0.0, 0.15]])
+
+    def reset(self, which: np.ndarray) -> None:
+        if not hasattr(self, "_touch"):
+            self._touch, self._push = Touch(len(self.values)), np.zeros((len(self.values), 2))
+        self._touch.reset(which)
+        self._push[which] = 0.0
 
     def change_model(self, plant, which: np.ndarray) -> None:
         solimp, rows = plant.field("geom_solimp"), self.rows[which]
         for geom in plant.object_geoms:
             solimp[rows, geom, 4] += self["extra_power"][which, 0]
+
+    def act(self) -> None:
+        depth = np.maximum(self._touch.depth(self.plant, self.rows, self.pad_force), 0.0)
+        self._push = self["cubic_n"] * (depth / DEPTH_M) ** 3
+        self.plant.finger_push_n[self.rows] += self._push  # towards opening, away from the object
+        self.plant.object_push_n[self.rows] += self._push[:, 0] - self._push[:, 1]
+
+    def interaction(self, force: np.ndarray) -> np.ndarray:
+        return force + self._push

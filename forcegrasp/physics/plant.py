@@ -32,7 +32,7 @@ class Plant:
       tier: physics tier, see :meth:`~forcegrasp.physics.gripper.Gripper.compile`.
       threads: threads of the engine; 0 uses every core.
       step_factor: multiplies the physics step.
-      other_collisions: uses MuJoCo's other collision code.
+      other_collisions: uses MuJoCo's other collision code, native for libccd or libccd for native.
 
     Raises:
       ConfigError: if there is no such tier.

@@ -76,12 +76,12 @@ class GraspSimulator:
 
     @property
     def measured_position(self) -> np.ndarray:
-        """What the encoders say, before noise, metres, ``(n, 2)``; the positions themselves without an effect on them."""
+        """What the encoders say, before noise, metres, ``(n, 2)``; the positions themselves if nothing changes them."""
         return self.plant.measured_position
 
     @property
     def measured_force(self) -> np.ndarray:
-        """What the force sensors say, before noise, newtons, ``(n, 2)``; the forces themselves without an effect."""
+        """What the force sensors say, before noise, newtons, ``(n, 2)``; the true ones if nothing changes them."""
         return self.plant.measured_force
 
     def reset(

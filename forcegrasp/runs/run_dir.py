@@ -67,7 +67,7 @@ class RunDir:
         return run
 
     def model(self, config: TrainConfig) -> Model | None:
-        """The fitted model that the run trains with, if any; the run keeps a copy, so that it can be resumed without it.
+        """The fitted model that the run trains with, if any; the run keeps a copy, to be resumed from.
 
         Raises:
           ConfigError: if it can't be read.

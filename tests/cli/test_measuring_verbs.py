@@ -1,0 +1,193 @@
+"""From measurements to a better model, by the command line alone: record, fit, diagnose, add, compare."""
+
+from __future__ import annotations
+
+import contextlib
+import csv
+import io
+import json
+import shutil
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+import yaml
+
+from forcegrasp.cli.main import main
+
+# the loop takes half a minute: one worker should run it, once
+pytestmark = pytest.mark.xdist_group("measuring verbs")
+
+#: What makes a diagnosis quick.
+FEW = "effects=[force_bias,force_drift]"
+TABLE_META = "format: forcegrasp-measurements/1\nkind: final_force\ngripper: tiago\nsource: a test\nlicense: none\n"
+
+
+def run(folder: Path, *arguments: str) -> str:
+    """Runs a verb in a folder; returns what it printed."""
+    out = io.StringIO()
+    with contextlib.chdir(folder), contextlib.redirect_stdout(out):
+        assert main(list(arguments)) == 0
+    return out.getvalue()
+
+
+def shorten(folder: Path, seconds: float) -> None:
+    """Keeps the first seconds of each grasp."""
+    path = folder / "samples.csv"
+    with open(path, newline="") as file:
+        head, *rows = list(csv.reader(file))
+    column = head.index("t_s")
+    with open(path, "w", newline="") as file:
+        csv.writer(file).writerows([head, *(row for row in rows if float(row[column]) < seconds)])
+
+
+@pytest.fixture(scope="session")
+def loop(tmp_path_factory) -> SimpleNamespace:
+    """A set with a force bias hidden in it, and all that the verbs made of it. Don't change it."""
+    folder = tmp_path_factory.mktemp("loop")
+    printed = {}
+    printed["record"] = run(folder, "record", "out=my_set", "grasps=6", "objects=1", "effects=[force_bias]")
+    shorten(folder / "my_set", 3.6)
+    printed["fit"] = run(folder, "fit", "data=my_set", "out=model.yaml")
+    printed["diagnose"] = run(folder, "diagnose", "data=my_set", "model=model.yaml", FEW, "out=diagnosis")
+    printed["add"] = run(folder, "add", "data=my_set", "model=model.yaml", "effect=force_bias", "out=new/better.yaml")
+    printed["compare"] = run(folder, "compare", "data=my_set", "model=new/better.yaml", "out=comparison")
+    results = {
+        verb: json.loads(next(folder.glob(pattern)).read_text())
+        for verb, pattern in {
+            "fit": "runs/fit_*/fit.json",
+            "diagnose": "diagnosis/diagnosis.json",
+            "add": "runs/add_*/add.json",
+            "compare": "comparison/compare.json",
+        }.items()
+    }
+    return SimpleNamespace(folder=folder, printed=printed, **results)
+
+
+@pytest.fixture
+def folder(loop, tmp_path, monkeypatch) -> Path:
+    """A working folder with the set, its models, a table of final forces, and things that are neither."""
+    for name in ("my_set", "model.yaml", "new/better.yaml"):
+        source = loop.folder / name
+        (shutil.copytree if source.is_dir() else shutil.copy)(source, tmp_path / source.name)
+    (tmp_path / "file").write_text("text")
+    (tmp_path / "table").mkdir()
+    (tmp_path / "table" / "meta.yaml").write_text(TABLE_META)
+    rows = [f"foam,{0.0002 * k:g},{0.06 * max(0, k - 1) + 0.001 * (-1) ** k:g}" for k in range(1, 11)]
+    (tmp_path / "table" / "table.csv").write_text("\n".join(["object,delta_q_m,final_force_n", *rows]) + "\n")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_the_hidden_effect_is_found(loop):
+    found = loop.diagnose
+    assert (found["verdict"], found["effects"]) == ("effect", ["force_bias"])
+    assert found["ranking"][0]["effect"] == "force_bias"
+    assert found["ranking"][0]["parameters"] == pytest.approx({"left_n": 0.06, "right_n": 0.04}, rel=0.1)
+    assert found["ranking"][0]["p_family"] <= 0.01
+    assert found["error_before"] > 2 > 1.1 > found["error_after"] == found["floor_ratio"]
+    assert "lacks force_bias" in loop.printed["diagnose"]
+    assert "force is not zero in free air" in loop.printed["diagnose"]
+    if found["next_grasp"]:
+        assert f"record next: {found['next_grasp']['grasp']}" in loop.printed["diagnose"]
+
+
+def test_the_error_falls_when_it_is_added(loop):
+    assert loop.fit["converged"]
+    assert loop.fit["error_heldout"] == pytest.approx(loop.add["error_before"], rel=0.02)
+    assert loop.add["error_after"] < 0.5 * loop.add["error_before"]
+    assert loop.compare["floor_ratio"] == pytest.approx(loop.add["error_after"], rel=0.02)
+    assert "no failure" in loop.printed["compare"]
+
+
+def test_models_are_text_with_intervals(loop):
+    model = yaml.safe_load((loop.folder / "model.yaml").read_text())
+    better = yaml.safe_load((loop.folder / "new" / "better.yaml").read_text())
+    assert (model["effects"], list(better["effects"])) == ({}, ["force_bias"])
+    bias = better["effects"]["force_bias"]["left_n"]
+    assert bias["low"] < 0.06 < bias["high"]
+    reported = loop.add["parameters"]["force_bias.left_n"]
+    assert (reported.pop("unit"), bias.pop("unit")) == ("N", "N")
+    assert reported == pytest.approx(bias, rel=1e-6)
+
+
+def test_every_verb_writes_a_report_and_says_where(loop):
+    for verb, place in (("diagnose", "diagnosis"), ("compare", "comparison")):
+        assert (loop.folder / place / "report.html").stat().st_size > 20_000
+        assert f"report: {place}/report.html" in loop.printed[verb]
+    for verb, out in (("fit", "model.yaml"), ("add", "new/better.yaml")):
+        (report,) = loop.folder.glob(f"runs/{verb}_*/report.html")
+        assert f"report: {report.relative_to(loop.folder)}" in loop.printed[verb]
+        assert f"wrote {out}" in loop.printed[verb]
+
+
+def test_what_is_printed_is_short(loop):
+    for printed in loop.printed.values():
+        answer = [line for line in printed.splitlines() if not line.startswith("  [")]
+        assert len(answer) < 40
+
+
+def test_a_table_of_final_forces(folder, capsys):
+    for verb, file in (("compare", "compare.json"), ("diagnose", "diagnosis.json")):
+        assert main([verb, "data=table", f"out={verb}"]) == 0
+        assert (folder / verb / "report.html").is_file()
+        assert json.loads((folder / verb / file).read_text())["floor_ratio"] > 0
+        assert "dead zone" in capsys.readouterr().out
+
+
+def test_an_effect_that_does_not_help_is_not_added(folder, capsys, monkeypatch):
+    from forcegrasp.compare import workflow
+
+    def useless(*arguments):
+        return SimpleNamespace(error_before=1.0, error_after=0.996)
+
+    monkeypatch.setattr(workflow, "add_effect", useless)
+    assert main(["add", "data=my_set", "model=model.yaml", "effect=backlash", "out=worse.yaml"]) == 2
+    error = capsys.readouterr().err
+    assert error.startswith("forcegrasp: effect=backlash: the error on held-out grasps does not fall (1.000 ×")
+    assert error.count("\n") == 1
+    assert not (folder / "worse.yaml").exists()
+    assert not (folder / "runs").exists()
+
+
+MISTAKES = [
+    *((verb, [], "data is missing: data=my_set") for verb in ("compare", "fit", "diagnose", "add")),
+    *((verb, ["data=nowhere"], "nowhere") for verb in ("compare", "fit", "diagnose")),
+    ("compare", ["data=file"], "file"),
+    ("compare", ["data=my_set", "out=file"], "out=file: could not write"),
+    ("compare", ["data=my_set", "out=file/below"], "is a file"),
+    ("diagnose", ["data=my_set", "out=file"], "out=file: could not write"),
+    ("compare", ["data=my_set", "model=file"], "forcegrasp-model/1"),
+    ("compare", ["data=my_set", "model=nowhere.yaml"], "nowhere.yaml"),
+    ("compare", ["data=my_set", "model=my_set"], "my_set: could not read the model"),
+    ("diagnose", ["data=my_set", "model=file"], "forcegrasp-model/1"),
+    ("diagnose", ["data=my_set", "effects=[backlsh]"], "effects=backlsh: no such effect; did you mean backlash"),
+    ("diagnose", ["data=my_set", "effects=backlash"], "effects"),
+    ("fit", ["data=my_set", "out=my_set"], "it is a folder; name a file: out=my_set/model.yaml"),
+    ("fit", ["data=my_set", "out=file/model.yaml"], "could not write"),
+    ("add", ["data=my_set"], "model is missing: model=model.yaml"),
+    ("add", ["data=my_set", "model=model.yaml"], "effect is missing: effect=backlash"),
+    ("add", ["data=my_set", "model=model.yaml", "effect=backlsh"], "did you mean backlash"),
+    ("add", ["data=my_set", "model=model.yaml", "effect=none"], "no such effect"),
+    ("add", ["data=my_set", "model=file", "effect=backlash"], "forcegrasp-model/1"),
+    ("add", ["data=my_set", "model=better.yaml", "effect=force_bias"], "has it already"),
+    ("add", ["data=my_set", "model=model.yaml", "effect=backlash", "out=my_set"], "it is a folder"),
+    ("fit", ["data=table"], "is a table of final forces"),
+    ("add", ["data=table", "model=model.yaml", "effect=backlash"], "is a table of final forces"),
+    ("compare", ["data=table", "model=model.yaml"], "leave model= out"),
+    ("diagnose", ["data=table", "effects=[backlash]"], "leave effects= out"),
+    ("compare", ["dta=my_set"], "did you mean data"),
+]
+
+
+@pytest.mark.parametrize(("verb", "arguments", "told"), MISTAKES, ids=[f"{v} {' '.join(a)}" for v, a, _ in MISTAKES])
+def test_mistake(verb, arguments, told, folder, capsys):
+    before = sorted(folder.rglob("*"))
+    assert main([verb, *arguments]) == 2
+    captured = capsys.readouterr()
+    assert captured.err.startswith("forcegrasp: ")
+    assert captured.err.count("\n") == 1
+    assert told in captured.err
+    assert "Traceback" not in captured.err
+    assert all(line.startswith("warning: ") for line in captured.out.splitlines())
+    assert sorted(folder.rglob("*")) == before

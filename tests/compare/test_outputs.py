@@ -1,0 +1,266 @@
+"""Tables, JSON and reports say what was put into the results, and no name does any harm."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from forcegrasp.cli.measuring import write_results
+from forcegrasp.cli.results import write_json
+from forcegrasp.compare import compare_output, diagnose_output, figures, fit_output
+from forcegrasp.compare.base_fit import BaseFit
+from forcegrasp.compare.diagnose import Step
+from forcegrasp.compare.report import Picture
+from forcegrasp.effects import get_effect
+
+VERDICTS = ("effect", "one_of", "explained", "unknown", "not_fitted")
+
+
+def shown(renderable) -> str:
+    console = Console(width=80, record=True, file=open("/dev/null", "w"))  # noqa: SIM115
+    with console.file:
+        console.print(renderable)
+    return console.export_text()
+
+
+def plain(content: dict, folder: Path) -> dict:
+    """What a reader of the JSON file gets."""
+    write_json(folder / "x.json", content)
+    return json.loads((folder / "x.json").read_text())
+
+
+# --- compare -------------------------------------------------------------------------------------------------------
+
+
+def test_compare_json_holds_the_planted_errors(made_up, tmp_path):
+    found = plain(compare_output.compare_json(made_up.comparison, "my_set", "m.yaml", []), tmp_path)
+    assert {"set", "model", "signals", "phases", "floor_ratio", "heldout"} <= set(found)
+    assert (found["set"], found["model"]) == ("my_set", "m.yaml")
+    hold = found["phases"]["hold"]["force_l"]
+    # 5² in seven grasps, 9² in one, and the noise
+    assert hold["ratio"] == pytest.approx(np.sqrt(1 + (7 * 25 + 81) / 8), rel=0.03)
+    assert hold["rms_n"] == pytest.approx(hold["ratio"] * 0.013)
+    assert hold["bias_n"] == pytest.approx(5.5 * 0.013, rel=0.05)
+    assert found["phases"]["hold"]["position_r"]["ratio"] == pytest.approx(1, abs=0.1)
+    assert found["phases"]["free"]["position_r"]["rms_m"] == pytest.approx(2.7e-5, rel=0.1)
+    assert set(found["signals"]) == {"position_l", "position_r", "force_l", "force_r"}
+    assert found["signals"]["force_r"]["noise_n"] == 0.013
+    for signal, ratio in (("position_l", 1.1), ("force_r", 1.1)):
+        assert found["heldout"][signal]["ratio"] == pytest.approx(ratio, abs=0.06)
+    assert found["floor_ratio"] == pytest.approx(1.1 * np.sqrt(np.mean(made_up.comparison.residual**2)))
+    assert max(found["grasps"], key=found["grasps"].get) == "g3"
+
+
+def test_compare_answers_where(made_up):
+    answer = compare_output.answer(made_up.comparison)
+    assert "on held-out grasps" in answer
+    assert "hold, force left" in answer
+    table = shown(compare_output.printed(made_up.comparison))
+    assert max(map(len, table.splitlines())) <= 80
+    cell = next(c for c in made_up.comparison.cells() if (c.signal, c.phase) == ("force_l", "hold"))
+    assert re.search(rf"^ +hold .* {cell.rms * 1e3:.1f} mN {cell.ratio:.1f}× ", table, re.MULTILINE)
+    assert "g3 on thing 1" in compare_output.details(made_up.comparison)[0].partition(",")[0]
+
+
+def test_compare_of_a_model_that_has_not_seen_the_set(made_up):
+    unseen = dataclasses.replace(made_up.comparison, heldout=made_up.comparison.residual)
+    assert "to which the model was not fitted" in compare_output.answer(unseen)
+
+
+def test_compare_without_failure_says_so(made_up):
+    calm = np.random.default_rng(3).standard_normal(made_up.comparison.residual.shape)
+    comparison = dataclasses.replace(made_up.comparison, residual=calm, heldout=calm.copy())
+    assert "no failure" in compare_output.answer(comparison)
+    assert not any("goes with" in line for line in compare_output.details(comparison))
+
+
+def test_an_estimated_noise_is_called_a_lower_bound(made_up):
+    assert "as given" in compare_output.noise_sentence(made_up.target)
+    estimated = dataclasses.replace(made_up.target, sigma_known=False)
+    assert "lower bound" in compare_output.noise_sentence(estimated)
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "text"), [(2.7e-5, "m", "27 µm"), (0.0123, "m", "12300 µm"), (0.0131, "N", "13.1 mN")]
+)
+def test_amounts_have_units(value, unit, text):
+    assert compare_output.amount(value, unit) == text
+
+
+# --- fit and add ---------------------------------------------------------------------------------------------------
+
+
+def test_fit_json_and_answer(made_up, tmp_path):
+    found = plain(fit_output.fit_json(made_up.base, made_up.target, made_up.model, "s", Path("m.yaml")), tmp_path)
+    assert found["converged"] is True
+    assert found["starts"] == [2.0, 2.001, 2.3]
+    assert set(found["parameters"]["position_gain"]) == {"value", "low", "high", "unit"}
+    assert "rho_m of thing 0" in found["parameters"]
+    assert "is fitted" in fit_output.fit_answer(made_up.base, made_up.target)
+    table = shown(fit_output.printed_parameters(made_up.model))
+    assert all(name in table for name in ("position_gain", "rho_m of thing 1", "N/m"))
+
+
+def test_a_fit_that_did_not_converge_says_why_and_what_to_do(made_up):
+    answer = fit_output.fit_answer(BaseFit(made_up.base.fit, (1.0,), False, "the starts differ"), made_up.target)
+    assert "NOT fitted: the starts differ" in answer
+    assert "record more grasps" in answer
+
+
+def test_add_tells_the_fall(made_up, tmp_path):
+    effect = get_effect("force_bias")
+    found = plain(fit_output.add_json(made_up.added, effect, "s", Path("b.yaml")), tmp_path)
+    assert found["error_before"] > 1.5 > 1.0 == found["error_after"]
+    assert found["signals"]["force_l"]["before"] > 3 * found["signals"]["force_l"]["after"]
+    assert "force_bias.left_n" in found["parameters"]
+    assert "to 1.00 × noise" in fit_output.add_answer(made_up.added, effect)
+    assert re.search(r"force left +\d\.\d\d +1\.\d\d", shown(fit_output.printed_fall(made_up.added, effect)))
+
+
+def test_the_symptom_is_shown_where_it_is_strongest(made_up):
+    picture = fit_output.symptom_picture(
+        made_up.target, made_up.added.before, made_up.added.after, get_effect("force_bias")
+    )
+    assert "force left of grasp g3 on thing 1" in picture.caption
+    labels = [text.get_text() for text in picture.figure.axes[0].get_legend().get_texts()]
+    assert labels == ["measured", "without force_bias", "with force_bias"]
+
+
+# --- diagnose ------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("verdict", VERDICTS)
+def test_diagnosis_json(made_up, verdict, tmp_path):
+    diagnosis = made_up.diagnosis(verdict)
+    advice = made_up.advice if verdict == "one_of" else None
+    found = plain(diagnose_output.diagnosis_json(diagnosis, advice, made_up.tried, "s"), tmp_path)
+    assert found["verdict"] == verdict
+    assert found["effects"] == {"effect": ["force_bias"], "one_of": ["force_bias", "force_drift"]}.get(verdict, [])
+    assert [step["verdict"] for step in found["steps"]] == (
+        [] if verdict == "not_fitted" else [verdict if found["effects"] else "none"]
+    )
+    assert found["floor_ratio"] == found["error_after"]
+    assert found["error_before"] > 1.5
+    ranked = [row["effect"] for row in found["ranking"]]
+    assert ranked == ([] if verdict == "not_fitted" else ["force_bias", "force_drift", "backlash", "force_lag"])
+    for row in found["ranking"]:
+        refitted = row["effect"].startswith("force_") and row["effect"] != "force_lag"
+        assert {"effect", "p_family", "heldout_gain", "floor_ratio_after", "parameters"} <= set(row)
+        assert (row["heldout_gain"] is not None) == refitted
+    assert found["no_trace"] == ([] if verdict == "not_fitted" else ["adhesion"])
+    if advice:
+        assert found["next_grasp"]["tells_apart"] == ["force_bias", "force_drift"]
+        assert (found["next_grasp"]["grasp"], found["next_grasp"]["differences"]["slow ramp"]) == ("slow ramp", 3.0)
+    else:
+        assert found["next_grasp"] is None
+    place = found["where"]
+    if found["effects"]:
+        assert found["parameters"]["force_bias"]["left_n"]["unit"] == "N"
+        assert place["explainable"] < 0.05
+    else:
+        assert (place["phase"], place["signal"]) == ("hold", "force_l")
+        assert place["explainable"] == pytest.approx(1 - 1 / np.nanmean(diagnosis.heldout() ** 2))
+        assert set(place["explained_by"]) >= {"command_m", "direction"}
+
+
+@pytest.mark.parametrize(
+    ("verdict", "told"),
+    [
+        ("effect", "lacks force_bias."),
+        ("one_of", "force_bias or force_drift"),
+        ("explained", "explains these data"),
+        ("unknown", "none of the effects I know"),
+        ("not_fitted", "the starts differ"),
+    ],
+)
+def test_the_verdict_in_words(made_up, verdict, told):
+    diagnosis = made_up.diagnosis(verdict)
+    assert told in diagnose_output.answer(diagnosis)
+    lines = "\n".join(diagnose_output.lines(diagnosis, made_up.advice))
+    assert (get_effect("force_bias").symptom in lines) == (verdict in ("effect", "one_of"))
+    assert ("could also be: force_drift" in lines) == (verdict == "one_of")
+    assert "record next: slow ramp" in lines
+    assert ("largest in force left, hold" in lines) == (verdict == "unknown")
+    table = diagnose_output.printed(diagnosis)
+    assert (table is None) == (verdict == "not_fitted")
+    assert table is None or "force_drift" in shown(table)
+
+
+def test_rounding_is_found_without_any_fit(made_up, tmp_path):
+    """The step has no candidates: nothing was fitted for it."""
+    target = dataclasses.replace(made_up.target, quantum=np.array([0, 0, 0.04, 0.04]))
+    plainly = made_up.diagnosis("effect")
+    step = Step("effect", ("quantisation",), (), (), 2.0, 1.5)
+    diagnosis = dataclasses.replace(
+        plainly, target=target, steps=(step, *plainly.steps), effects=("quantisation", "force_bias")
+    )
+    found = plain(diagnose_output.diagnosis_json(diagnosis, None, made_up.tried, "s"), tmp_path)
+    assert [row["effect"] for row in found["ranking"]][:2] == ["quantisation", "force_bias"]
+    assert found["ranking"][0]["parameters"] == {"position_step_m": 0, "force_step_n": 0.04}
+    assert found["parameters"]["quantisation"]["force_step_n"]["value"] == 0.04
+    assert "quantisation and force_bias" in diagnose_output.answer(diagnosis)
+    lines = diagnose_output.lines(diagnosis, None)
+    assert any(line.startswith("quantisation: few distinct values") for line in lines)
+    assert "steps: forces 40 mN" in lines[-1]
+    assert "quantisation" in shown(diagnose_output.printed(diagnosis))
+    first, second = diagnose_output.sections(diagnosis, None, made_up.tried)[:2]
+    assert (first.title, second.title) == ("1. quantisation", "2. force_bias")
+    assert "multiples of 40 mN" in next(b for b in first.blocks if isinstance(b, Picture)).caption
+
+
+def test_the_report_of_a_diagnosis_shows_what_the_answer_rests_on(made_up):
+    sections = diagnose_output.sections(made_up.diagnosis("one_of"), made_up.advice, made_up.tried)
+    first, advice = sections[:2]
+    assert first.title == "1. force_bias or force_drift"
+    assert "helps most" in next(b for b in first.blocks if isinstance(b, Picture)).caption
+    assert advice.title == "What to record next"
+    assert any(isinstance(b, Picture) for b in advice.blocks)
+
+
+# --- reports -------------------------------------------------------------------------------------------------------
+
+
+def all_reports(made_up):
+    effect = get_effect("force_bias")
+    yield compare_output.sections(made_up.comparison, [f"note {made_up.loaded.measured.name}"])
+    yield fit_output.fit_sections(made_up.base, made_up.target, made_up.model)
+    yield fit_output.add_sections(made_up.added, effect)
+    for verdict in VERDICTS:
+        yield diagnose_output.sections(made_up.diagnosis(verdict), made_up.advice, made_up.tried)
+
+
+def test_reports_are_harmless_and_load_nothing(made_up, tmp_path, capsys):
+    name = made_up.loaded.measured.name
+    for number, sections in enumerate(all_reports(made_up)):
+        out = tmp_path / str(number)
+        write_results(out, "x", {"set": name}, name, name, sections, made_up.loaded)
+        html = (out / "report.html").read_text()
+        assert "<script" not in html
+        assert "&lt;script&gt;" in html
+        loaded = re.findall(r"(?:href|src|url)\s*[=(]\s*[\"']?([^\"')>\s]+)", html)
+        assert all(link.startswith(("#", "data:")) for link in loaded)
+        assert html.count("<svg") == html.count("<figure>") >= 1
+        assert json.loads((out / "x.json").read_text())["set"] == name
+    assert str(out / "report.html") in capsys.readouterr().out
+
+
+def test_of_many_grasps_the_worst_are_drawn():
+    grid = np.ones((300, 5))
+    grid[[7, 200]] = 9.0
+    figure = figures.heat_map(grid, [f"g{i}" for i in range(300)], list("abcde"))
+    labels = [label.get_text() for label in figure.axes[0].get_yticklabels()]
+    assert len(labels) <= 40
+    assert {"g7", "g200"} <= set(labels)
+
+
+def test_signals_may_stand_still(made_up):
+    """Residuals without any spread, and covariates that are nowhere defined."""
+    values = {"time_since_contact_s": np.full((2, 5, 2), np.nan), "direction": np.zeros((2, 5, 2))}
+    figure = figures.dependence(values, np.zeros((2, 5, 4)), np.ones((2, 5), bool))
+    figure.canvas.draw()
