@@ -112,7 +112,9 @@ def report_table(loaded: Loaded, name: str, out: Path, **unused: object) -> None
         print(line)
     content = analysis.compare_json() if name == "compare" else analysis.diagnosis_json()
     question = "Where the static law fails" if name == "compare" else "What the static law lacks"
-    lead = f"{analysis.verdict.replace('_', ' ')}: {analysis.reason}."
+    lead = f"{analysis.verdict.replace('_', ' ').capitalize()}: {analysis.reason}."
+    if analysis.effects:
+        lead += f" It could be any of {', '.join(analysis.effects)}."
     write_results(out, name, content, f"{question}: {loaded.measured.name}", lead, analysis.sections(), loaded)
 
 

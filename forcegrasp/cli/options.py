@@ -151,8 +151,11 @@ def help_text(verb: str, purpose: str, notes: str = "") -> str:
     lines = [f"forcegrasp {verb}: {purpose}", "", f"usage: forcegrasp {verb} [key=value ...]", ""]
     if notes:
         lines += [notes.strip("\n"), ""]
-    lines.append("presets (a preset sets several options; options given beside it win)")
-    lines += [f"  {name}={'|'.join(choices)}" for name, choices in groups(verb).items()]
+    presets = [f"  {name}={'|'.join(choices)}" for name, choices in groups(verb).items()]
+    if presets:
+        lines += ["presets (a preset sets several options; options given beside it win)", *presets]
+    else:
+        lines.pop()
     section = None
     for name, entry, default in leaves(SCHEMAS[verb]):
         head = name.rpartition(".")[0]
@@ -166,6 +169,8 @@ def help_text(verb: str, purpose: str, notes: str = "") -> str:
             + (f" [{meta['unit']}]" if meta["unit"] else "")
             + (f" ({meta['source']})" if meta["source"] else "")
         )
+        if not all(choice in detail for choice in meta["choices"]):
+            detail += f": {' or '.join(meta['choices'])}"
         option = f"  {name}={shown}"
         lines.append(f"{option}\n{'':<6}{detail}")
     return "\n".join(lines) + "\n"

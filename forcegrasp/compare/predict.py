@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -31,7 +31,7 @@ class Case:
         """Equal for cases that differ in nothing but sensors: they share one simulation."""
         parts = [value.tobytes() for name, value in sorted(self.base.items()) if name != "force_scale"]
         for one in self.effects:
-            if not one.effect.reads_only():
+            if not one.effect.reads_only(one.variant):
                 parts.append(f"{one.effect.name}/{one.variant}/".encode() + one.values.tobytes())
         return b"|".join(parts)
 
@@ -47,20 +47,20 @@ def predict(replay: Replay, cases: Sequence[Case]) -> np.ndarray:
         name: np.concatenate([c.base[name] for c in simulated]) for name in simulated[0].base if name != "force_scale"
     }
     grasp = np.tile(np.arange(count), len(simulated))
-    motion = replay.simulate(grasp, base, _spread(simulated, count, reads_only=False))
+    motion = replay.simulate(grasp, base, _spread(simulated, count, lambda e: not e.effect.reads_only(e.variant)))
     rows = np.concatenate([np.arange(count) + place[key] * count for key in keys])
     scale = np.concatenate([case.base["force_scale"] for case in cases])
-    readings = replay.read(motion, rows, scale, _spread(cases, count, reads_only=True))
+    readings = replay.read(motion, rows, scale, _spread(cases, count, lambda e: e.effect.reads()))
     signals = np.concatenate([readings.position, readings.force], axis=-1)
     return signals.reshape(len(cases), count, *signals.shape[1:])
 
 
-def _spread(cases: Sequence[Case], count: int, reads_only: bool) -> list[EffectOn]:
-    """Effects of all cases, each kind once, on the rows of the cases that have it."""
+def _spread(cases: Sequence[Case], count: int, acts: Callable[[Applied], bool]) -> list[EffectOn]:
+    """Effects of all cases, each kind once, on the rows of the cases that have it, as far as it acts here."""
     kinds: dict[tuple[type[Effect], str], list[tuple[int, np.ndarray]]] = {}
     for index, case in enumerate(cases):
         for one in case.effects:
-            if one.effect.reads_only() == reads_only:
+            if acts(one):
                 kinds.setdefault((one.effect, one.variant), []).append((index, one.values))
     spread = []
     for (effect, variant), places in kinds.items():

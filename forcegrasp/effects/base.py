@@ -168,7 +168,12 @@ class Effect:
         return {name for name in names if getattr(cls, name) is not getattr(Effect, name)}
 
     @classmethod
-    def reads_only(cls) -> bool:
+    def reads(cls) -> bool:
+        """Whether it changes what is read."""
+        return not cls.hooks().isdisjoint({"read_force", "read_position"})
+
+    @classmethod
+    def reads_only(cls, variant: str = "") -> bool:
         """Whether it changes what is read and nothing that happens, so that no simulation is needed to try it."""
         return cls.hooks() <= {"read_force", "read_position"}
 

@@ -8,7 +8,10 @@ from forcegrasp.effects.base import Effect, Parameter
 
 
 class EncoderBias(Effect):
-    """An offset of each finger's encoder; commands are not affected."""
+    """An offset of each finger's encoder.
+
+    ``reading``: only what is recorded is off. ``loop``: the servo itself acts on the encoder, and so stands off by it.
+    """
 
     name = "encoder_bias"
     stage = "sensor"
@@ -21,11 +24,19 @@ class EncoderBias(Effect):
         Parameter("left_m", "offset of the left encoder", "m", -0.01, 0.01, 0.0003),
         Parameter("right_m", "offset of the right encoder", "m", -0.01, 0.01, -0.0002),
     )
+    variants = ("reading", "loop")
     order = 9
 
     @classmethod
     def trials(cls) -> np.ndarray:
         return np.array([[2e-4, 0.0], [0.0, 2e-4]])
+
+    @classmethod
+    def reads_only(cls, variant: str = "") -> bool:
+        return variant != "loop"
+
+    def command(self, command: np.ndarray, fresh: np.ndarray) -> np.ndarray:
+        return command if self.variant == "reading" else command - self.values
 
     def read_position(self, position: np.ndarray) -> np.ndarray:
         return position + self.values

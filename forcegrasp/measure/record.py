@@ -84,12 +84,12 @@ def record(
         EffectOn(effect, variant, rows, np.repeat(values[None], grasps, axis=0)) for effect, variant, values in effects
     ]
     motion = replay.simulate(
-        rows, {n: v for n, v in base.items() if n != "force_scale"}, [e for e in on if not e.effect.reads_only()]
+        rows,
+        {n: v for n, v in base.items() if n != "force_scale"},
+        [e for e in on if not e.effect.reads_only(e.variant)],
     )
     last = [e for e in on if e.effect.name == "quantisation"]  # a converter rounds the noise, too
-    readings = replay.read(
-        motion, rows, base["force_scale"], [e for e in on if e.effect.reads_only() and e not in last]
-    )
+    readings = replay.read(motion, rows, base["force_scale"], [e for e in on if e.effect.reads() and e not in last])
     position = readings.position + position_std_m * rng.standard_normal(readings.position.shape)
     force = readings.force + force_std_n * rng.standard_normal(readings.force.shape)
     for rounding in last:

@@ -13,6 +13,8 @@ from forcegrasp.measure.schema import MeasuredGrasp
 from forcegrasp.physics.gripper import Gripper
 from forcegrasp.physics.plant import Plant, write_base
 
+#: Threads of the engine; 0 uses every core. Programs that run several diagnoses side by side set it to 1.
+THREADS = 0
 #: A finger starts where its first command or the end of its range is, if it was measured that near to it. Metres.
 _AT_REST_M = 1e-3
 #: Rows × physics steps that are kept in memory at once.
@@ -118,7 +120,7 @@ class Replay:
                 parts.append(self.simulate(grasp[part], chunk, [_cut(e, part) for e in effects]))
             names = ("grasp", "position", "pad_force", "object_position")
             return Motion(*(np.concatenate([getattr(p, name) for p in parts]) for name in names))
-        plant = Plant(self.gripper, n, self.tier, 0, self._step_factor, self._other_collisions)
+        plant = Plant(self.gripper, n, self.tier, THREADS, self._step_factor, self._other_collisions)
         plant.attach([(e.effect(e.values, self.dt, e.variant), e.rows) for e in effects if len(e.rows)])
         ids = np.arange(n)
         plant.reset(ids, write_base(plant, ids, base), self.start_m[grasp])

@@ -52,10 +52,12 @@ class Browser:
     def messages(self) -> list[str]:
         return [entry["message"] for entry in self.ask("/se/log", type="browser")]
 
-    def requested(self) -> list[str]:
-        """Addresses of everything that pages asked for."""
+    def requested(self, page: str) -> set[str]:
+        """Addresses of everything that a page asked for, itself included; what is in the page is not asked for."""
         events = [json.loads(entry["message"])["message"] for entry in self.ask("/se/log", type="performance")]
-        return [e["params"]["request"]["url"] for e in events if e["method"] == "Network.requestWillBeSent"]
+        asked = [e["params"] for e in events if e["method"] == "Network.requestWillBeSent"]
+        addresses = {params["request"]["url"] for params in asked if params["documentURL"] == page}
+        return {address for address in addresses if not address.startswith("data:")}
 
 
 @pytest.fixture(scope="module")
@@ -87,7 +89,6 @@ def report(request, made_up, tmp_path) -> Path:
 
 
 def test_report(browser, report, made_up):
-    browser.requested()  # what came before
     browser.ask("/url", url=report.as_uri())
     sizes = browser.ask("/execute/sync", script=SIZES, args=[])
     assert len(sizes) == report.read_text().count("<figure>") >= 4
@@ -97,7 +98,7 @@ def test_report(browser, report, made_up):
         assert shapes > 10
         assert right <= 1100
     assert browser.messages() == []
-    assert {url for url in browser.requested() if not url.startswith("data:")} == {report.as_uri()}
+    assert browser.requested(report.as_uri()) == {report.as_uri()}
     text = browser.ask("/execute/sync", script="return document.body.innerText", args=[])
     assert made_up.loaded.measured.name in text
     assert browser.ask("/execute/sync", script="return document.scripts.length", args=[]) == 0

@@ -1,0 +1,175 @@
+"""Hides effects in sets of an independent recorder, diagnoses them, and reports how often that succeeds.
+
+    python tools/hidden_effects.py run [--only REGEX] [--jobs 2]   diagnoses what has no result yet; may be stopped
+    python tools/hidden_effects.py report                          writes docs/hidden-effects.md from the results
+
+The recorder is tests/independent: it shares no code with the effects under test. A set takes about a minute.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import re
+import shutil
+import sys
+import tempfile
+import time
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT))
+RESULTS = ROOT / "runs" / "hidden_effects.jsonl"
+SIZES = ("small", "medium", "large")
+PAIRS = (
+    ("command_delay", "force_bias"),
+    ("coulomb_friction", "force_lag"),
+    ("backlash", "force_gain_asymmetry"),
+    ("object_friction", "force_drift"),
+    ("rate_limit", "force_saturation"),
+    ("finger_compliance", "encoder_bias"),
+)
+
+
+@dataclass(frozen=True)
+class Job:
+    """One set to record and diagnose."""
+
+    group: str  #: "none", "one", "other reading", "two" or "outside"
+    hidden: tuple[str, ...]  #: names in the recorder
+    size: str
+    seed: int
+    contact: str = "mujoco"
+    grasps: int = 24
+
+    @property
+    def name(self) -> str:
+        """What the result is filed under."""
+        parts = ["+".join(self.hidden) or "none", self.size, f"s{self.seed}", self.contact, f"n{self.grasps}"]
+        return "_".join(p for p in parts if p)
+
+
+def jobs() -> list[Job]:
+    """The whole campaign, most telling sets first."""
+    from tests.independent.rig import CATALOGUE, OUTSIDE, VARIANTS
+
+    found = [Job("none", (), "", seed) for seed in range(1, 13)]
+    for seed, size in enumerate(("medium", "small", "large"), 1):
+        found += [Job("one", (name,), size, seed) for name in CATALOGUE]
+        found += [Job("outside", (name,), size, seed) for name in OUTSIDE if size != "small"]
+    found += [Job("two", pair, "medium", seed) for seed, pair in enumerate(PAIRS, 1)]
+    found += [Job("other reading", (name,), "medium", 2) for name in VARIANTS]
+    found += [Job("none", (), "", 1, contact) for contact in ("mujoco_multiccd", "penalty", "hertz")]
+    found += [Job("one", (name,), "medium", 4, grasps=10) for name in CATALOGUE]
+    return found
+
+
+def right_names(job: Job) -> set[str]:
+    """What a right diagnosis names."""
+    from tests.independent.catalogue import VARIANT_OF
+
+    return set() if job.group == "outside" else {VARIANT_OF.get(name, name) for name in job.hidden}
+
+
+def run_job(job: Job) -> dict:
+    """Records and diagnoses one set."""
+    from forcegrasp.compare import workflow
+    from forcegrasp.measure import replay
+    from tests.independent.rig import record
+
+    replay.THREADS = 1
+    folder = Path(tempfile.mkdtemp())
+    try:
+        truth = record(folder / "set", dict.fromkeys(job.hidden, job.size), job.seed, job.grasps, contact=job.contact)
+        started = time.perf_counter()
+        loaded = workflow.load(folder / "set")
+        diagnosis, _ = workflow.diagnose_set(loaded, None, [], 0, lambda text: None)
+        seconds = time.perf_counter() - started
+        numerical = workflow.numerical_error(diagnosis.fit, diagnosis.target)
+        model = workflow.model_of(diagnosis.fit, diagnosis.target, loaded, numerical)
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+    return {
+        "name": job.name,
+        **asdict(job),
+        "verdict": diagnosis.verdict,
+        "effects": list(diagnosis.effects),
+        "steps": [[s.verdict, list(s.effects)] for s in diagnosis.steps],
+        "found_parameters": {e.effect.name: {n: p.value for n, p in e.parameters.items()} for e in model.effects},
+        "error_before": diagnosis.error_before,
+        "error_after": diagnosis.error_after,
+        "floor": diagnosis.floor,
+        "left": diagnosis.left,
+        "reason": diagnosis.base.reason,
+        "seconds": seconds,
+        "intervals": _intervals(model, truth),
+    }
+
+
+def _intervals(model, truth) -> list[list]:
+    """Parameter, truth and interval of every base parameter."""
+    rows = [
+        ["position_gain", truth.position_gain, model.base["position_gain"]],
+        ["velocity_gain", truth.b2, model.base["velocity_gain"]],
+    ]
+    for name, true in truth.objects.items():
+        if name in model.objects:
+            rows.append([f"rho_m of {name}", true["rho_m"], model.objects[name]["rho_m"]])
+            rows.append([f"force_scale of {name}", true["f_alpha"], model.objects[name]["force_scale"]])
+    return [[name, true, fitted.low, fitted.high] for name, true, fitted in rows]
+
+
+def run(only: str, workers: int) -> None:
+    """Works through what has no result yet."""
+    done = {row["name"] for row in load_results()}
+    todo = [job for job in jobs() if job.name not in done and re.search(only, job.name)]
+    RESULTS.parent.mkdir(exist_ok=True)
+    print(f"{len(todo)} sets to diagnose, {len(done)} done")
+    with ProcessPoolExecutor(workers, max_tasks_per_child=8) as pool:
+        running = {pool.submit(run_job, job): job for job in todo}
+        for number, future in enumerate(as_completed(running), 1):
+            try:
+                row = future.result()
+            except Exception as error:  # one set that fails must not take the others along; the report counts it
+                row = {
+                    "name": running[future].name,
+                    **asdict(running[future]),
+                    "verdict": "error",
+                    "error": repr(error),
+                }
+            with RESULTS.open("a") as file:
+                file.write(json.dumps(row) + "\n")
+            said = ", ".join(row.get("effects", [])) or row.get("error", "")
+            print(
+                f"[{number}/{len(todo)}] {row['name']}: {row['verdict']} {said} ({row.get('seconds', 0):.0f} s)",
+                flush=True,
+            )
+
+
+def load_results() -> list[dict]:
+    """All results so far, the last of each name."""
+    if not RESULTS.exists():
+        return []
+    rows = [json.loads(line) for line in RESULTS.read_text().splitlines()]
+    return list({row["name"]: row for row in rows}.values())
+
+
+def main() -> None:
+    """Reads the command line."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("what", choices=("run", "report"))
+    parser.add_argument("--only", default="", help="regular expression that a set's name must match")
+    parser.add_argument("--jobs", type=int, default=2, help="diagnoses side by side")
+    arguments = parser.parse_args()
+    if arguments.what == "run":
+        run(arguments.only, arguments.jobs)
+    else:
+        from hidden_effects_report import write
+
+        write(load_results(), jobs(), right_names)
+
+
+if __name__ == "__main__":
+    main()
