@@ -11,7 +11,7 @@ train: setup
 	$(VENV)/bin/forcegrasp evaluate 'policies=[$(RUN),force_pi,informed]' out=$(RUN)/evaluation
 
 test: setup
-	$(VENV)/bin/python -m pytest -q -n auto
+	$(VENV)/bin/python -m pytest -q -n auto --dist loadgroup
 
 setup: $(VENV)/.ready
 

@@ -34,7 +34,7 @@ class Show:
     start_m: float = 0.0275
 
 
-# Pads meet a centred object at 24.7 mm.
+# Pads meet a centred object at 25 mm, and press noticeably from 24.5 mm on.
 _STEPS = Show(
     "fast steps in free air and into the object, and a release",
     ((26, JUMP, 0.36), (27.2, JUMP, 0.36), (22, JUMP, 0.52), (23.6, JUMP, 0.4), (27.5, JUMP, 0.4)),

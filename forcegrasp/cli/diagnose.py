@@ -53,6 +53,8 @@ def main(arguments: list[str]) -> int:
     diagnosis, _ = workflow.diagnose_set(loaded, model, [e.name for e in tried], config.seed, narrator())
     advice = advise(diagnosis)
     lead, table = diagnose_output.answer(diagnosis), diagnose_output.printed(diagnosis)
+    if config.effects:
+        lead += f" Only {', '.join(config.effects)} were tried."
     if table is not None:
         Console(highlight=False).print(table)
     print("\n".join([f"{diagnosis.verdict}: {lead}", *diagnose_output.lines(diagnosis, advice)]))

@@ -70,8 +70,14 @@ class Comparison:
         return value if np.isfinite(value) else rms(self.residual, self.target)
 
     def covariates(self) -> dict[str, np.ndarray]:
-        """What the residual may depend on, each ``(G, S, 2)``, left and right finger."""
-        return covariates(self.target)
+        """What the residual may depend on, each ``(G, S, 2)``, left and right finger.
+
+        Positions and forces are the predicted ones: the noise of the measured ones is in the residual, too.
+        """
+        found = covariates(self.target)
+        for name, part in (("position_m", slice(0, 2)), ("force_n", slice(2, 4))):
+            found[name] = np.where(self.target.mask[..., None], self.predicted[..., part], np.nan)
+        return found
 
     def explanations(self) -> list[tuple[str, str, float]]:
         """Covariate, signal kind and the share of the residual's variance that its bins explain, largest first."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from forcegrasp.compare.base_fit import BaseFit
-from forcegrasp.compare.fit import Fit, Simulators, fit_once
+from forcegrasp.compare.fit import Fit, Simulators, fit_exactly, fit_once
 from forcegrasp.compare.floor import beyond_fit, cells, excess, numerical_error, numerical_floor
 from forcegrasp.compare.heldout import heldout_residual, log_likelihood, make_folds, rms
 from forcegrasp.compare.problem import Problem
@@ -228,8 +228,8 @@ def refine(scores: Sequence[Score], target: Target, fit: Fit, simulators: Simula
 
 
 def polish(fit: Fit, target: Target, simulators: Simulators) -> Fit:
-    """Goes on from a refined fit with slopes and correction of its own."""
-    return fit_once(target, fit.problem, simulators, fit.vector, fit.correction, rounds=2)
+    """Goes on from a refined fit with the model itself and slopes of its own."""
+    return fit_exactly(target, fit.problem, simulators, fit.vector)
 
 
 def _convincing(candidate: Candidate) -> bool:

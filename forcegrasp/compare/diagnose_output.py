@@ -250,9 +250,9 @@ def sections(diagnosis: Diagnosis, advice: Advice | None, tried: Sequence[type[E
     found = [_step_section(n, *pair, diagnosis) for n, pair in enumerate(found_steps(diagnosis), 1)]
     if advice is not None:
         found.append(_advice_section(diagnosis, advice))
-    if diagnosis.steps:
-        found.append(_tried_section(diagnosis, tried))
-    return [*found, *_left_sections(diagnosis)]
+    attempts = [_tried_section(diagnosis, tried)] if diagnosis.steps else []
+    left = _left_sections(diagnosis)
+    return [*found, *attempts, *left] if diagnosis.effects else [*left, *found, *attempts]
 
 
 def _step_section(number: int, step: Step, before: Fit, diagnosis: Diagnosis) -> Section:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +12,8 @@ from forcegrasp.compare.problem import Problem
 from forcegrasp.compare.target import Target
 from forcegrasp.measure.replay import Replay
 
+# Slopes are measured anew after so many steps; in between they follow the values (Broyden 1965).
+_SLOPES_LAST = 3
 # Step of the finite differences in a problem's coordinates: far above the chaos of the contacts, within the bend.
 _STEP = 0.02
 # Relative change of the cost at which a fit ends, and the largest number of simulations until then.
@@ -84,53 +85,72 @@ def fit_once(
       known_slopes: of the first k coordinates from an earlier fit nearby, ``(G, S, 4, k)``; they are kept, which spares
         most of the simulations.
     """
-    cheap = _Remembered(lambda x: _with_slopes(problem, simulators.cheap, target, x, known_slopes))
-    inside = np.clip(start, problem.low + 1e-9, problem.high - 1e-9)
+    local = _Local(target, problem, simulators.cheap, simulators.cheap, known_slopes)
+    vector = np.clip(start, problem.low + 1e-9, problem.high - 1e-9)
     free = np.ones(len(problem), bool) if free is None else free
-    exact_is_cheap = simulators.exact is simulators.cheap
+    one_model = simulators.exact is simulators.cheap
     if correction is None:
-        correction = 0.0 if exact_is_cheap else _difference(problem, simulators, inside)
+        correction = 0.0 if one_model else _difference(problem, simulators, vector)
     total = 0
     for turn in range(max(1, rounds) if free.any() else 0):
-
-        def whole(part: np.ndarray, known=inside) -> np.ndarray:
-            vector = known.copy()
-            vector[free] = part
-            return vector
-
-        def residuals(part: np.ndarray, whole=whole, shift=correction) -> np.ndarray:
-            return -target.residual(cheap(whole(part))[0] + shift).ravel()
-
-        solution = least_squares(
-            residuals,
-            inside[free],
-            jac=lambda part, whole=whole: cheap(whole(part))[1].reshape(-1, len(problem))[:, free],
-            bounds=(problem.low[free], problem.high[free]),
-            x_scale="jac",
-            ftol=_TOLERANCE,
-            xtol=1e-6,
-            gtol=1e-10,
-            max_nfev=_EVALUATIONS,
-        )
-        inside, total = whole(solution.x), total + solution.nfev
-        if exact_is_cheap or rounds == 0:
+        vector, count = _descend(local, vector, correction, free)
+        total += count
+        if one_model or rounds == 0:
             break
-        renewed = _difference(problem, simulators, inside)
+        renewed = _difference(problem, simulators, vector)
         change = np.sqrt(np.mean(((renewed - correction) / target.sigma)[target.mask] ** 2))
         correction = renewed
         if change < 0.02 and turn:
             break
-    predicted, jacobian = cheap(inside)
-    predicted = predicted + correction
-    residual = target.residual(predicted)
-    flat = jacobian.reshape(-1, len(problem))
-    norms = np.maximum(np.linalg.norm(flat, axis=0), 1e-12)
-    slope = flat.T @ residual.ravel() / norms
-    blocked = ~free | ((inside <= problem.low + 1e-6) & (slope < 0)) | ((inside >= problem.high - 1e-6) & (slope > 0))
-    correction = np.broadcast_to(correction, predicted.shape)
-    return Fit(
-        problem, inside, predicted, residual, jacobian, correction, float(np.abs(slope[~blocked]).max(initial=0)), total
+    return _finish(local, vector, local.value(vector) + correction, correction, free, total)
+
+
+def fit_exactly(target: Target, problem: Problem, simulators: Simulators, start: np.ndarray) -> Fit:
+    """Fits the model itself, near an optimum, with slopes from the cheap one.
+
+    For effects with memory, such as play: where the two models part ways, no correction brings them together.
+    """
+    local = _Local(target, problem, simulators.exact, simulators.cheap, None)
+    free = np.ones(len(problem), bool)
+    vector, total = _descend(local, np.clip(start, problem.low + 1e-9, problem.high - 1e-9), 0.0, free)
+    exact = local.value(vector)
+    cheap = exact if simulators.exact is simulators.cheap else predict(simulators.cheap, [problem.case(vector)])[0]
+    return _finish(local, vector, exact, exact - cheap, free, total)
+
+
+def _descend(local: _Local, start: np.ndarray, shift: np.ndarray | float, free: np.ndarray) -> tuple[np.ndarray, int]:
+    """Goes to the next optimum in the free coordinates; also returns the number of evaluations."""
+
+    def whole(part: np.ndarray) -> np.ndarray:
+        vector = start.copy()
+        vector[free] = part
+        return vector
+
+    problem = local.problem
+    solution = least_squares(
+        lambda part: -local.target.residual(local.value(whole(part)) + shift).ravel(),
+        start[free],
+        jac=lambda part: local.slopes(whole(part)).reshape(-1, len(problem))[:, free],
+        bounds=(problem.low[free], problem.high[free]),
+        x_scale="jac",
+        ftol=_TOLERANCE,
+        xtol=1e-6,
+        gtol=1e-10,
+        max_nfev=_EVALUATIONS,
     )
+    return whole(solution.x), solution.nfev
+
+
+def _finish(local: _Local, vector: np.ndarray, predicted: np.ndarray, correction, free: np.ndarray, total: int) -> Fit:
+    problem = local.problem
+    jacobian = local.slopes(vector, anew=True)
+    residual = local.target.residual(predicted)
+    flat = jacobian.reshape(-1, len(problem))
+    slope = flat.T @ residual.ravel() / np.maximum(np.linalg.norm(flat, axis=0), 1e-12)
+    blocked = ~free | ((vector <= problem.low + 1e-6) & (slope < 0)) | ((vector >= problem.high - 1e-6) & (slope > 0))
+    steepest = float(np.abs(slope[~blocked]).max(initial=0))
+    correction = np.broadcast_to(correction, predicted.shape)
+    return Fit(problem, vector, predicted, residual, jacobian, correction, steepest, total)
 
 
 def _difference(problem: Problem, simulators: Simulators, vector: np.ndarray) -> np.ndarray:
@@ -138,39 +158,66 @@ def _difference(problem: Problem, simulators: Simulators, vector: np.ndarray) ->
     return predict(simulators.exact, case)[0] - predict(simulators.cheap, case)[0]
 
 
-def _with_slopes(
-    problem: Problem, replay: Replay, target: Target, vector: np.ndarray, known: np.ndarray | None
-) -> tuple[np.ndarray, np.ndarray]:
-    """Prediction ``(G, S, 4)`` and its slopes ÷ noise ``(G, S, 4, p)`` by one-sided differences, in one simulation."""
-    count = 0 if known is None else known.shape[-1]
-    groups = [group for group in problem.columns() if min(group) >= count]
-    step = np.where(vector + _STEP > problem.high, -_STEP, _STEP)
-    step = np.where(np.abs(problem.high - problem.low) < 2 * _STEP, (problem.high - problem.low) / 4, step)
-    varied = [vector]
-    for group in groups:
-        moved = vector.copy()
-        moved[group] += step[group]
-        varied.append(moved)
-    signals = predict(replay, [problem.case(v) for v in varied])
-    slopes = np.zeros((*signals.shape[1:], len(problem)))
-    for change, group in zip(signals[1:] - signals[0], groups, strict=True):
-        for index in group:
-            members = problem.entries[index].members
-            slopes[members, :, :, index] = change[members] / step[index]
-    slopes /= target.sigma[:, None]
-    slopes[~target.mask] = 0
-    if count:
-        slopes[..., :count] = known
-    return signals[0], slopes
+class _Local:
+    """Values and slopes of a prediction, with as few simulations as will do.
 
+    Args:
+      target: the measurements.
+      problem: what may be changed.
+      values: simulates the values.
+      slopes: simulates the slopes.
+      known: slopes of the first coordinates, which are not to be found again, ``(G, S, 4, k)``.
+    """
 
-class _Remembered:
-    """Keeps the last result: the optimiser asks for value and slopes of the same point one after the other."""
+    def __init__(
+        self, target: Target, problem: Problem, values: Replay, slopes: Replay, known: np.ndarray | None
+    ) -> None:
+        self.target, self.problem = target, problem
+        self._values, self._slopes, self._known = values, slopes, known
+        self._value: tuple[np.ndarray, np.ndarray] | None = None  # the last point, and the signals there
+        self._slope: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None  # point, signals, slopes
+        self._age = 0
 
-    def __init__(self, function: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]) -> None:
-        self._function, self._last = function, (None, None)
+    def value(self, x: np.ndarray) -> np.ndarray:
+        """Predicted signals, ``(G, S, 4)``."""
+        if self._value is None or not np.array_equal(self._value[0], x):
+            self._value = (x.copy(), predict(self._values, [self.problem.case(x)])[0])
+        return self._value[1]
 
-    def __call__(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        if self._last[0] is None or not np.array_equal(self._last[0], x):
-            self._last = (x.copy(), self._function(x))
-        return self._last[1]
+    def slopes(self, x: np.ndarray, anew: bool = False) -> np.ndarray:
+        """Slopes of the signals ÷ noise over the coordinates, ``(G, S, 4, p)``."""
+        value = self.value(x)
+        if self._slope is not None and np.array_equal(self._slope[0], x) and not (anew and self._age):
+            return self._slope[2]
+        if self._slope is None or anew or self._age >= _SLOPES_LAST:
+            self._age, slopes = 0, self._measured(x, value)
+        else:
+            self._age += 1
+            before, signals, slopes = self._slope
+            step = x - before
+            surprise = np.where(self.target.mask[..., None], (value - signals) / self.target.sigma, 0) - slopes @ step
+            slopes = slopes + surprise[..., None] * (step / (step @ step))
+        self._slope = (x.copy(), value, slopes)
+        return slopes
+
+    def _measured(self, x: np.ndarray, value: np.ndarray) -> np.ndarray:
+        """One-sided differences, all in one simulation."""
+        problem, target = self.problem, self.target
+        count = 0 if self._known is None else self._known.shape[-1]
+        groups = [group for group in problem.columns() if min(group) >= count]
+        step = np.where(x + _STEP > problem.high, -_STEP, _STEP)
+        step = np.where(np.abs(problem.high - problem.low) < 2 * _STEP, (problem.high - problem.low) / 4, step)
+        moved = [x + step * np.isin(np.arange(len(x)), group) for group in groups]
+        same = self._values is self._slopes
+        signals = predict(self._slopes, [problem.case(v) for v in (moved if same else [x, *moved])])
+        signals, base = (signals, value) if same else (signals[1:], signals[0])
+        slopes = np.zeros((*value.shape, len(problem)))
+        for change, group in zip(signals - base, groups, strict=True):
+            for index in group:
+                members = problem.entries[index].members
+                slopes[members, :, :, index] = change[members] / step[index]
+        slopes /= target.sigma[:, None]
+        slopes[~target.mask] = 0
+        if count:
+            slopes[..., :count] = self._known
+        return slopes

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,8 @@ from forcegrasp.errors import ConfigError, closest
 from forcegrasp.physics.gripper import Gripper, load_gripper
 
 FORMAT = "forcegrasp-model/1"
+# Of a key in a message.
+_LONGEST_KEY = 80
 
 
 @dataclass(frozen=True)
@@ -99,103 +102,129 @@ def read_model(path: Path) -> Model:
     """
     try:
         raw = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError, ValueError) as error:
-        raise ConfigError(f"{path}: could not read the model: {' '.join(str(error).split())}") from error
+    except RecursionError as error:
+        raise _refuse(path, "", "could not read the model: nested too deeply") from error
+    except (OSError, ValueError, yaml.YAMLError) as error:
+        why = getattr(error, "strerror", None) or str(error)
+        raise _refuse(path, "", f"could not read the model: {why}") from error
     keys = ("format", "gripper", "mujoco", "data", "base", "objects", "grasps", "effects", "warnings")
     if not isinstance(raw, dict) or raw.get("format") != FORMAT:
-        raise ConfigError(f"{path}: format: must be {FORMAT}; write a model with `forcegrasp fit`")
+        raise _refuse(path, "format", f"must be {FORMAT}; write a model with `forcegrasp fit`")
     for key in raw:
         if key not in keys:
-            raise ConfigError(f"{path}: {key}: unknown{closest(str(key), keys)}")
+            raise _refuse(path, str(key), f"unknown{closest(str(key), keys)}")
     if not isinstance(raw.get("gripper"), str):
-        raise ConfigError(f"{path}: gripper: missing")
-    gripper = load_gripper(raw["gripper"], path.parent)
+        raise _refuse(path, "gripper", "must be a gripper's name, or the path of its description")
+    gripper = _renamed(path, "gripper", lambda: load_gripper(raw["gripper"], path.parent))
     base = _read_all(path, "base", raw.get("base"), gripper, "gripper")
     missing = {n for n, p in gripper.parameters.items() if p.scope == "gripper"} - set(base)
     if missing:
-        raise ConfigError(f"{path}: base.{min(missing)}: missing")
+        raise _refuse(path, f"base.{min(missing)}", "missing")
     objects = {
         str(o): _read_all(path, f"objects.{o}", v, gripper, "object") for o, v in _map(path, "objects", raw).items()
     }
     grasps = {str(g): _read_all(path, f"grasps.{g}", v, gripper, "grasp") for g, v in _map(path, "grasps", raw).items()}
     effects = tuple(_read_effect(path, name, entry) for name, entry in _map(path, "effects", raw).items())
-    data = {str(k): str(v) for k, v in _map(path, "data", raw).items()}
-    lines = raw.get("warnings") or []
+    data = {str(key): _text(path, f"data.{key}", value) for key, value in _map(path, "data", raw).items()}
+    lines = [] if raw.get("warnings") is None else raw["warnings"]
     if not isinstance(lines, list):
-        raise ConfigError(f"{path}: warnings: must be a list")
-    return Model(gripper, base, objects, grasps, effects, data, tuple(map(str, lines)))
+        raise _refuse(path, "warnings", "must be a list")
+    warnings = tuple(_text(path, f"warnings.{index}", line) for index, line in enumerate(lines))
+    return Model(gripper, base, objects, grasps, effects, data, warnings)
 
 
-def _read_effect(path: Path, name: str, entry: Any) -> FoundEffect:
+def _read_effect(path: Path, name: Any, entry: Any) -> FoundEffect:
     where = f"effects.{name}"
-    effect = _renamed(f"{path}: effects: ", lambda: get_effect(str(name)))
+    effect = _renamed(path, "effects", lambda: get_effect(str(name)))
     if not isinstance(entry, dict):
-        raise ConfigError(f"{path}: {where}: must be a mapping of its parameters")
+        raise _refuse(path, where, "must be a mapping of its parameters")
     known = {p.name: p for p in effect.parameters}
-    variant = entry.get("variant", "")
-    if variant and variant not in effect.variants:
-        raise ConfigError(f"{path}: {where}.variant: must be one of {', '.join(effect.variants)}")
+    variant = entry.get("variant", effect.variants[0])
+    if variant not in effect.variants:
+        raise _refuse(path, f"{where}.variant", f"must be {' or '.join(filter(None, effect.variants)) or 'left out'}")
     for key in entry:
         if key != "variant" and key not in known:
-            raise ConfigError(f"{path}: {where}.{key}: unknown{closest(str(key), known)}")
+            raise _refuse(path, f"{where}.{key}", f"unknown{closest(str(key), known)}")
     parameters = {}
-    for parameter in effect.parameters:
-        if parameter.name not in entry:
-            raise ConfigError(f"{path}: {where}.{parameter.name}: missing")
-        fitted = _read_number(path, f"{where}.{parameter.name}", entry[parameter.name], parameter.unit)
-        if not (parameter.low <= fitted.low <= fitted.high <= parameter.high or fitted.value == parameter.null):
-            limits = f"[{parameter.low:g}, {parameter.high:g}] {parameter.unit}"
-            raise ConfigError(f"{path}: {where}.{parameter.name}: must lie in {limits}")
-        parameters[parameter.name] = fitted
-    return FoundEffect(effect, variant or effect.variants[0], parameters)
+    for p in effect.parameters:
+        if p.name not in entry:
+            raise _refuse(path, f"{where}.{p.name}", "missing")
+        fitted = _read_number(path, f"{where}.{p.name}", entry[p.name], p.unit)
+        absent = fitted.low == fitted.value == fitted.high == p.null  # which may be infinite
+        if not (absent or (p.low <= fitted.low and fitted.high <= p.high)):
+            raise _refuse(path, f"{where}.{p.name}", f"must lie in [{p.low:g}, {p.high:g}] {p.unit}")
+        parameters[p.name] = fitted
+    return FoundEffect(effect, variant, parameters)
 
 
 def _read_all(path: Path, where: str, raw: Any, gripper: Gripper, scope: str) -> dict[str, Fitted]:
     if not isinstance(raw, dict):
-        raise ConfigError(f"{path}: {where}: must be a mapping of parameters")
+        raise _refuse(path, where, "must be a mapping of parameters")
     known = {name: p for name, p in gripper.parameters.items() if p.scope == scope}
     for name in raw:
         if name not in known:
-            raise ConfigError(f"{path}: {where}.{name}: unknown{closest(str(name), known)}")
+            raise _refuse(path, f"{where}.{name}", f"unknown{closest(str(name), known)}")
     found = {}
     for name, entry in raw.items():
-        found[name] = _read_number(path, f"{where}.{name}", entry, known[name].unit)
-        if not known[name].low <= found[name].value <= known[name].high:
-            raise ConfigError(f"{path}: {where}.{name}: must lie in [{known[name].low:g}, {known[name].high:g}]")
+        p, fitted = known[name], _read_number(path, f"{where}.{name}", entry, known[name].unit)
+        if not (p.low <= fitted.low and fitted.high <= p.high):
+            raise _refuse(path, f"{where}.{name}", f"must lie in [{p.low:g}, {p.high:g}] {p.unit}")
+        found[name] = fitted
     return found
 
 
 def _read_number(path: Path, where: str, entry: Any, unit: str) -> Fitted:
     parts = entry if isinstance(entry, dict) else {"value": entry}
+    keys = ("value", "low", "high", "unit")
     for key in parts:
-        if key not in ("value", "low", "high", "unit"):
-            raise ConfigError(f"{path}: {where}.{key}: unknown{closest(str(key), ('value', 'low', 'high', 'unit'))}")
-    numbers = []
-    for key in ("value", "low", "high"):
-        number = parts.get(key, parts.get("value"))
-        if isinstance(number, bool) or not isinstance(number, (int, float)) or number != number:
-            raise ConfigError(f"{path}: {where}.{key}: must be a number")
-        numbers.append(float(number))
-    value, low, high = numbers
+        if key not in keys:
+            raise _refuse(path, f"{where}.{key}", f"unknown{closest(str(key), keys)}")
+    value, low, high = (
+        _number(path, f"{where}.{key}" if isinstance(entry, dict) else where, parts.get(key, parts.get("value")))
+        for key in ("value", "low", "high")
+    )
     if not low <= value <= high:
-        raise ConfigError(f"{path}: {where}: low ≤ value ≤ high must hold")
+        raise _refuse(path, where, f"low ≤ value ≤ high must hold, and does not with {low:g}, {value:g}, {high:g}")
     if parts.get("unit", unit) != unit:
-        raise ConfigError(f"{path}: {where}.unit: must be {unit}")
+        raise _refuse(path, f"{where}.unit", f"must be {unit}")
     return Fitted(value, low, high, unit)
 
 
+def _number(path: Path, where: str, value: Any) -> float:
+    try:
+        if isinstance(value, (int, float)) and not isinstance(value, bool) and not math.isnan(value):
+            return float(value)
+    except OverflowError:
+        pass
+    hint = "; YAML wants 1.0e-3 for 1e-3" if isinstance(value, str) and "e" in value.lower() else ""
+    raise _refuse(path, where, f"must be a number{hint}")
+
+
+def _text(path: Path, where: str, value: Any) -> str:
+    if isinstance(value, str):
+        return value
+    raise _refuse(path, where, "must be text; put it in quotes")
+
+
 def _map(path: Path, key: str, raw: Mapping[str, Any]) -> dict:
-    value = raw.get(key) or {}
+    value = {} if raw.get(key) is None else raw[key]
     if not isinstance(value, dict):
-        raise ConfigError(f"{path}: {key}: must be a mapping")
+        raise _refuse(path, key, "must be a mapping")
     return value
 
 
-def _renamed(prefix: str, call):
+def _renamed(path: Path, where: str, call: Callable[[], Any]) -> Any:
     try:
         return call()
     except ConfigError as error:
-        raise ConfigError(f"{prefix}{error}") from error
+        raise _refuse(path, where, str(error)) from error
+
+
+def _refuse(path: Path, where: str, problem: str) -> ConfigError:
+    """The error to raise about a key, in one line whatever the file says."""
+    key = where if len(where) <= _LONGEST_KEY else f"{where[:_LONGEST_KEY]}…"
+    text = ": ".join(filter(None, (str(path), key, problem)))
+    return ConfigError(" ".join("".join(c if c.isprintable() else " " for c in text).split()))
 
 
 def _gripper_name(gripper: Gripper) -> str:

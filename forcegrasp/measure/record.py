@@ -100,7 +100,9 @@ def record(
     name = gripper.path.stem if gripper.is_shipped else str(gripper.path.resolve())
     fingerprint = fingerprint_of_set(name, position_std_m, force_std_n, full)
     source = f"simulated by forcegrasp record, plan {plan}, seed {seed}"
-    measured = MeasurementSet(Path(), "", name, source, "", position_std_m, force_std_n, full, fingerprint)
+    measured = MeasurementSet(
+        Path(), "recorded", name, source, "none: simulated", position_std_m, force_std_n, full, fingerprint
+    )
     return Recorded(measured, base)
 
 

@@ -198,7 +198,7 @@ def test_metadata(effect):
 def test_parameters(effect, variant, parameter):
     p = parameter
     assert p.unit
-    assert p.name.endswith({"1": "", "m/N": "_m_n", "N/s": "_n_s", "m/s": "_m_s"}.get(p.unit, f"_{p.unit.lower()}"))
+    assert p.name.endswith({"1": "", "m/N": "_m_n", "N/m": "_n_m", "N/s": "_n_s", "m/s": "_m_s"}.get(p.unit, f"_{p.unit.lower()}"))
     assert p.low < p.typical < p.high
     assert all(p.low <= size <= p.high for size in p.trials)
     assert np.isinf(p.null) or p.low <= p.null <= p.high
@@ -226,6 +226,43 @@ def test_wrong_use_is_refused(effect):
         effect(np.zeros((2, len(effect.parameters) + 1)), 0.002)
     with pytest.raises(ValueError, match="no variant 'nonsense'"):
         effect(effect.typical_values()[None], 0.002, "nonsense")
+
+
+@pytest.mark.parametrize(("effect", "variant"), CASES)
+def test_what_a_class_says_of_its_variants_is_true(effect, variant):
+    """`reads_only`: nothing that happens changes. `reads`: what is read differs from what happens."""
+    trace = rollout(3, [(effect, effect.typical_values(), variant, range(3))])
+    moved = trace.true_position.tobytes() != bare("fast").true_position.tobytes()
+    assert moved != effect.reads_only(variant)
+    read = not all(map(np.array_equal, (trace.position, trace.force), (trace.true_position, trace.true_force)))
+    assert read == effect.reads()
+
+
+def test_longest_is_the_largest_that_will_be():
+    delay = get_effect("command_delay")
+    values = np.array([[0.01], [0.04]])
+    assert delay(values, 0.002).longest("delay_s") == 0.04
+    assert delay(values, 0.002, "", np.array([0.02])).longest("delay_s") == 0.04
+    assert delay(values, 0.002, "", np.array([0.2])).longest("delay_s") == 0.2
+
+
+@pytest.mark.parametrize("name", ["command_delay", "force_delay"])
+def test_delays_that_are_drawn_anew_act(name):
+    """Values written before a reset are those of the new grasps; rows that are not reset keep theirs."""
+    kind, n = get_effect(name), 3
+    plant = make_plant(n)
+    effect = kind(np.full((n, 1), 0.02), plant.dt, "", np.array([0.1]))
+    plant.attach([(effect, np.arange(n))])
+    start(plant, range(n))
+    play(plant, RICH[:18])
+    effect.values[1:] = [[0.1], [0.0]]
+    start(plant, [1, 2])
+    commands = np.stack([np.roll(RICH, -18, axis=0), RICH, RICH], axis=1)
+    after = play(plant, commands)
+    fresh = rollout(n, [(kind, [[0.02], [0.1], [0.0]], "", range(n))])
+    assert after.row(1) == fresh.row(1)
+    assert after.row(2) == fresh.row(2) == bare("fast").row(2)
+    assert after.position[: len(RICH) - 18, 0].tobytes() == fresh.position[18:, 0].tobytes()
 
 
 def test_no_torch():
