@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
@@ -31,6 +32,8 @@ EXPLAINED = 0.5
 _REFITTED = 5
 # A signature this much worse than the best is not refitted.
 _HOPELESS = 0.2
+# A refit gains at most about twice what a signature promises.
+_UNSEEN = 0.5
 # Effects whose signatures are that parallel can't be told apart, whatever the likelihood says.
 _PARALLEL = 0.995
 
@@ -134,6 +137,8 @@ def diagnose(
         if step.verdict == "none":
             break
         fit = polish(step.candidates[0].fit, target, simulators)
+        step = dataclasses.replace(step, error_after=rms(heldout_residual(fit, target, folds), target))
+        steps[-1] = step
         progress(f"found {step.effects[0]}: held-out error {step.error_before:.2f} → {step.error_after:.2f} × noise")
         if not excess(heldout_residual(fit, target, folds), numerical, target):
             break
@@ -180,7 +185,9 @@ def _look_further(
     held = heldout_residual(fit, target, folds)
     error = rms(held, target)
     bar = float(np.quantile(null, 1 - ALARM))
-    hopeful = [s for s in ranked if s.gain > max(bar, _HOPELESS * ranked[0].gain)][:_REFITTED]
+    beyond = np.sum(fit.residual**2) - target.mask.sum() * 4
+    least = max(bar, _HOPELESS * ranked[0].gain, _UNSEEN * LEAST_SHARE * beyond) if ranked else np.inf
+    hopeful = [s for s in ranked if s.gain > least][:_REFITTED]
     candidates = []
     for number, score in enumerate(hopeful, 1):
         progress(f"refitting with {score.effect.name} {score.variant} ({number} of {len(hopeful)})")

@@ -89,7 +89,8 @@ def write_model(model: Model, path: Path) -> None:
     )
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(head + yaml.dump(content, sort_keys=False, allow_unicode=True, width=120, Dumper=_Flat))
+        text = head + yaml.dump(content, sort_keys=False, allow_unicode=True, width=120, Dumper=_Flat)
+        path.write_text(text, encoding="utf-8")
     except OSError as error:
         raise ConfigError(f"{path}: could not write the model ({error.strerror})") from error
 
