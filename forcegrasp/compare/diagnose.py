@@ -22,8 +22,8 @@ from forcegrasp.effects.quantisation import Quantisation
 MOST_EFFECTS = 4
 #: Family-wise probability of a false alarm that is accepted at each step.
 ALARM = 0.01
-#: An effect must lower the error of some signal in some phase by this share.
-LEAST_GAIN = 0.02
+#: An effect must lower the error of some signal in some phase by this share; by more where all is at the floor already.
+LEAST_GAIN, LEAST_GAIN_AT_FLOOR = 0.02, 0.1
 #: An effect must explain this share of the mean square beyond the noise.
 LEAST_SHARE = 0.25
 #: Effects must explain this share of it together to be the answer; below it is "unknown".
@@ -196,7 +196,8 @@ def _look_further(
     for candidate in sorted(candidates, key=lambda c: -c.heldout_gain):
         best.setdefault(candidate.effect.name, candidate)  # of several variants the best one
     ordered = tuple(best.values())
-    if not ordered or not _convincing(ordered[0]):
+    least_gain = LEAST_GAIN if excess(held, numerical, target) else LEAST_GAIN_AT_FLOOR
+    if not ordered or not _convincing(ordered[0], least_gain):
         return Step("none", (), ordered, tuple(ranked), error, error)
     winner = ordered[0]
     equal = [winner, *(c for c in ordered[1:] if _equal(winner, c))]
@@ -239,13 +240,13 @@ def polish(fit: Fit, target: Target, simulators: Simulators) -> Fit:
     return fit_exactly(target, fit.problem, simulators, fit.vector)
 
 
-def _convincing(candidate: Candidate) -> bool:
+def _convincing(candidate: Candidate, least_gain: float) -> bool:
     gains = candidate.gains[np.isfinite(candidate.gains)]
     spread = gains.std(ddof=1) * np.sqrt(len(gains)) if len(gains) > 1 else np.inf
     return (
         candidate.p_family <= ALARM
         and gains.sum() > max(spread, 5.0)
-        and candidate.largest_fall >= LEAST_GAIN
+        and candidate.largest_fall >= least_gain
         and candidate.share >= LEAST_SHARE
     )
 

@@ -51,7 +51,7 @@ def diagnosis_json(analysis: TableAnalysis) -> dict:
         "error_before": before,
         "error_after": after,
         "floor_ratio": after,
-        "next_grasp": grasps[0] if grasps else None,
+        "next_grasp": {"grasp": grasps[0], "tells_apart": list(analysis.effects)} if grasps else None,
         "where": _where(analysis) if analysis.verdict == "unknown" else None,
     }
 
@@ -225,7 +225,7 @@ def sections(analysis: TableAnalysis) -> list[Section]:
             draw(analysis), "Measured final forces with the base law (dashed) and the best shape; below, residuals."
         ),
         fitted,
-        *(Text(f"{sentence[0].upper()}{sentence[1:]}.") for sentence in facts(analysis)),
+        *(Text(f"{sentence}.") for sentence in facts(analysis)),
         *(Text(f"{name} was left out: {why}.") for name, why in analysis.skipped.items()),
     ]
     doubt = Text(

@@ -51,7 +51,7 @@ def warnings(fit: Fit, errors: np.ndarray) -> list[str]:
     ):
         margin = 1e-3 * (high - low)
         for bound, at in ((entry.low, x - low < margin), (entry.high, high - x < margin)):
-            if at and bound != getattr(entry, "null", None):
+            if at and bound != entry.null:
                 lines.append(f"{entry.name} ended at its bound {bound:g} {entry.unit}: widen it or doubt the model")
         if Z95 * error > 0.5 * (high - low):
             lines.append(f"{entry.name} is hardly fixed by these data")

@@ -27,6 +27,7 @@ class Entry:
     unit: str
     logarithmic: bool
     scale: float  #: a change of this size is worth noticing, in its own unit; 1 for logarithms
+    null: float = float("nan")  #: where an effect's parameter does nothing; base parameters have no such value
 
     def coordinate(self, value: float) -> float:
         """The fit's own coordinate of a value; differences of 1 are large."""
@@ -97,7 +98,8 @@ class Problem:
                 scale = 1.0 if p.logarithmic else abs(p.typical)
                 bounds = (p.typical, p.low, p.high, p.unit)
                 everyone = np.ones(len(self.grasps), bool)
-                entries.append(Entry(f"{effect.name}.{p.name}", p.name, index, everyone, *bounds, p.logarithmic, scale))
+                name, kind = f"{effect.name}.{p.name}", (p.logarithmic, scale, p.null)
+                entries.append(Entry(name, p.name, index, everyone, *bounds, *kind))
         return entries
 
     def start(self) -> np.ndarray:

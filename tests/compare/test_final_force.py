@@ -78,7 +78,7 @@ def test_the_real_table_names_a_set_and_a_grasp(real):
     look_alikes = {"backlash", "force_deadzone", "command_deadband", "adhesion", "coulomb_friction", "stiction"}
     assert look_alikes | {"encoder_bias"} <= set(real.effects)
     assert not {"command_delay", "force_lag", "object_friction", "viscoelastic_contact"} & set(real.effects)
-    assert real.diagnosis_json()["next_grasp"] in MENU
+    assert real.diagnosis_json()["next_grasp"]["grasp"] in MENU
     assert real.slopes_differ_p < 0.01
     assert real.slope_ratio[0] == pytest.approx(339 / 283, abs=0.01)
     assert abs(real.shared["travel"] - real.shared["force"]) < 1e-3  # a gap or a threshold: these rows can't tell

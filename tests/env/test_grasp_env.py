@@ -10,10 +10,13 @@ from torchrl.data import Bounded
 from torchrl.envs.utils import check_env_specs
 
 from forcegrasp.config import GraspConfig, PhysicsConfig, RewardConfig
+from forcegrasp.effects import get_effect
+from forcegrasp.effects.model_file import Fitted, FoundEffect, Model
 from forcegrasp.env import GraspEnv
 from forcegrasp.env.grasp_env import OBSERVATIONS
 from forcegrasp.errors import ConfigError
 from forcegrasp.physics import FixedGrasps, GraspSimulator
+from forcegrasp.physics.gripper import load_gripper
 
 FAST = PhysicsConfig(tier="fast", threads=1)
 #: Large objects, which both fingers meet within 20 steps.
@@ -44,8 +47,10 @@ def test_entries_and_their_shapes():
     env = GraspEnv(3, FAST)
     sizes = {
         "joint_position": 2,
+        "measured_position": 2,
         "commanded_position": 2,
         "force": 2,
+        "measured_force": 2,
         "goal_force": 1,
         "object_position": 1,
         "object_speed": 1,
@@ -77,12 +82,87 @@ def test_state_is_the_simulators(draw):
     for t, action in enumerate(actions):
         simulator.step(action.double().numpy())
         now = rollout[:, t]
-        for key in ("joint_position", "commanded_position", "force"):
+        for key in ("joint_position", "measured_position", "commanded_position", "force", "measured_force"):
             np.testing.assert_array_equal(now.get(key), getattr(simulator, key).astype(np.float32))
         for key in ("object_position", "object_speed"):
             np.testing.assert_array_equal(now.get(key)[:, 0], getattr(simulator, key).astype(np.float32))
         np.testing.assert_array_equal(now.get("goal_force")[:, 0], grasps.goal_force_n.astype(np.float32))
         np.testing.assert_array_equal(now.get("grasp_parameters"), grasps.as_array().astype(np.float32))
+
+
+NOMINAL = {"position_gain": Fitted(100.0, 100.0, 100.0), "velocity_gain": Fitted(-9.0, -9.0, -9.0)}
+
+
+def model_with(name: str, *values: float, low: float = 1.0, high: float = 1.0) -> Model:
+    """A nominal gripper with one effect, known but for these factors."""
+    kind = get_effect(name)
+    numbers = {p.name: Fitted(v, *sorted((low * v, high * v))) for p, v in zip(kind.parameters, values, strict=True)}
+    return Model(load_gripper("tiago"), NOMINAL, effects=(FoundEffect(kind, kind.variants[0], numbers),))
+
+
+def test_without_a_model_what_is_measured_is_true():
+    rollout = play(GraspEnv(3, FAST, NEAR), close(25, 3))
+    assert (rollout.get(("next", "force")) > 0).any()
+    for state in (rollout, rollout.get("next")):
+        assert torch.equal(state.get("measured_position"), state.get("joint_position"))
+        assert torch.equal(state.get("measured_force"), state.get("force"))
+
+
+def test_force_bias_of_a_model_is_measured_and_not_paid_for(draw):
+    """Readings are off by exactly the bias; what happens and what is paid stay as they are."""
+    grasps, actions = draw(4, radius_m=[0.03, 0.035], b2=[-9.0, -9.0]), close(25, 4)
+    model = model_with("force_bias", 0.05, -0.03)
+    plain = play(GraspEnv(4, FAST, sampler=FixedGrasps(grasps)), actions).get("next")
+    biased = play(GraspEnv(4, FAST, sampler=FixedGrasps(grasps), model=model), actions).get("next")
+    for key in plain.keys(True, True):
+        if key != "measured_force":
+            assert torch.equal(biased.get(key), plain.get(key)), key
+    off = biased.get("measured_force") - biased.get("force")
+    torch.testing.assert_close(off, torch.tensor([0.05, -0.03]).expand_as(off), rtol=0, atol=1e-7)
+
+
+def test_encoder_bias_of_a_model_is_measured():
+    """The gripper's own numbers are used: a command is a delta to what the encoder says."""
+    env = GraspEnv(2, FAST, NEAR, model=model_with("encoder_bias", -0.001, 0.0005))
+    state = env.reset()
+    off = torch.tensor([-0.001, 0.0005]).expand(2, 2)
+    torch.testing.assert_close(state.get("measured_position") - state.get("joint_position"), off, rtol=0, atol=1e-8)
+    after = env.step(state.clone().set("joint_delta", torch.full((2, 2), -0.002))).get("next")
+    commanded = (state.get("measured_position") - 0.002).clamp(max=0.045)
+    torch.testing.assert_close(after.get("commanded_position"), commanded, rtol=0, atol=1e-8)
+
+
+def test_models_are_drawn_from_the_seed():
+    model = model_with("force_bias", 0.05, -0.03, low=0.5)
+
+    def bias(seed: int) -> torch.Tensor:
+        env = GraspEnv(4, FAST, NEAR, seed=seed, model=model)
+        return torch.stack([env.reset().get("measured_force") for _ in range(2)])
+
+    one, again, other = bias(1), bias(1), bias(2)
+    assert torch.equal(one, again)
+    assert not (one == other).any()
+    assert not (one[0] == one[1]).any()
+    assert one.abs().max() <= 0.05
+
+
+def test_velocity_gain_of_a_model_replaces_b2():
+    state = GraspEnv(3, FAST, GraspConfig(b2=[-7.0, -6.0]), model=model_with("force_bias", 0.0, 0.0)).reset()
+    assert torch.equal(state.get("grasp_parameters")[:, 1], torch.full((3,), -9.0))
+
+
+def test_partial_reset_with_a_model():
+    env = GraspEnv(3, FAST, NEAR, model=model_with("force_bias", 0.05, -0.03, low=0.5))
+    state = play(env, close(20, 3)).get("next")[:, -1].exclude("reward")
+    reset = env.reset(state.clone().set("_reset", torch.tensor([[False], [True], [False]])))
+    others = torch.tensor([0, 2])
+    for key in OBSERVATIONS:
+        assert torch.equal(reset.get(key)[others], state.get(key)[others]), key
+    assert not torch.equal(reset.get("measured_force")[1], state.get("measured_force")[1] - state.get("force")[1])
+
+
+def test_specs_with_a_model():
+    check_env_specs(GraspEnv(2, FAST, GraspConfig(steps=20), model=model_with("command_delay", 0.05, low=0.2)), seed=0)
 
 
 @pytest.mark.parametrize("form", ["paper", "goal_normalised"])

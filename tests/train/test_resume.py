@@ -134,6 +134,50 @@ def test_with_the_newest_checkpoint_damaged(whole, run, equal):
     assert equal(run, whole)
 
 
+MODEL = """format: forcegrasp-model/1
+gripper: tiago
+base:
+  position_gain: {value: 95.0, low: 80.0, high: 110.0}
+  velocity_gain: {value: -8.0, low: -9.0, high: -7.0}
+effects:
+  command_delay: {delay_s: {value: 0.02, low: 0.0, high: 0.06}}
+  force_bias: {left_n: {value: 0.02, low: 0.0, high: 0.04}, right_n: -0.01}
+"""
+
+
+def test_with_a_model_that_is_gone_by_then(tmp_path, tiny, trained, equal):
+    """The run keeps a copy: a training with a fitted model is resumed bit by bit without the file it was given."""
+    given = tmp_path / "fitted.yaml"
+    given.write_text(MODEL)
+    config = tiny(log={"checkpoint_every": 2, "keep": 99})
+    nominal = trained(tmp_path / "nominal", config)
+    config.model = str(given)
+    whole = trained(tmp_path / "whole", config)
+    assert final(whole) != final(nominal)
+    run = RunDir.create(tmp_path / "run", config, [])
+    with after_batch(2, ctrl_c):
+        assert not train(config, run)
+    given.unlink()
+    with after_batch(3, power_cut), pytest.raises(PowerCutError):
+        resume(run)
+    assert resume(run)
+    assert equal(run, whole)
+
+
+def test_a_model_that_changed_meanwhile_does_not_change_the_run(tmp_path, tiny, trained, equal):
+    given = tmp_path / "fitted.yaml"
+    given.write_text(MODEL)
+    config = tiny()
+    config.model = str(given)
+    whole = trained(tmp_path / "whole", config)
+    run = RunDir.create(tmp_path / "run", config, [])
+    with after_batch(2, ctrl_c):
+        train(config, run)
+    given.write_text(MODEL.replace("0.06", "0.3"))
+    assert resume(run)
+    assert equal(run, whole)
+
+
 def test_second_ctrl_c_ends_at_once(run):
     def twice():
         ctrl_c()

@@ -1,0 +1,114 @@
+"""A small part of the campaign of tools/hidden_effects.py: sets of the independent recorder, and sets that were spoilt."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from forcegrasp.compare import workflow
+from forcegrasp.effects import get_effect
+from forcegrasp.errors import ConfigError, MeasurementError
+from forcegrasp.measure import check_set, read_set
+from tests.independent.rig import record
+
+GRASPS = 10
+
+
+def silent(text: str) -> None:
+    """Takes what a diagnosis tells about its progress."""
+
+
+def recorded(folder, hidden: dict, seed: int = 1, grasps: int = GRASPS) -> workflow.Loaded:
+    record(folder / "set", hidden, seed, grasps)
+    return workflow.load(folder / "set")
+
+
+def diagnosed(loaded: workflow.Loaded):
+    return workflow.diagnose_set(loaded, None, [], 0, silent)[0]
+
+
+@pytest.mark.parametrize("name", ["coulomb_friction", "encoder_bias", "force_lag", "quantisation"])
+def test_finds_what_was_hidden(tmp_path, name):
+    diagnosis = diagnosed(recorded(tmp_path, {name: "medium"}))
+    assert diagnosis.verdict in ("effect", "one_of")
+    assert diagnosis.effects[0] == name
+    assert diagnosis.error_after < 1.1 * diagnosis.floor
+    assert diagnosis.error_after < diagnosis.error_before
+
+
+def test_finds_nothing_where_nothing_is_hidden(tmp_path):
+    diagnosis = diagnosed(recorded(tmp_path, {}, seed=3))
+    assert (diagnosis.verdict, diagnosis.effects) == ("explained", ())
+    assert diagnosis.error_after < 1.1
+
+
+def test_does_not_name_an_effect_for_one_that_it_does_not_know(tmp_path):
+    diagnosis = diagnosed(recorded(tmp_path, {"motor_cogging": "medium"}))
+    assert (diagnosis.verdict, diagnosis.effects) == ("unknown", ())
+    assert diagnosis.left
+
+
+def respoil(loaded: workflow.Loaded, spoil) -> workflow.Loaded:
+    grasps = tuple(spoil(list(loaded.measured.grasps)))
+    return dataclasses.replace(loaded, measured=dataclasses.replace(loaded.measured, grasps=grasps))
+
+
+def shuffle(grasps):
+    """Each grasp gets another one's readings."""
+    turned = grasps[1:] + grasps[:1]
+    return [
+        dataclasses.replace(g, position_m=other.position_m, force_n=other.force_n)
+        for g, other in zip(grasps, turned, strict=True)
+    ]
+
+
+def swap_fingers(grasps):
+    return [dataclasses.replace(g, position_m=g.position_m[:, ::-1], force_n=g.force_n[:, ::-1]) for g in grasps]
+
+
+def negate_forces(grasps):
+    return [dataclasses.replace(g, force_n=-g.force_n) for g in grasps]
+
+
+@pytest.mark.parametrize("spoil", [shuffle, swap_fingers, negate_forces])
+def test_spoilt_sets_do_not_pass(tmp_path, spoil):
+    loaded = respoil(recorded(tmp_path, {"force_lag": "medium"}), spoil)
+    try:
+        check_set(loaded.measured, loaded.gripper.open_m)
+    except MeasurementError as refusal:
+        assert "\n" not in str(refusal)
+        return
+    diagnosis = diagnosed(loaded)
+    assert diagnosis.verdict in ("unknown", "not_fitted")
+    assert diagnosis.effects == ()
+
+
+def test_the_wrong_effect_does_not_lower_the_error(tmp_path):
+    loaded = recorded(tmp_path, {"force_lag": "medium"}, grasps=8)
+    target, _, base = workflow.fit_model(loaded, 0, silent)
+    model = workflow.model_of(base.fit, target, loaded, [])
+    right = workflow.add_effect(loaded, model, get_effect("force_lag"), silent)
+    wrong = workflow.add_effect(loaded, model, get_effect("object_friction"), silent)
+    assert right.error_after < 0.8 * right.error_before
+    assert wrong.error_after > 0.97 * wrong.error_before
+    assert right.model.effects[0].parameters["time_constant_s"].value == pytest.approx(0.03, abs=0.003)
+    with pytest.raises(ConfigError, match="has it already"):
+        workflow.add_effect(loaded, right.model, get_effect("force_lag"), silent)
+
+
+def test_a_diagnosis_needs_grasps_to_hold_out(tmp_path):
+    with pytest.raises(MeasurementError, match="too few"):
+        diagnosed(recorded(tmp_path, {}, grasps=3))
+
+
+def test_intervals_hold_the_truth(tmp_path):
+    truth = record(tmp_path / "set", {}, 2, GRASPS)
+    loaded = workflow.load(tmp_path / "set")
+    assert read_set(tmp_path / "set").fingerprint == loaded.measured.fingerprint
+    target, _, base = workflow.fit_model(loaded, 0, silent)
+    model = workflow.model_of(base.fit, target, loaded, workflow.numerical_error(base.fit, target))
+    gain = model.base["position_gain"]
+    assert gain.low < truth.position_gain < gain.high
+    assert np.log(gain.high / gain.low) < 0.05

@@ -1,0 +1,232 @@
+"""Replays: held commands, stepped a second time by hand; the same numbers whatever else is replayed beside them."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from forcegrasp.effects import Effect, catalogue, get_effect
+from forcegrasp.errors import PhysicsError
+from forcegrasp.measure import MeasuredGrasp, replay
+from forcegrasp.measure.replay import EffectOn, Replay, start_position
+from forcegrasp.physics.gripper import load_gripper
+from forcegrasp.physics.plant import Plant, write_base
+
+TIAGO = load_gripper("tiago")
+OPEN_M = TIAGO.open_m
+SECOND = Path(__file__).parents[1] / "grippers" / "second.yaml"
+CASES = [pytest.param(e, v, id=f"{e.name}-{v}".rstrip("-")) for e in catalogue().values() for v in e.variants]
+BASE = {"position_gain": 90.0, "velocity_gain": -8.0, "rho_m": 0.005, "radius_m": 0.03, "offset_m": 0.002}
+SCALE = 1.7
+
+
+def grasp(time: np.ndarray, name: str = "g", position_m: np.ndarray | None = None) -> MeasuredGrasp:
+    """Closes from 32 mm in steps, holds, opens; the right finger commands a bit less. Nothing is measured."""
+    left = np.interp(time - time[0], [0.0, 0.05, 0.3, 0.5, 0.6, 1.0], [0.032, 0.032, 0.026, 0.026, 0.029, 0.034])
+    command = np.stack([left, left + 0.0004], axis=1)
+    position = np.repeat(command[:1], len(time), axis=0) if position_m is None else position_m
+    return MeasuredGrasp(name, "o", "", None, None, None, time, command, position, 0 * command, None)
+
+
+REGULAR = np.arange(20) * 0.04
+TIMES = {
+    "25 Hz": REGULAR,
+    "100 Hz": np.arange(80) * 0.01,
+    "30 Hz, between physics steps": np.arange(24) / 30,
+    "jitter": REGULAR + np.random.default_rng(0).uniform(-0.015, 0.015, 20) * (REGULAR > 0),
+    "gap": REGULAR[[0, 1, 2, 3, 4, 5, 12, 13, 14, 19]],
+    "late clock": 1.7e9 + REGULAR,
+}
+
+
+def by_hand(one: MeasuredGrasp, *effects: tuple[type[Effect], str, np.ndarray], tier: str = "fast") -> np.ndarray:
+    """Position, force and object at each sample, read before that sample's command acts; ``(samples, 5)``."""
+    plant, row = Plant(TIAGO, 1, tier, threads=1), np.array([0])
+    plant.attach([(kind(values[None], plant.dt, variant), row) for kind, variant, values in effects])
+    base = {name: np.array([value]) for name, value in (BASE | {"force_scale": SCALE}).items()}
+    plant.reset(row, write_base(plant, row, base), one.command_m[:1])
+    steps = [round((t - one.time_s[0]) / plant.dt) for t in one.time_s]
+    seen = []
+    for index, command in enumerate(one.command_m):
+        seen.append([*plant.measured_position[0], *plant.measured_force[0], plant.object_position[0]])
+        if index + 1 < len(steps):
+            plant.advance(command[None], steps[index + 1] - steps[index])
+    return np.array(seen)
+
+
+def replayed(simulator: Replay, rows: np.ndarray, *effects: EffectOn, base: dict | None = None) -> np.ndarray:
+    """The same by replay, ``(rows, samples, 5)``."""
+    numbers = {name: np.full(len(rows), value) for name, value in BASE.items()} | (base or {})
+    motion = simulator.simulate(rows, numbers, [e for e in effects if not e.effect.reads_only(e.variant)])
+    readings = simulator.read(
+        motion, np.arange(len(rows)), np.full(len(rows), SCALE), [e for e in effects if e.effect.reads()]
+    )
+    return np.concatenate([readings.position, readings.force, readings.object_position[..., None]], axis=-1)
+
+
+@pytest.mark.parametrize("name", TIMES)
+@pytest.mark.parametrize("tier", ["fast", "reference"])
+def test_commands_are_held_from_their_time_stamp(name, tier):
+    one = grasp(TIMES[name])
+    seen = replayed(Replay(TIAGO, [one], tier), np.array([0]))[0]
+    assert seen.tobytes() == by_hand(one, tier=tier).tobytes()
+    assert seen[:, 2:4].max() > 0.05 or name == "gap"
+
+
+@pytest.mark.parametrize(("effect", "variant"), CASES)
+def test_effects_act_as_they_do_live(effect, variant):
+    """Sensors are read after the simulation, those of the command see what is new: all as on a plant."""
+    one, values = grasp(TIMES["jitter"]), effect.typical_values()
+    simulator = Replay(TIAGO, [one], "fast", encoders_known=False)
+    on = EffectOn(effect, variant, np.array([0]), values[None])
+    assert replayed(simulator, np.array([0]), on)[0].tobytes() == by_hand(one, (effect, variant, values)).tobytes()
+
+
+def test_several_effects_act_in_their_order():
+    one = grasp(REGULAR)
+    chosen = [get_effect(n) for n in ("quantisation", "force_bias", "force_lag", "backlash", "command_delay")]
+    on = [EffectOn(e, "", np.array([0]), e.typical_values()[None]) for e in chosen]
+    seen = replayed(Replay(TIAGO, [one], "fast", encoders_known=False), np.array([0]), *on)[0]
+    assert seen.tobytes() == by_hand(one, *((e, "", e.typical_values()) for e in chosen)).tobytes()
+
+
+@pytest.mark.parametrize("sample", [3, 9])
+def test_a_reading_is_taken_before_its_command_acts(sample):
+    one = grasp(REGULAR)
+    command = one.command_m.copy()
+    command[sample:] = 0.04
+    other = dataclasses.replace(one, command_m=command)
+    first, second = replayed(Replay(TIAGO, [one, other], "fast"), np.arange(2))
+    assert np.array_equal(first[: sample + 1], second[: sample + 1])
+    assert np.all(first[sample + 1, :2] != second[sample + 1, :2])
+
+
+def test_grasps_of_different_lengths_and_rates():
+    grasps = [grasp(t, n) for n, t in TIMES.items()]
+    simulator = Replay(TIAGO, grasps, "fast")
+    together = replayed(simulator, np.arange(len(grasps)))
+    longest = max(len(g.time_s) for g in grasps)
+    assert together.shape == (len(grasps), longest, 5)
+    for index, one in enumerate(grasps):
+        count = len(one.time_s)
+        assert simulator.mask[index].tolist() == [True] * count + [False] * (longest - count)
+        alone = replayed(Replay(TIAGO, [one], "fast"), np.array([0]))[0]
+        assert together[index, :count].tobytes() == alone.tobytes()
+        assert np.all(together[index, count:] == alone[-1])  # its last reading again
+
+
+@functools.cache
+def many() -> tuple[Replay, np.ndarray, tuple[EffectOn, ...], dict[str, np.ndarray]]:
+    """Nine rows of three grasps, each with its own gain, effects on some of them."""
+    grasps = [grasp(REGULAR), grasp(TIMES["gap"]), grasp(TIMES["100 Hz"])]
+    rows = np.array([0, 1, 2, 2, 1, 0, 0, 1, 2])
+    bias, delay, viscous = map(get_effect, ("force_bias", "command_delay", "viscoelastic_contact"))
+    effects = (
+        EffectOn(bias, "", np.array([1, 4, 8]), np.array([[0.1, 0.2], [0.3, 0.4], [0.5, 0.6]])),
+        EffectOn(delay, "", np.array([0, 4, 5, 7]), np.array([[0.01], [0.02], [0.03], [0.045]])),
+        EffectOn(viscous, "", np.array([8]), np.array([[300.0, 0.2]])),
+    )
+    return Replay(TIAGO, grasps, "fast"), rows, effects, {"position_gain": np.linspace(80, 110, 9)}
+
+
+@pytest.mark.parametrize("rows_at_once", [1, 2, 4])
+def test_chunks_change_no_bit(rows_at_once, monkeypatch):
+    simulator, rows, effects, base = many()
+    whole = replayed(simulator, rows, *effects, base=base)
+    monkeypatch.setattr(replay, "_CHUNK", rows_at_once * simulator._steps)
+    assert replayed(simulator, rows, *effects, base=base).tobytes() == whole.tobytes()
+
+
+def test_rows_are_as_if_alone():
+    simulator, rows, effects, base = many()
+    whole = replayed(simulator, rows, *effects, base=base)
+    for row in range(len(rows)):
+        mine = []
+        for e in effects:
+            at = np.flatnonzero(e.rows == row)
+            if len(at):
+                mine.append(EffectOn(e.effect, e.variant, np.array([0]), e.values[at]))
+        alone = replayed(simulator, rows[[row]], *mine, base={n: v[[row]] for n, v in base.items()})
+        assert alone[0].tobytes() == whole[row].tobytes()
+
+
+def test_one_motion_is_read_in_several_ways():
+    simulator = Replay(TIAGO, [grasp(REGULAR), grasp(TIMES["gap"])], "fast")
+    motion = simulator.simulate(np.arange(2), {name: np.full(2, value) for name, value in BASE.items()})
+    bias = EffectOn(get_effect("force_bias"), "", np.array([1]), np.array([[0.1, -0.2]]))
+    readings = simulator.read(motion, np.array([0, 0, 1, 0]), np.array([1.0, 1.0, 2.0, 3.0]), [bias])
+    assert np.array_equal(readings.position[0], readings.position[3])
+    assert readings.force[3] == pytest.approx(3 * readings.force[0], rel=1e-12)
+    assert readings.force[1] - readings.force[0] == pytest.approx(np.full((20, 2), [0.1, -0.2]), abs=1e-12)
+    alone = simulator.read(motion, np.array([1]), np.array([2.0]))
+    assert np.array_equal(alone.force[0], readings.force[2])
+    assert np.array_equal(alone.object_position[0], readings.object_position[2])
+
+
+def test_a_drivers_dead_band_goes_by_the_recorded_encoder():
+    """Where a grasp was recorded, the driver decided by what its encoder said then, not by what we simulate."""
+    dead = EffectOn(get_effect("command_deadband"), "position", np.array([0]), np.array([[0.003]]))
+    one = grasp(REGULAR)
+    at_command = grasp(REGULAR, position_m=one.command_m.copy())  # recorded as being there already: nothing is sent
+    far = grasp(REGULAR, position_m=one.command_m + 0.01)
+
+    def moved(measured: MeasuredGrasp, known: bool) -> float:
+        seen = replayed(Replay(TIAGO, [measured], "fast", encoders_known=known), np.array([0]), dead)[0]
+        return float(np.abs(seen[:, :2] - measured.command_m[0]).max())
+
+    assert moved(at_command, True) == pytest.approx(0, abs=1e-9)
+    assert moved(far, True) > 0.003
+    assert moved(at_command, False) == moved(one, False) > 0.003
+
+
+def test_half_the_step_reads_at_the_same_times():
+    one = grasp(TIMES["jitter"])
+    whole, half = Replay(TIAGO, [one]), Replay(TIAGO, [one], step_factor=0.5)
+    assert half.dt == whole.dt / 2
+    assert np.abs(half.sample_steps * half.dt - whole.sample_steps * whole.dt).max() <= whole.dt / 2 + 1e-12
+    first, second = replayed(whole, np.array([0])), replayed(half, np.array([0]))
+    assert not np.array_equal(first, second)
+    assert first[..., :2] == pytest.approx(second[..., :2], abs=3e-4)
+
+
+def test_the_other_collision_code_is_another_one():
+    one = grasp(REGULAR)
+    seen = [replayed(Replay(TIAGO, [one], other_collisions=o), np.array([0]))[0] for o in (False, True)]
+    assert not np.array_equal(*seen)
+    assert seen[0][:, :2] == pytest.approx(seen[1][:, :2], abs=1e-4)
+
+
+def test_where_the_fingers_start():
+    def start(position: tuple[float, float], command: tuple[float, float]) -> list[float]:
+        one = grasp(REGULAR)
+        measured = np.tile(np.array(position), (20, 1))
+        return start_position(
+            dataclasses.replace(one, position_m=measured, command_m=np.tile(np.array(command), (20, 1))), OPEN_M
+        ).tolist()
+
+    assert start((0.0301, 0.0303), (0.030, 0.0305)) == [0.030, 0.0305]  # at the command but for noise
+    assert start((0.0448, 0.0452), (0.030, 0.030)) == [OPEN_M, OPEN_M]  # open
+    assert start((0.040, 0.035), (0.030, 0.030)) == [0.040, 0.035]  # on the way
+    assert start((0.046, -0.002), (0.010, 0.010)) == [OPEN_M, 0.0]  # within its range
+    assert start((0.0302, 0.0451), (0.030, 0.020)) == [0.030, OPEN_M]  # each finger by itself
+
+
+def test_divergence_names_the_grasp_and_its_parameters():
+    simulator = Replay(TIAGO, [grasp(REGULAR, "good"), grasp(REGULAR, "bad")], "fast")
+    base = {name: np.full(2, value) for name, value in BASE.items()} | {"velocity_gain": np.array([-8.0, 1e9])}
+    with pytest.raises(PhysicsError, match=r"grasp bad diverged with .*velocity_gain=1e\+09"):
+        simulator.simulate(np.arange(2), base)
+
+
+def test_another_gripper():
+    second = load_gripper(str(SECOND))
+    one = grasp(REGULAR)
+    nominal = {n: np.array([p.nominal]) for n, p in second.parameters.items() if n != "force_scale"}
+    simulator = Replay(second, [one])
+    motion = simulator.simulate(np.array([0]), nominal)
+    assert motion.position[0, 0] == pytest.approx(one.command_m[0])
+    assert motion.position[0].min() < 0.03
