@@ -38,7 +38,7 @@ _UNSEEN = 0.5
 _PARALLEL = 0.995
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Candidate:
     """One effect, refitted together with everything else."""
 
@@ -200,7 +200,9 @@ def _look_further(
     if not ordered or not _convincing(ordered[0], least_gain):
         return Step("none", (), ordered, tuple(ranked), error, error)
     winner = ordered[0]
-    equal = [winner, *(c for c in ordered[1:] if _equal(winner, c))]
+    # of those that can't be told apart the simplest comes first
+    equal = sorted([winner, *(c for c in ordered[1:] if _equal(winner, c))], key=lambda c: len(c.effect.parameters))
+    ordered, winner = (*equal, *(c for c in ordered if c not in equal)), equal[0]
     names = tuple(c.effect.name for c in equal)
     verdict = "effect" if len(names) == 1 else "one_of"
     return Step(verdict, names, ordered, tuple(ranked), error, winner.error_after)

@@ -37,7 +37,9 @@ class Entry:
 
     def value(self, coordinate: float) -> float:
         """The inverse of :meth:`coordinate`."""
-        return float(np.clip(np.exp(coordinate) if self.logarithmic else coordinate * self.scale, self.low, self.high))
+        if self.logarithmic:  # of a parameter that nothing fixes, an interval's end is beyond all numbers
+            coordinate = np.exp(np.clip(coordinate, np.log(self.low), np.log(self.high)))
+        return float(np.clip(coordinate * self.scale, self.low, self.high))
 
 
 class Problem:

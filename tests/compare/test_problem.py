@@ -45,7 +45,7 @@ def test_entries_are_what_is_not_given(problem):
         "radius_m of ball": [1],
         "offset_m of grasp b": [1],
         "offset_m of grasp d": [3],
-        "rate_limit.speed_m_s": [0, 1, 2, 3],
+        "rate_limit.rate_m_s": [0, 1, 2, 3],
         "backlash.gap_m": [0, 1, 2, 3],
         "force_bias.left_n": [0, 1, 2, 3],
         "force_bias.right_n": [0, 1, 2, 3],
@@ -96,7 +96,7 @@ def test_a_vector_is_a_model(problem):
     wanted = {
         "position_gain": 80.0, "velocity_gain": -7.0, "rho_m of cup": 0.004, "rho_m of ball": 0.009,
         "force_scale of cup": 1.5, "force_scale of ball": 3.0, "radius_m of cup": 0.021, "radius_m of ball": 0.031,
-        "offset_m of grasp b": -0.003, "offset_m of grasp d": 0.004, "rate_limit.speed_m_s": 0.05,
+        "offset_m of grasp b": -0.003, "offset_m of grasp d": 0.004, "rate_limit.rate_m_s": 0.05,
         "backlash.gap_m": 0.001, "force_bias.left_n": 0.1, "force_bias.right_n": -0.2,
     }  # fmt: skip
     case = problem.case(np.array([named[name].coordinate(value) for name, value in wanted.items()]))

@@ -48,8 +48,10 @@ def test_noise_estimate_survives_jumps():
     rng = np.random.default_rng(1)
     grasps = [smooth_grasp(rng) for _ in range(8)]
     for g in grasps:
-        g.force_n[rng.integers(0, 150, 3)] += 1.0
-    assert estimate_noise(tuple(grasps))[2] == pytest.approx(SIGMA_N, rel=0.2)
+        g.force_n[rng.integers(0, 150)] += 1.0
+    assert estimate_noise(tuple(grasps))[2] == pytest.approx(
+        SIGMA_N, rel=0.15
+    )  # by their spread it would be four times that
 
 
 @pytest.mark.parametrize(("std", "kind"), [((0.0, SIGMA_N), "positions"), ((SIGMA_M, 0.0), "forces")])

@@ -19,9 +19,12 @@ from forcegrasp.config import (
     RewardConfig,
     SensorConfig,
 )
+from forcegrasp.effects import get_effect
+from forcegrasp.effects.model_file import Fitted, FoundEffect, Model
 from forcegrasp.env import build_env, seed_env
 from forcegrasp.errors import ConfigError
 from forcegrasp.physics import FixedGrasps
+from forcegrasp.physics.gripper import load_gripper
 
 FAST = PhysicsConfig(tier="fast", threads=1)
 #: Large objects, which both fingers meet within 25 steps.
@@ -89,6 +92,29 @@ def test_parts_of_the_observation_can_be_left_out(parts, frames):
     keys = {"position": "scaled_position", "force": "sensed_force"}
     newest = torch.cat([after.get(keys.get(part, part)) for part in parts], -1)
     assert torch.equal(after.get("observation")[..., -size:], newest)
+
+
+def test_policies_see_what_sensors_say():
+    """With a fitted model, noise, contact and force error start from what is measured, and the reward from the truth."""
+    effects = tuple(
+        FoundEffect(
+            get_effect(name), get_effect(name).variants[0], {key: Fitted(*[v] * 3) for key, v in values.items()}
+        )
+        for name, values in {
+            "force_bias": {"left_n": 0.1, "right_n": -0.2},
+            "encoder_bias": {"left_m": 0.001, "right_m": -0.002},
+        }.items()
+    )
+    base = {"position_gain": Fitted(100.0, 100.0, 100.0), "velocity_gain": Fitted(-9.0, -9.0, -9.0)}
+    after = play(build(sensors=EXACT, model=Model(load_gripper("tiago"), base, effects=effects))).get("next")
+    assert torch.equal(after.get("sensed_force"), after.get("measured_force"))
+    assert torch.equal(after.get("sensed_position"), after.get("measured_position"))
+    off = after.get("sensed_force") - after.get("force")
+    torch.testing.assert_close(off, torch.tensor([0.1, -0.2]).expand_as(off), rtol=0, atol=1e-6)
+    assert torch.equal(after.get("force_error"), after.get("goal_force") - after.get("sensed_force"))
+    assert after.get("had_contact")[:, 0, 0].all()  # the left finger is taken for touching at once
+    true_error = (after.get("goal_force") - after.get("force")).abs().sum(-1, keepdim=True)
+    torch.testing.assert_close(after.get(("reward_terms", "force_paper")), 1 - torch.tanh(true_error))
 
 
 def test_readings_are_noisy_as_configured():

@@ -1,0 +1,250 @@
+"""Fits of small simulated sets, whose truth is known: values, slopes, intervals, and the ways to spare simulations."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from forcegrasp.compare import fit as fit_module
+from forcegrasp.compare.base_fit import check_gradient, fit_base, rms_error
+from forcegrasp.compare.fit import Fit, Simulators, fit_exactly, fit_once
+from forcegrasp.compare.floor import beyond_fit, excess, numerical_error, numerical_floor
+from forcegrasp.compare.heldout import heldout_residual, make_folds, rms
+from forcegrasp.compare.intervals import intervals, standard_errors, warnings
+from forcegrasp.compare.predict import Applied, Case, predict
+from forcegrasp.compare.problem import Problem
+from forcegrasp.compare.target import Target, make_target
+from forcegrasp.effects import get_effect
+from forcegrasp.measure import MeasuredGrasp, MeasurementSet
+from forcegrasp.measure.replay import Replay
+from forcegrasp.physics.gripper import load_gripper
+
+TIAGO = load_gripper("tiago")
+SIGMA = np.array([2.7e-5, 2.7e-5, 0.013, 0.013])
+BIAS = np.array([0.05, -0.03])
+TRUTH = {
+    "position_gain": 118.0,
+    "velocity_gain": -7.4,
+    "rho_m of cup": 0.0050,
+    "rho_m of ball": 0.0081,
+    "force_scale of cup": 2.6,
+    "force_scale of ball": 1.4,
+}
+RADIUS = {"cup": 0.022, "ball": 0.026}
+
+
+def planned(index: int) -> MeasuredGrasp:
+    """A short grasp that starts near the object: closes, holds, reverses, opens; the rest follows from the index."""
+    thing = ("cup", "ball")[index % 2]
+    time = np.arange(45) * 0.04
+    contact, deep = RADIUS[thing], 0.003 + 0.0005 * index
+    way = [contact + 0.002, contact - deep, contact - deep, contact - deep / 3, contact - deep / 3, contact + 0.003]
+    command = np.interp(time, [0.12, 0.3 + 0.04 * index, 0.9, 1.0, 1.3, 1.5], way)
+    pair = np.repeat(command[:, None], 2, axis=1)
+    offset = 0.0004 * (index % 3 - 1)
+    return MeasuredGrasp(f"g{index}", thing, "", contact, offset, None, time, pair, pair, 0 * pair, None)
+
+
+def truth_of(problem: Problem) -> np.ndarray:
+    return np.array([e.coordinate(TRUTH[e.name]) for e in problem.entries if e.effect < 0])
+
+
+def measure(bias: np.ndarray) -> tuple[Target, Problem]:
+    """Six grasps of two objects with noise, simulated by the model itself."""
+    bare = [planned(i) for i in range(6)]
+    problem = Problem(TIAGO, bare)
+    signals = predict(Replay(TIAGO, bare), [problem.case(truth_of(problem))])[0]
+    signals = signals + SIGMA * np.random.default_rng(0).standard_normal(signals.shape) + np.r_[0, 0, bias]
+    full = tuple(
+        dataclasses.replace(g, position_m=signals[i, :, :2], force_n=signals[i, :, 2:]) for i, g in enumerate(bare)
+    )
+    target = make_target(MeasurementSet(Path(), "", "tiago", "", "", SIGMA[0], SIGMA[2], full, ""))
+    return target, Problem(TIAGO, target.grasps)
+
+
+@pytest.fixture(scope="module")
+def fitted() -> SimpleNamespace:
+    """A fit of the base model from its nominal parameters."""
+    target, problem = measure(np.zeros(2))
+    simulators = Simulators(problem)
+    fit = fit_once(target, problem, simulators, problem.start())
+    numerical = numerical_error(fit, target)
+    return SimpleNamespace(
+        target=target,
+        problem=problem,
+        simulators=simulators,
+        fit=fit,
+        numerical=numerical,
+        errors=standard_errors(fit, numerical),
+    )
+
+
+def exact(problem: Problem, vector: np.ndarray) -> np.ndarray:
+    return predict(Replay(problem.gripper, problem.grasps), [problem.case(vector)])[0]
+
+
+def distance(fit: Fit, errors: np.ndarray) -> np.ndarray:
+    """How far the parameters are from the truth, in standard errors."""
+    return np.abs(fit.vector - truth_of(fit.problem)) / errors
+
+
+# --- fits ----------------------------------------------------------------------------------------------------------
+
+
+def test_truth_is_recovered_within_its_intervals(fitted):
+    fit, target = fitted.fit, fitted.target
+    assert rms_error(fit, target) == pytest.approx(1.0, abs=0.03)
+    assert fit.gradient < 5
+    found = intervals(fit, fitted.errors)
+    for e, (value, low, high) in zip(fit.problem.entries, found, strict=True):
+        assert low < value < high
+        assert low < TRUTH[e.name] < high
+        assert high - low < 0.1 * abs(value)  # and the intervals say something
+    assert warnings(fit, fitted.errors) == []
+
+
+def test_what_is_predicted_is_the_model_itself(fitted):
+    fit, target = fitted.fit, fitted.target
+    model = exact(fit.problem, fit.vector)
+    assert fit.predicted == pytest.approx(model, abs=1e-12)
+    assert fit.residual == pytest.approx(
+        np.where(target.mask[..., None], (target.signals - model) / SIGMA, 0), abs=1e-9
+    )
+    assert fit.cost == pytest.approx(np.sum(fit.residual**2))
+    cheap = predict(fitted.simulators.cheap, [fit.problem.case(fit.vector)])[0]
+    assert fit.correction == pytest.approx(model - cheap, abs=1e-12)
+
+
+def test_fit_of_the_model_itself(fitted):
+    fit = fit_exactly(fitted.target, fitted.problem, fitted.simulators, fitted.fit.vector)
+    assert fit.predicted == pytest.approx(exact(fit.problem, fit.vector), abs=1e-12)
+    assert fit.cost <= 1.001 * fitted.fit.cost
+    assert np.abs(fit.vector - fitted.fit.vector).max() < fitted.errors.max()
+    assert distance(fit, fitted.errors).max() < 2
+
+
+def test_slopes(fitted):
+    """Force over the logarithm of f_α is the force; the others by differences to both sides."""
+    fit, problem = fitted.fit, fitted.problem
+    names = [e.name for e in problem.entries]
+    cheap = fit.predicted - fit.correction
+    for thing in ("cup", "ball"):
+        index = names.index(f"force_scale of {thing}")
+        of_thing = np.array([g.object == thing for g in problem.grasps])
+        slope = fit.jacobian[..., index]
+        assert slope[of_thing][..., 2:] == pytest.approx(cheap[of_thing][..., 2:] / SIGMA[2], rel=0.015, abs=1e-6)
+        assert not slope[of_thing][..., :2].any()
+        assert not slope[~of_thing].any()
+    index = names.index("position_gain")
+    step = np.zeros(len(problem))
+    step[index] = 0.02
+    up, down = predict(fitted.simulators.cheap, [problem.case(fit.vector + s) for s in (step, -step)])
+    central = ((up - down) / 0.04 / SIGMA).ravel()
+    ours = fit.jacobian[..., index].ravel()
+    assert np.linalg.norm(ours - central) < 0.1 * np.linalg.norm(central)
+
+
+def test_what_is_not_free_stays(fitted):
+    start = fitted.problem.start()
+    free = np.array([e.parameter in ("force_scale", "position_gain") for e in fitted.problem.entries])
+    fit = fit_once(fitted.target, fitted.problem, fitted.simulators, start, free=free)
+    assert np.array_equal(fit.vector[~free], np.clip(start, fit.problem.low + 1e-9, fit.problem.high - 1e-9)[~free])
+    assert np.all(fit.vector[free] != start[free])
+    assert fitted.fit.cost < fit.cost
+    fixed = fit_once(fitted.target, fitted.problem, fitted.simulators, fitted.fit.vector, free=np.zeros(6, bool))
+    assert np.array_equal(fixed.vector, fitted.fit.vector)
+    assert fixed.evaluations == 0
+    assert fixed.predicted == pytest.approx(fitted.fit.predicted, abs=1e-12)
+
+
+def test_known_slopes_spare_simulations_and_lead_to_the_same_place(fitted, monkeypatch):
+    """A bias hides in forces; the base parameters' slopes come from the fit before."""
+    target, _ = measure(BIAS)
+    before = fit_once(target, fitted.problem, fitted.simulators, fitted.fit.vector)
+    bias = get_effect("force_bias")
+    problem = Problem(TIAGO, target.grasps, [(bias, "")])
+    start = np.r_[before.vector, problem.start()[len(before.vector) :] * 0.3]
+    counts = []
+
+    def counted(replay, cases):
+        counts[-1] += len(cases)
+        return predict(replay, cases)
+
+    monkeypatch.setattr(fit_module, "predict", counted)
+    fits = []
+    for known in (None, before.jacobian):
+        counts.append(0)
+        fits.append(fit_once(target, problem, fitted.simulators, start, before.correction, 0, known_slopes=known))
+    assert counts[1] < 0.75 * counts[0]
+    assert np.array_equal(fits[1].jacobian[..., :6], before.jacobian)
+    for fit in fits:
+        assert rms_error(before, target) > 1.3
+        assert rms_error(fit, target) < 1.06
+        assert fit.values[-2:] == pytest.approx(BIAS, abs=0.003)
+    assert np.abs(fits[0].vector - fits[1].vector)[:6] == pytest.approx(0, abs=0.02)
+
+
+def test_cases_that_differ_in_sensors_share_a_simulation(fitted, monkeypatch):
+    base = fitted.problem.case(fitted.fit.vector).base
+    bias, delay = get_effect("force_bias"), get_effect("command_delay")
+    cases = [
+        Case(base),
+        Case(base, (Applied(bias, "", BIAS),)),
+        Case(base | {"force_scale": 2 * base["force_scale"]}),
+        Case(base, (Applied(delay, "", np.array([0.04])), Applied(bias, "", BIAS))),
+        Case(base | {"position_gain": base["position_gain"] + 1}),
+    ]
+    simulated = []
+    simulate = Replay.simulate
+    monkeypatch.setattr(Replay, "simulate", lambda self, g, *a: simulated.append(len(g)) or simulate(self, g, *a))
+    together = predict(fitted.simulators.cheap, cases)
+    assert simulated == [3 * 6]
+    alone = [predict(fitted.simulators.cheap, [case])[0] for case in cases]
+    assert together.tobytes() == np.array(alone).tobytes()
+    assert together[1] - together[0] == pytest.approx(np.broadcast_to(np.r_[0, 0, BIAS], together[0].shape), abs=1e-12)
+    assert together[2][..., 2:] == pytest.approx(2 * together[0][..., 2:])
+
+
+def test_several_starts_agree(fitted):
+    told = []
+    base = fit_base(fitted.target, fitted.problem, fitted.simulators, np.random.default_rng(0), told.append)
+    assert base.converged, base.reason
+    assert base.reason == ""
+    assert len(base.errors) == len(told) == 3
+    assert np.ptp(base.errors) < 0.02
+    assert distance(base.fit, fitted.errors).max() < 2
+
+
+def test_a_fit_that_ended_on_a_slope_is_not_believed(fitted):
+    steep = dataclasses.replace(fitted.fit, gradient=20.0)
+    gate = check_gradient(steep, fitted.target)
+    assert not gate.converged
+    assert "slope of 20.0 standard errors" in gate.reason
+    assert check_gradient(fitted.fit, fitted.target).converged
+
+
+# --- what is left --------------------------------------------------------------------------------------------------
+
+
+def test_a_right_model_leaves_nothing_and_a_wrong_one_does(fitted):
+    target, fit = fitted.target, fitted.fit
+    folds = make_folds(target.grasps)
+    held = heldout_residual(fit, target, folds)
+    assert rms(held, target) == pytest.approx(1.0, abs=0.04)
+    numerical = fitted.numerical
+    assert all(n.shape == fit.residual.shape and n.any() for n in numerical)
+    left = beyond_fit(fit, numerical)
+    slopes = fit.jacobian.reshape(-1, len(fit.problem))
+    for before, after in zip(numerical, left, strict=True):
+        assert np.linalg.norm(after) <= np.linalg.norm(before)
+        assert slopes.T @ after.ravel() == pytest.approx(0, abs=1e-6 * np.linalg.norm(slopes) * np.linalg.norm(before))
+    assert 1 <= numerical_floor(left, target) < 1.1
+    assert excess(held, left, target) == ""
+    off = heldout_residual(
+        fit_once(measure(BIAS)[0], fitted.problem, fitted.simulators, fit.vector), measure(BIAS)[0], folds
+    )
+    assert excess(off, left, target) != ""
