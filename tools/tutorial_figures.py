@@ -13,6 +13,7 @@ import contextlib
 import io
 import re
 import shlex
+import sys
 import tempfile
 from pathlib import Path
 from unittest import mock
@@ -28,7 +29,6 @@ COMMANDS = re.compile(r"^```sh\n(.*?)^```\n(?:\n```text\n(.*?)^```\n)?", re.MULT
 PICTURES = {
     ("runs/where", "Error by signal and phase", 0): "compare_where.png",
     ("runs/where", "The worst grasps", 0): "compare_worst_grasp.png",
-    ("runs/where", "What the error goes with", 0): "compare_goes_with.png",
     ("runs/why", "1. ", 0): "compare_symptom.png",
     ("runs/add_", "Before and after", 0): "compare_fall.png",
     ("runs/after", "The worst grasps", 0): "compare_after.png",
@@ -64,7 +64,7 @@ def draw(path: Path, sections: list[report.Section]) -> None:
             if section.title.startswith(title):
                 pictures = [block for block in section.blocks if isinstance(block, report.Picture)]
                 pictures[index].figure.savefig(FIGURES / name, dpi=110, bbox_inches="tight", metadata={"Software": ""})
-                print(f"drew {name}: {pictures[index].caption}")
+                print(f"drew {name}: {pictures[index].caption}", file=sys.stderr)
 
 
 def make(folder: Path) -> None:

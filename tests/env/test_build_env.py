@@ -95,7 +95,7 @@ def test_parts_of_the_observation_can_be_left_out(parts, frames):
 
 
 def test_policies_see_what_sensors_say():
-    """With a fitted model, noise, contact and force error start from what is measured, and the reward from the truth."""
+    """With a fitted model noise, contact and force error start from what is measured, the reward from the truth."""
     effects = tuple(
         FoundEffect(
             get_effect(name), get_effect(name).variants[0], {key: Fitted(*[v] * 3) for key, v in values.items()}
