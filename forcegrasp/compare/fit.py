@@ -16,8 +16,8 @@ from forcegrasp.measure.replay import Replay
 _SLOPES_LAST = 3
 # Step of the finite differences in a problem's coordinates: far above the chaos of the contacts, within the bend.
 _STEP = 0.02
-# Relative change of the cost at which a fit ends, and the largest number of simulations until then.
-_TOLERANCE, _EVALUATIONS = 1e-4, 15
+# Relative change of the cost at which a fit ends, one that only ranks, and the largest number of simulations until then.
+_TOLERANCE, _ROUGH, _EVALUATIONS = 1e-4, 1e-3, 15
 
 
 class Simulators:
@@ -80,7 +80,7 @@ def fit_once(
       simulators: of the problem's grasps.
       start: coordinates to start from, ``(p,)``.
       correction: exact minus cheap prediction near the start; found there if not given.
-      rounds: how often the correction is renewed; with 0 it stays as given.
+      rounds: how often the correction is renewed; with 0 it stays as given, and the fit is a rough one.
       free: which coordinates may change, ``(p,)``; all by default.
       known_slopes: of the first k coordinates from an earlier fit nearby, ``(G, S, 4, k)``; they are kept, which spares
         most of the simulations.
@@ -93,7 +93,7 @@ def fit_once(
         correction = 0.0 if one_model else _difference(problem, simulators, vector)
     total = 0
     for turn in range(max(1, rounds) if free.any() else 0):
-        vector, count = _descend(local, vector, correction, free)
+        vector, count = _descend(local, vector, correction, free, _TOLERANCE if rounds else _ROUGH)
         total += count
         if one_model or rounds == 0:
             break
@@ -112,13 +112,16 @@ def fit_exactly(target: Target, problem: Problem, simulators: Simulators, start:
     """
     local = _Local(target, problem, simulators.exact, simulators.cheap, None)
     free = np.ones(len(problem), bool)
-    vector, total = _descend(local, np.clip(start, problem.low + 1e-9, problem.high - 1e-9), 0.0, free)
+    start = np.clip(start, problem.low + 1e-9, problem.high - 1e-9)
+    vector, total = _descend(local, start, 0.0, free, _TOLERANCE)
     exact = local.value(vector)
     cheap = exact if simulators.exact is simulators.cheap else predict(simulators.cheap, [problem.case(vector)])[0]
     return _finish(local, vector, exact, exact - cheap, free, total)
 
 
-def _descend(local: _Local, start: np.ndarray, shift: np.ndarray | float, free: np.ndarray) -> tuple[np.ndarray, int]:
+def _descend(
+    local: _Local, start: np.ndarray, shift: np.ndarray | float, free: np.ndarray, tolerance: float
+) -> tuple[np.ndarray, int]:
     """Goes to the next optimum in the free coordinates; also returns the number of evaluations."""
 
     def whole(part: np.ndarray) -> np.ndarray:
@@ -133,7 +136,7 @@ def _descend(local: _Local, start: np.ndarray, shift: np.ndarray | float, free: 
         jac=lambda part: local.slopes(whole(part)).reshape(-1, len(problem))[:, free],
         bounds=(problem.low[free], problem.high[free]),
         x_scale="jac",
-        ftol=_TOLERANCE,
+        ftol=tolerance,
         xtol=1e-6,
         gtol=1e-10,
         max_nfev=_EVALUATIONS,

@@ -29,7 +29,7 @@ def diagnosed(loaded: workflow.Loaded):
     return workflow.diagnose_set(loaded, None, [], 0, silent)[0]
 
 
-@pytest.mark.parametrize("name", ["coulomb_friction", "encoder_bias", "force_lag", "quantisation"])
+@pytest.mark.parametrize("name", ["coulomb_friction", "force_lag"])
 def test_finds_what_was_hidden(tmp_path, name):
     diagnosis = diagnosed(recorded(tmp_path, {name: "medium"}))
     assert diagnosis.verdict in ("effect", "one_of")

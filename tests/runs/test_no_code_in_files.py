@@ -32,14 +32,25 @@ def dotted(node: ast.AST) -> str:
     return node.id if isinstance(node, ast.Name) else ""
 
 
+def loads_text_only(call: ast.Call, tree: ast.AST) -> bool:
+    """Whether yaml.load is given a loader of the same file that is one of YAML's own safe ones but for its refusals."""
+    loaders = [dotted(k.value) for k in call.keywords if k.arg == "Loader"]
+    classes = [node for node in ast.walk(tree) if isinstance(node, ast.ClassDef) and node.name in loaders]
+    safe = {("yaml.BaseLoader",), ("yaml.SafeLoader",)}
+    return len(classes) == 1 and tuple(map(dotted, classes[0].bases)) in safe
+
+
 def offences(text: str) -> Iterator[str]:
-    for node in ast.walk(ast.parse(text)):
+    tree = ast.parse(text)
+    for node in ast.walk(tree):
         if isinstance(node, (ast.Import, ast.ImportFrom)):
             module = [node.module or ""] if isinstance(node, ast.ImportFrom) else []
             names = module + [f"{'.'.join([*module, ''])}{alias.name}" for alias in node.names]
             yield from (name for name in names if name.split(".")[0] in FORBIDDEN_MODULES or name in FORBIDDEN_CALLS)
         if isinstance(node, ast.Call):
             name = dotted(node.func)
+            if name == "yaml.load" and loads_text_only(node, tree):
+                continue
             if name in FORBIDDEN_NAMES or name in FORBIDDEN_CALLS:
                 yield name
             if name.endswith(("np.load", "numpy.load")):
@@ -69,6 +80,9 @@ def test_source(path):
         "np.load(p)",
         "np.load(p, allow_pickle=True)",
         "yaml.load(text)",
+        "yaml.load(text, Loader=yaml.Loader)",
+        "class Mine(yaml.UnsafeLoader): ...\nyaml.load(text, Loader=Mine)",
+        "class Mine(yaml.BaseLoader, yaml.Loader): ...\nyaml.load(text, Loader=Mine)",
         "subprocess.run('ls', shell=True)",
         "x = {'_target_': 'os.system'}",
         "from hydra.utils import instantiate",

@@ -13,7 +13,16 @@ from torchrl.data import Bounded, Categorical, Composite, Unbounded
 from torchrl.envs import EnvBase
 
 SURFACE_M, STIFFNESS_N_PER_M = 0.03, 100.0
-OBSERVATIONS = {"joint_position": 2, "force": 2, "force_gap": 2, "touching": 2, "goal_force": 1, "received": 2}
+OBSERVATIONS = {
+    "joint_position": 2,
+    "measured_position": 2,
+    "force": 2,
+    "measured_force": 2,
+    "force_gap": 2,
+    "touching": 2,
+    "goal_force": 1,
+    "received": 2,
+}
 
 
 class FakeGrasp(EnvBase):
@@ -55,6 +64,7 @@ class FakeGrasp(EnvBase):
         self.reward_spec = positive(1) if bounded else free(1)
         if bounded:
             self.observation_spec["force"] = positive(2)
+            self.observation_spec["measured_force"] = positive(2)
         done = {key: flag.clone() for key in ("done", "truncated", "terminated")}
         self.full_done_spec = Composite(done, shape=batch)
 
@@ -84,7 +94,9 @@ class FakeGrasp(EnvBase):
         truncated = (self.age >= self.last_step).unsqueeze(-1)
         state = {
             "joint_position": self.position,
+            "measured_position": self.position,
             "force": force,
+            "measured_force": force,
             "force_gap": self.goal - force,
             "touching": (force > 0).to(self.dtype_),
             "goal_force": self.goal,
