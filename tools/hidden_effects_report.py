@@ -69,9 +69,10 @@ def _page(rows: list[dict], planned: int) -> str:
     lines = [
         "# How often a hidden effect is found",
         "",
-        "Measurement sets were recorded by an independent simulator (`tests/independent`: its own scene, 0.5 ms steps,",
-        "the newer collision code, its own implementation of every effect), with off-nominal base parameters, sensor",
-        "noise of 27 µm and 13 mN, 24 grasps of a rich plan and 150 samples each. `forcegrasp diagnose` was told nothing.",
+        "Measurement sets were recorded by an independent simulator (`tests/independent`: its own scene, 0.5 ms",
+        "steps, the newer collision code, its own implementation of every effect), with off-nominal base parameters,",
+        "sensor noise of 27 µm and 13 mN, and 24 grasps of a rich plan, 150 samples each. `forcegrasp diagnose` was",
+        "told nothing.",
         "",
         "    python tools/hidden_effects.py run      # the campaign, about a minute a set",
         "    python tools/hidden_effects.py report   # this page",
@@ -83,7 +84,7 @@ def _page(rows: list[dict], planned: int) -> str:
         f'| one effect hidden: right one first, or in a right "one of" set | {_share(one, "first", "in set")} |',
         f"| … strictly first | {_share(one, 'first')} |",
         *(
-            f"| … {size} effects, first or in the set | {_share([r for r in one if r['size'] == size], 'first', 'in set')} |"
+            f"| … {size} effects, first or in the set | {_share(of('one', grasps=24, size=size), 'first', 'in set')} |"
             for size in SIZES
         ),
         f"| … further effects named though only one is hidden | {more} of {len(steps)} |",
@@ -104,8 +105,8 @@ def _page(rows: list[dict], planned: int) -> str:
         "",
         "![power](figures/hidden_effects_power.png)",
         "",
-        "How often each effect is found, by size. Sizes are those of `tests/independent/catalogue.py`; a small one moves",
-        "some signal by about 3 σ somewhere.",
+        "How often each effect is found, by size. Sizes are those of `tests/independent/catalogue.py`; a small one",
+        "moves some signal by about 3 σ somewhere.",
         "",
         "## Where it went wrong",
         "",

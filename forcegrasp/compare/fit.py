@@ -16,7 +16,7 @@ from forcegrasp.measure.replay import Replay
 _SLOPES_LAST = 3
 # Step of the finite differences in a problem's coordinates: far above the chaos of the contacts, within the bend.
 _STEP = 0.02
-# Relative change of the cost at which a fit ends, one that only ranks, and the largest number of simulations until then.
+# Relative change of the cost at which a fit ends, one that only ranks, and the most evaluations until then.
 _TOLERANCE, _ROUGH, _EVALUATIONS = 1e-4, 1e-3, 15
 
 

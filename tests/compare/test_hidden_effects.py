@@ -1,4 +1,4 @@
-"""A small part of the campaign of tools/hidden_effects.py: sets of the independent recorder, and sets that were spoilt."""
+"""A small part of the campaign of tools/hidden_effects.py, and sets that were spoilt."""
 
 from __future__ import annotations
 

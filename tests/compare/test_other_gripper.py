@@ -1,4 +1,4 @@
-"""The comparison knows no gripper by itself: the second one, with its own parameters and directions, is diagnosed alike."""
+"""The comparison knows no gripper by itself: the second one, with directions of its own, is diagnosed alike."""
 
 from __future__ import annotations
 
