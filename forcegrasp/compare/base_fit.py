@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from forcegrasp.compare.fit import Fit, Simulators, fit_once
+from forcegrasp.compare.geometry import guess
 from forcegrasp.compare.problem import Problem
 from forcegrasp.compare.target import Target
 
@@ -39,14 +40,13 @@ def fit_base(
     progress: Callable[[str], None] = lambda text: None,
 ) -> BaseFit:
     """Fits from the nominal parameters, and then looks from random places inside the bounds for a better optimum."""
-    first = fit_once(target, problem, simulators, problem.start())
+    first = fit_once(target, problem, simulators, guess(target, problem))
     progress(f"base model, start 1 of {STARTS}: {rms_error(first, target):.2f} × noise")
     few = _few_grasps(target)
     small = _Subset(target, problem, few, first)
     ends = [small.fit(small.known)]
     for number in range(1, STARTS):
-        low, high = small.problem.low, small.problem.high
-        ends.append(small.fit(low + rng.uniform(0.2, 0.8, len(low)) * (high - low)))
+        ends.append(small.fit(_elsewhere(small.problem, guess(small.target, small.problem), rng)))
         progress(f"base model, start {number + 1} of {STARTS}: {rms_error(ends[-1], small.target):.2f} × noise")
     best = min(ends, key=lambda f: f.cost)
     errors = tuple(rms_error(f, small.target) for f in ends)
@@ -57,7 +57,11 @@ def fit_base(
     if sum(f.cost - best.cost <= tolerance for f in ends) < 2:
         spread = ", ".join(f"{error:.2f}" for error in errors)
         return BaseFit(first, errors, False, f"the starts end in different places (errors of {spread} × noise)")
-    return check_gradient(first, target, errors)
+    checked = check_gradient(first, target, errors)
+    if checked.converged:
+        return checked
+    further = fit_once(target, problem, simulators, first.vector, first.correction)  # it may just have been slow
+    return check_gradient(further, target, errors)
 
 
 def check_gradient(fit: Fit, target: Target, errors: tuple[float, ...] = ()) -> BaseFit:
@@ -71,6 +75,13 @@ def check_gradient(fit: Fit, target: Target, errors: tuple[float, ...] = ()) -> 
 def rms_error(fit: Fit, target: Target) -> float:
     """Root mean square of a fit's residuals ÷ noise."""
     return float(np.sqrt(fit.cost / (target.mask.sum() * 4)))
+
+
+def _elsewhere(problem: Problem, felt: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """A random place inside the bounds; but objects stay where the fingers felt them, or there is nothing to fit."""
+    anywhere = problem.low + rng.uniform(0.2, 0.8, len(felt)) * (problem.high - problem.low)
+    geometry = np.array([e.effect < 0 and e.parameter in ("radius_m", "offset_m") for e in problem.entries])
+    return np.where(geometry, felt, anywhere)
 
 
 def _few_grasps(target: Target) -> np.ndarray:

@@ -12,8 +12,8 @@ from forcegrasp.compare.problem import Problem
 from forcegrasp.compare.target import Target
 from forcegrasp.measure.replay import Replay
 
-# Slopes are measured anew after so many steps; in between they follow the values (Broyden 1965).
-_SLOPES_LAST = 3
+# Slopes are measured anew after so many steps; in between they follow the values (Broyden 1965), if they are few.
+_SLOPES_LAST, _FEW = 3, 16
 # Step of the finite differences in a problem's coordinates: far above the chaos of the contacts, within the bend.
 _STEP = 0.02
 # Relative change of the cost at which a fit ends, one that only ranks, and the most evaluations until then.
@@ -192,7 +192,7 @@ class _Local:
         value = self.value(x)
         if self._slope is not None and np.array_equal(self._slope[0], x) and not (anew and self._age):
             return self._slope[2]
-        if self._slope is None or anew or self._age >= _SLOPES_LAST:
+        if self._slope is None or anew or self._age >= _SLOPES_LAST or len(x) > _FEW:
             self._age, slopes = 0, self._measured(x, value)
         else:
             self._age += 1
