@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import dataclasses
 
-import numpy as np
 import pytest
 
 from forcegrasp.compare import workflow
 from forcegrasp.effects import get_effect
 from forcegrasp.errors import ConfigError, MeasurementError
-from forcegrasp.measure import check_set, read_set
+from forcegrasp.measure import check_set
 from tests.independent.rig import record
 
-GRASPS = 10
+GRASPS = 8
 
 
 def silent(text: str) -> None:
@@ -29,7 +28,7 @@ def diagnosed(loaded: workflow.Loaded):
     return workflow.diagnose_set(loaded, None, [], 0, silent)[0]
 
 
-@pytest.mark.parametrize("name", ["coulomb_friction", "force_lag"])
+@pytest.mark.parametrize("name", ["object_friction"])
 def test_finds_what_was_hidden(tmp_path, name):
     diagnosis = diagnosed(recorded(tmp_path, {name: "medium"}))
     assert diagnosis.verdict in ("effect", "one_of")
@@ -104,14 +103,3 @@ def test_the_wrong_effect_does_not_lower_the_error(tmp_path):
 def test_a_diagnosis_needs_grasps_to_hold_out(tmp_path):
     with pytest.raises(MeasurementError, match="too few"):
         diagnosed(recorded(tmp_path, {}, grasps=3))
-
-
-def test_intervals_hold_the_truth(tmp_path):
-    truth = record(tmp_path / "set", {}, 2, GRASPS)
-    loaded = workflow.load(tmp_path / "set")
-    assert read_set(tmp_path / "set").fingerprint == loaded.measured.fingerprint
-    target, _, base = workflow.fit_model(loaded, 0, silent)
-    model = workflow.model_of(base.fit, target, loaded, workflow.numerical_error(base.fit, target))
-    gain = model.base["position_gain"]
-    assert gain.low < truth.position_gain < gain.high
-    assert np.log(gain.high / gain.low) < 0.05

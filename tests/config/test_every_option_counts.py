@@ -51,6 +51,8 @@ TINY_TRAINING = TINY_GRASP | {
 }
 TINY_EVALUATION = TINY_GRASP | {"kappas": 2, "trials": 2}
 
+MODEL = Path(__file__).parent / "model.yaml"
+
 #: Option → another value than in the tiny training and the tiny evaluation.
 SHARED_CASES: dict[str, Any] = {
     "physics.tier": "reference",
@@ -71,6 +73,7 @@ SHARED_CASES: dict[str, Any] = {
 #: The same, for the options of training alone.
 TRAIN_CASES: dict[str, Any] = {
     "seed": 1,
+    "model": str(MODEL),
     **SHARED_CASES,
     "observation.parts": ["position", "force"],
     "observation.frames": 2,
@@ -120,6 +123,7 @@ EVALUATE_CASES: dict[str, Any] = {
     "kappas": 3,
     "trials": 3,
     "seed": 1,
+    "model": str(MODEL),
     **SHARED_CASES,
     "speed_threshold_m": 0.0,
 }
@@ -189,12 +193,16 @@ def tensorboard_tags(folder: Path) -> list[str]:
     return sorted(tag for kind in ("scalars", "histograms", "images") for tag in events[kind])
 
 
+def _is_outcome(path: Path) -> bool:
+    return "tfevents" not in path.name and path.name != "model.yaml"  # the copy of a model repeats the configuration
+
+
 def trained(folder: Path, **values: Any) -> dict[str, Any]:
     """What a tiny training leaves behind, less what merely repeats its configuration or tells its speed."""
     config = with_options(TrainConfig(), TINY_TRAINING | values)
     run = RunDir.create(folder, config, [])
     assert train(config, run)
-    files = sorted(str(path.relative_to(folder)) for path in folder.rglob("*.*") if "tfevents" not in path.name)
+    files = sorted(str(path.relative_to(folder)) for path in folder.rglob("*.*") if _is_outcome(path))
     tensors, _ = checkpoint.read(max(run.checkpoints.iterdir()))
     weights = {name: tensor.tolist() for name, tensor in tensors.items() if name.startswith(("policy", "value"))}
     with open(run.metrics_path, newline="") as file:

@@ -20,7 +20,7 @@ def is_number(value) -> bool:
 
 
 def first(default):
-    return default[0] if isinstance(default, list) else default
+    return default[0] if isinstance(default, list) and default else default
 
 
 def selected(condition) -> dict:
@@ -33,8 +33,8 @@ def selected(condition) -> dict:
 
 
 NUMBERS = selected(lambda meta, default: is_number(first(default)))
-RANGES = selected(lambda meta, default: isinstance(default, list) and isinstance(default[0], float))
-LISTS = selected(lambda meta, default: isinstance(default, list))
+RANGES = selected(lambda meta, default: isinstance(default, list) and isinstance(first(default), float))
+LISTS = selected(lambda meta, default: isinstance(default, list) and default)
 CHOICES = selected(lambda meta, default: meta["choices"])
 
 
