@@ -31,7 +31,8 @@ from forcegrasp.measure.schema import (
 from forcegrasp.measure.table import Columns, Table
 from forcegrasp.measure.yaml_file import Reader, load_yaml
 
-META = ("format", "kind", "gripper", "source", "license")
+META = ("format", "kind", "gripper")
+ABOUT = ("source", "license")
 NOISE = ("position_std_m", "force_std_n")
 MAX_TEXT = 10_000
 
@@ -56,7 +57,7 @@ def read_set(path: str | Path) -> MeasurementSet | FinalForceTable:
     content = load_yaml(file)
     if content.get("format") != FORMAT:  # first, lest the keys of another format are called unknown
         raise MeasurementError(f"{show(file)}: format: must be {FORMAT}, not {show(content.get('format', ''))}")
-    meta = Reader(content, show(file), META, NOISE)
+    meta = Reader(content, show(file), META, (*ABOUT, *NOISE))
     kind = meta.text("kind", MAX_NAME)
     readers = {"grasps": _read_grasps, "final_force": _read_table}
     if kind not in readers:
@@ -65,8 +66,7 @@ def read_set(path: str | Path) -> MeasurementSet | FinalForceTable:
         "path": folder,
         "name": folder.resolve().name,
         "gripper": meta.text("gripper", MAX_NAME),
-        "source": meta.text("source", MAX_TEXT, lines=True),
-        "license": meta.text("license", MAX_TEXT, lines=True),
+        **{key: meta.text(key, MAX_TEXT, lines=True, blank=True) for key in ABOUT},  # no result depends on them
         "force_std_n": meta.positive("force_std_n"),
     }
     return readers[kind](folder, meta, facts)

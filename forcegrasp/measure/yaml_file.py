@@ -107,9 +107,11 @@ class Reader:
         """The value as it came; None if there is none."""
         return self._content.get(key)
 
-    def text(self, key: str, longest: int, lines: bool = False) -> str:
-        """Printable text; of several lines if ``lines``."""
-        value = self._content[key]
+    def text(self, key: str, longest: int, lines: bool = False, blank: bool = False) -> str:
+        """Printable text; of several lines if ``lines``, and "" where there is none if ``blank``."""
+        value = self._content.get(key, "")
+        if blank and isinstance(value, str) and value.strip() in ("", "~", "null"):
+            return ""
         if not isinstance(value, str) or value.strip() in ("", "~", "null"):
             raise self.refuse(key, "must be text and not empty")
         value = value.strip()

@@ -5,6 +5,8 @@ from __future__ import annotations
 import pytest
 from measured_rig import refuse
 
+from forcegrasp.measure import read_set
+
 VALID = {
     "format": "forcegrasp-measurements/1",
     "kind": "grasps",
@@ -14,15 +16,18 @@ VALID = {
 }
 
 
+NEEDED = ("format", "kind", "gripper")
+
+
 def _text(**changes: str | None) -> str:
     facts = VALID | changes
     return "".join(f"{key}: {value}\n" for key, value in facts.items() if value is not None)
 
 
 TEXTS = {
-    **{f"no {key}": (_text(**{key: None}), [key]) for key in VALID},
-    **{f"empty {key}": (_text(**{key: ""}), [key]) for key in VALID},
-    **{f"null {key}": (_text(**{key: "null"}), [key]) for key in VALID},
+    **{f"no {key}": (_text(**{key: None}), [key]) for key in NEEDED},
+    **{f"empty {key}": (_text(**{key: ""}), [key]) for key in NEEDED},
+    **{f"null {key}": (_text(**{key: "null"}), [key]) for key in NEEDED},
     **{f"list for {key}": (_text(**{key: "[a, b]"}), [key]) for key in VALID},
     **{f"mapping for {key}": (_text(**{key: "{a: b}"}), [key]) for key in VALID},
     **{f"too long {key}": (_text(**{key: "x" * 20_000}), [key]) for key in VALID},
@@ -92,6 +97,13 @@ def test_text(folder, case):
     text, parts = TEXTS[case]
     (folder / "meta.yaml").write_text(text)
     refuse(folder, "meta.yaml", *parts)
+
+
+@pytest.mark.parametrize("key", ["source", "license"])
+@pytest.mark.parametrize("value", [None, "", "null", "''"])
+def test_where_a_set_comes_from_may_be_left_out(folder, key, value):
+    (folder / "meta.yaml").write_text(_text(**{key: value}))
+    assert getattr(read_set(folder), key) == ""
 
 
 BYTES = {
