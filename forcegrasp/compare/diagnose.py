@@ -36,6 +36,8 @@ _HOPELESS = 0.2
 _UNSEEN = 0.5
 # Effects whose signatures are that parallel can't be told apart, whatever the likelihood says.
 _PARALLEL = 0.995
+# An effect with fewer parameters that gains this share of what the best one gains can't be ruled out.
+_NEARLY = 0.95
 
 
 @dataclass(frozen=True, eq=False)
@@ -258,4 +260,6 @@ def _equal(winner: Candidate, other: Candidate) -> bool:
     lead = lead[np.isfinite(lead)]
     error = lead.std(ddof=1) * np.sqrt(len(lead)) if len(lead) > 1 else np.inf
     parallel = abs(float(winner.signature @ other.signature))
-    return other.heldout_gain > 0 and (lead.sum() <= error or parallel > _PARALLEL)
+    simpler = len(other.effect.parameters) < len(winner.effect.parameters)
+    nearly = simpler and other.heldout_gain > _NEARLY * winner.heldout_gain
+    return other.heldout_gain > 0 and (lead.sum() <= error or parallel > _PARALLEL or nearly)

@@ -27,7 +27,7 @@ class RateLimit(Effect):
             0.012,
             null=np.inf,
             logarithmic=True,
-            trials=(0.004, 0.01, 0.025, 0.06),
+            trials=(0.004, 0.01, 0.025, 0.06, 0.15, 0.4),
         ),
     )
     order = 2
