@@ -296,21 +296,37 @@ class EvaluateConfig:
     """`forcegrasp evaluate`."""
 
     policies: list[str] = option(
-        ["force_pi"], "what to compare: run directories, or controllers by name", source="paper, Fig. 2"
+        ["force_pi"], "what to compare: controllers and shipped policies by name, or run directories", source="paper, Fig. 2"
     )
     out: str = option("", "where to write; runs/evaluate_TIME if empty")
+    baseline: str = option("force_pi", "policy that the others are held against, if it takes part")
+    objects: str = option(
+        "", "file of objects to grasp instead of a grid of softness values; `paper` has the six of its Table 1"
+    )
     kappas: int = option(
         11, "softness values, evenly spaced over grasp.kappa", source="paper, Sec. 5", low=1, high=1001
     )
-    trials: int = option(50, "grasps per softness value and policy; the paper had 200", low=2, high=1_000_000)
+    trials: int = option(
+        50, "grasps per softness value (or object) and policy; the paper had 200 (20)", low=2, high=1_000_000
+    )
     seed: int = option(1000, "seed of the grasps; the same grasps for every policy", low=0, high=2**31 - 1)
-    model: str = option("", "model file of forcegrasp fit or add to simulate the grasps with")
+    model: str = option(
+        "", "model file of forcegrasp fit or add to simulate the grasps with; virtual_robot comes with the package"
+    )
     physics: PhysicsConfig = field(default_factory=PhysicsConfig)
     grasp: GraspConfig = field(default_factory=GraspConfig)
     sensors: SensorConfig = field(default_factory=SensorConfig)
     speed_threshold_m: float = option(
         5e-5, "object speed that counts as fast", unit="m per control step", source="paper, Table 2", low=0, high=1
     )
+
+
+@dataclass
+class CurvesConfig:
+    """`forcegrasp curves`."""
+
+    folders: list[str] = option([], "folders with runs in or below them; also given plainly, without folders=")
+    out: str = option("", "where to write curves.png and curves.json; the first folder if empty")
 
 
 def check_deformation(deformation_m: float, radius_m: list[float], name: str) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,8 @@ from forcegrasp.errors import ConfigError, closest
 from forcegrasp.physics.gripper import Gripper, load_gripper
 
 FORMAT = "forcegrasp-model/1"
+#: Name of the model that comes with the package.
+SHIPPED = "virtual_robot"
 # Of a key in a message.
 _LONGEST_KEY = 80
 
@@ -96,11 +99,13 @@ def write_model(model: Model, path: Path) -> None:
 
 
 def read_model(path: Path) -> Model:
-    """Reads a model.
+    """Reads a model; ``virtual_robot`` is the one that comes with the package.
 
     Raises:
       ConfigError: names the file, the key, and what it must be.
     """
+    if str(path) == SHIPPED:
+        path = Path(str(files("forcegrasp.assets") / f"{SHIPPED}.yaml"))
     try:
         raw = yaml.safe_load(path.read_text(encoding="utf-8"))
     except RecursionError as error:

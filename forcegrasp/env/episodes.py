@@ -5,6 +5,8 @@ from __future__ import annotations
 from tensordict import TensorDictBase
 from torch import Tensor
 
+from forcegrasp.config import SensorConfig
+
 #: Figure → what it is. All of shape ``(n,)``, one per episode.
 FIGURES = {
     "force_reward_normalised": "Σ_t of r_force, authors' form (150 at best)",
@@ -15,16 +17,18 @@ FIGURES = {
     "action_change": "Σ_t Σ_i |a_i(t-1) - a_i(t)|",
     "first_contact_s": "time until one finger touches, s (the episode's length if never)",
     "both_contact_s": "time until both fingers have touched, s (the episode's length if never)",
+    "reach_s": "time until both forces are within 2 σ_f of the goal, s (the episode's length if never)",
+    "overshoot_percent": "largest force of a finger beyond the goal, % of the goal",
     "final_force_error_n": "mean |Δf| per finger over the last second, N",
 }
 
 
-def summarise(rollout: TensorDictBase, contact_threshold_n: float, period_s: float = 0.04) -> dict[str, Tensor]:
+def summarise(rollout: TensorDictBase, sensors: SensorConfig, period_s: float = 0.04) -> dict[str, Tensor]:
     """Figures of every episode, from the true state.
 
     Args:
       rollout: whole episodes as an env's ``rollout`` gives them, batch ``(n, T)``.
-      contact_threshold_n: true force above which a finger counts as touching.
+      sensors: f_θ, the true force above which a finger counts as touching, and σ_f, half the band around the goal.
       period_s: seconds per step.
 
     Returns:
@@ -36,12 +40,14 @@ def summarise(rollout: TensorDictBase, contact_threshold_n: float, period_s: flo
     start = rollout.get("object_position")[:, 0, 0]
     steps = force.shape[1]
 
-    touched = (force > contact_threshold_n).cummax(dim=1).values
+    touched = (force > sensors.contact_threshold_n).cummax(dim=1).values
     # steps before the first (second) finger has touched
     first, both = (steps - t.sum(dim=1) for t in (touched.any(-1), touched.all(-1)))
     at_grasp = position.gather(1, both.clamp_max(steps - 1).unsqueeze(1)).squeeze(1)
     last_second = max(1, min(steps, round(1 / period_s)))
-    error = (after.get("goal_force") - force).abs()
+    goal = after.get("goal_force")
+    error = (goal - force).abs()
+    reached = (error < 2 * sensors.force_std_n).all(-1).cummax(dim=1).values
     return {
         "force_reward_normalised": terms.get("force_normalised").sum((1, 2)),
         "force_reward_paper": terms.get("force_paper").sum((1, 2)),
@@ -51,5 +57,7 @@ def summarise(rollout: TensorDictBase, contact_threshold_n: float, period_s: flo
         "action_change": -terms.get("action").sum((1, 2)),
         "first_contact_s": first * period_s,
         "both_contact_s": both * period_s,
+        "reach_s": (steps - reached.sum(dim=1)) * period_s,
+        "overshoot_percent": ((force - goal) / goal).amax((1, 2)).clamp_min(0) * 100,
         "final_force_error_n": error[:, -last_second:].mean((1, 2)),
     }

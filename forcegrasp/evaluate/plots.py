@@ -67,21 +67,24 @@ def figure_pixels(figure: Figure) -> np.ndarray:
     return np.asarray(canvas.buffer_rgba())[..., :3].copy()
 
 
-def softness_boxes(results: dict[str, np.ndarray], kappas: np.ndarray, ylabel: str, log: bool = False) -> Figure:
-    """Box plot of a figure per softness value and policy, as in the paper's Fig. 2 (left).
+def cell_boxes(
+    results: dict[str, np.ndarray], cells: list[str], xlabel: str, ylabel: str, log: bool = False
+) -> Figure:
+    """Box plot of a figure per cell (softness value, or object) and policy, as in the paper's Fig. 2 (left).
 
     Args:
-      results: policy → values, ``(kappas, trials)``.
-      kappas: softness values.
+      results: policy → values, ``(cells, trials)``.
+      cells: their names.
+      xlabel: what tells the cells apart.
       ylabel: what the values are.
       log: whether the values span orders of magnitude.
     """
-    figure = Figure(figsize=(max(8, 0.9 * len(kappas)), 4.2), layout="constrained")
+    figure = Figure(figsize=(max(8, 0.9 * len(cells)), 4.2), layout="constrained")
     axes = figure.subplots()
     width = 0.8 / len(results)
     handles = []
     for index, (values, colour) in enumerate(zip(results.values(), PALETTE * len(results), strict=False)):
-        places = np.arange(len(kappas)) + (index + 0.5) * width - 0.4
+        places = np.arange(len(cells)) + (index + 0.5) * width - 0.4
         boxes = axes.boxplot(
             list(values),
             positions=places,
@@ -94,9 +97,9 @@ def softness_boxes(results: dict[str, np.ndarray], kappas: np.ndarray, ylabel: s
             capprops={"lw": 0.6},
         )
         handles.append(boxes["boxes"][0])
-    axes.set_xticks(np.arange(len(kappas)), [f"{k:.2g}" for k in kappas])
-    axes.set_xlim(-0.5, len(kappas) - 0.5)
-    axes.set_xlabel("softness κ (0 hard, 1 soft)")
+    axes.set_xticks(np.arange(len(cells)), cells)
+    axes.set_xlim(-0.5, len(cells) - 0.5)
+    axes.set_xlabel(xlabel)
     axes.set_ylabel(ylabel)
     axes.grid(axis="y", alpha=0.3)
     if log:

@@ -1,8 +1,7 @@
-"""Rolls a policy out over a grid of softness values, on the same grasps for every policy."""
+"""Rolls a policy out over given grasps."""
 
 from __future__ import annotations
 
-import dataclasses
 from typing import Any
 
 import numpy as np
@@ -13,24 +12,10 @@ from torchrl.envs.utils import ExplorationType, set_exploration_type
 
 from forcegrasp.config import GraspConfig
 from forcegrasp.env import build_env
-from forcegrasp.physics import FixedGrasps, GraspParameters, GraspSampler
+from forcegrasp.physics import FixedGrasps, GraspParameters
 
 #: Grasps simulated at once; more would only take memory.
 BATCH = 256
-
-
-def kappa_grid(grasp: GraspConfig, kappas: int, trials: int, seed: int) -> GraspParameters:
-    """Draws ``trials`` grasps for each of ``kappas`` evenly spaced softness values; all else random.
-
-    Returns:
-      ``kappas · trials`` grasps, those of one softness next to each other.
-    """
-    rng = np.random.default_rng(seed)
-    parts = []
-    for kappa in np.linspace(*grasp.kappa, kappas):
-        sampler = GraspSampler(dataclasses.replace(grasp, kappa=[float(kappa)] * 2))
-        parts.append(sampler(rng, np.arange(trials)))
-    return GraspParameters.concatenate(parts)
 
 
 def roll_out(

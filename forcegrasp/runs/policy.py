@@ -1,7 +1,8 @@
-"""Loads a trained policy from its run directory."""
+"""Loads a trained policy, from its run directory or from those that come with the package."""
 
 from __future__ import annotations
 
+from importlib.resources import files
 from pathlib import Path
 
 from tensordict.nn import TensorDictModuleBase
@@ -12,20 +13,29 @@ from forcegrasp.errors import CheckpointError
 from forcegrasp.runs.run_dir import RunDir
 
 
-def load_policy(path: Path | str) -> tuple[TensorDictModuleBase, TrainConfig]:
-    """Returns the newest policy of a run, and the configuration it was trained with.
+def shipped_policies() -> list[str]:
+    """Names of the policies that come with the package; each has a card beside it."""
+    folder = files("forcegrasp.policies")
+    return sorted(entry.name for entry in folder.iterdir() if (entry / "config.yaml").is_file())
+
+
+def load_policy(name: Path | str) -> tuple[TensorDictModuleBase, TrainConfig]:
+    """Returns a shipped policy by name, or the newest policy of a run; and the configuration it was trained with.
+
+    A shipped policy is laid out like a run directory, so that both are read alike.
 
     Raises:
-      CheckpointError: if the directory is no run, or its newest checkpoint is of another configuration.
+      CheckpointError: if there is no such policy or run, or its newest checkpoint is of another configuration.
     """
-    run = RunDir.open(path)
+    shipped = str(name) in shipped_policies()
+    run = RunDir.open(Path(str(files("forcegrasp.policies") / str(name))) if shipped else name)
     config = run.config()
     tensors, _ = run.load()
     size = 2 * len(config.observation.parts) * config.observation.frames
     policy = make_policy(size, config.ppo)
-    weights = {name.removeprefix("policy."): t for name, t in tensors.items() if name.startswith("policy.")}
+    weights = {key.removeprefix("policy."): t for key, t in tensors.items() if key.startswith("policy.")}
     try:
         policy.load_state_dict(weights)
     except RuntimeError as error:
-        raise CheckpointError(f"{path}: the checkpoint's weights do not fit its config.yaml") from error
+        raise CheckpointError(f"{name}: the checkpoint's weights do not fit its config.yaml") from error
     return policy.eval(), config

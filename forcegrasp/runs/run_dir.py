@@ -29,9 +29,12 @@ from forcegrasp.runs import checkpoint
 _PACKAGES = ("torch", "torchrl", "tensordict", "mujoco", "gymnasium", "hydra-core", "numpy")
 
 
-def fingerprint(config: TrainConfig) -> str:
-    """Identifies a training by its whole configuration; checkpoints carry it."""
-    return hashlib.sha256(json.dumps(dataclasses.asdict(config), sort_keys=True).encode()).hexdigest()[:16]
+def fingerprint(options: dict[str, Any]) -> str:
+    """Identifies a training by its options as config.yaml has them; checkpoints carry it.
+
+    Options that came into being after the run was made are not among them, so that old runs stay readable.
+    """
+    return hashlib.sha256(json.dumps(options, sort_keys=True).encode()).hexdigest()[:16]
 
 
 class RunDir:
@@ -99,7 +102,8 @@ class RunDir:
     @functools.cached_property
     def fingerprint(self) -> str:
         """Of the configuration as it was when first asked for: editing the file must not spoil a run at work."""
-        return fingerprint(self.config())
+        self.config()  # says what is wrong with the file, if anything
+        return fingerprint(yaml.safe_load(self.config_path.read_text()))
 
     def config(self) -> TrainConfig:
         """The run's configuration.
@@ -179,7 +183,7 @@ def _provenance(config: TrainConfig, overrides: list[str]) -> dict[str, Any]:
     return {
         "command": ["forcegrasp", "train", *overrides],
         "seed": config.seed,
-        "config": fingerprint(config),
+        "config": fingerprint(dataclasses.asdict(config)),
         "git": _git_hash(),
         "python": sys.version.split()[0],
         "versions": {name: version(name) for name in _PACKAGES} | {"forcegrasp": version("forcegrasp")},

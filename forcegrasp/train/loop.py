@@ -135,7 +135,7 @@ def train(config: TrainConfig, run: RunDir, resume: bool = False) -> bool:
             collected = time.perf_counter()
             figures = {
                 name: float(value.mean())
-                for name, value in summarise(batch, config.sensors.contact_threshold_n).items()
+                for name, value in summarise(batch, config.sensors).items()
             }
             rate = trainer.ppo.set_progress(trainer.frames / total)
             losses = trainer.ppo.update(batch, trainer.shuffle)

@@ -7,7 +7,11 @@ import pytest
 import torch
 from tensordict import TensorDict
 
+from forcegrasp.config import SensorConfig
 from forcegrasp.env.episodes import FIGURES, summarise
+
+# A wide band, which random forces meet now and then.
+SENSORS = SensorConfig(contact_threshold_n=0.05, force_std_n=0.15)
 
 
 def _random_rollout(n: int, steps: int, seed: int) -> TensorDict:
@@ -42,7 +46,7 @@ def _random_rollout(n: int, steps: int, seed: int) -> TensorDict:
     return TensorDict({"object_position": before, "next": after}, batch_size=(n, steps))
 
 
-def _slow(rollout: TensorDict, threshold: float, period: float) -> dict[str, np.ndarray]:
+def _slow(rollout: TensorDict, sensors: SensorConfig, period: float) -> dict[str, np.ndarray]:
     after = rollout["next"]
     force, goal = after["force"].double().numpy(), after["goal_force"].double().numpy()
     position = np.concatenate([rollout["object_position"][:, :1, 0], after["object_position"][..., 0]], axis=1)
@@ -52,14 +56,18 @@ def _slow(rollout: TensorDict, threshold: float, period: float) -> dict[str, np.
     figures: dict[str, list[float]] = {name: [] for name in FIGURES}
     for i in range(n):
         had = [False, False]
-        first = both = steps
+        first = both = reached = steps
+        overshoot = 0.0
         grasped_at = position[i, -1]
         for t in range(steps):
-            had = [h or f > threshold for h, f in zip(had, force[i, t], strict=True)]
+            had = [h or f > sensors.contact_threshold_n for h, f in zip(had, force[i, t], strict=True)]
             if any(had) and first == steps:
                 first = t
             if all(had) and both == steps:
                 both, grasped_at = t, position[i, t + 1]
+            close = [abs(goal[i, t, 0] - f) < 2 * sensors.force_std_n for f in force[i, t]]
+            reached = t if all(close) and reached == steps else reached
+            overshoot = max(overshoot, *(100 * (f / goal[i, t, 0] - 1) for f in force[i, t]))
         last = range(max(0, steps - max(1, round(1 / period))), steps)
         errors = [abs(goal[i, t, 0] - force[i, t, finger]) for t in last for finger in (0, 1)]
         figures["force_reward_normalised"].append(sum(terms["force_normalised"][i]))
@@ -70,6 +78,8 @@ def _slow(rollout: TensorDict, threshold: float, period: float) -> dict[str, np.
         figures["action_change"].append(-sum(terms["action"][i]))
         figures["first_contact_s"].append(first * period)
         figures["both_contact_s"].append(both * period)
+        figures["reach_s"].append(reached * period)
+        figures["overshoot_percent"].append(overshoot)
         figures["final_force_error_n"].append(sum(errors) / len(errors))
     return {name: np.array(values) for name, values in figures.items()}
 
@@ -77,7 +87,7 @@ def _slow(rollout: TensorDict, threshold: float, period: float) -> dict[str, np.
 @pytest.mark.parametrize(("n", "steps", "period"), [(12, 60, 0.04), (7, 25, 0.04), (5, 10, 0.04), (4, 8, 2.0)])
 def test_figures_equal_a_loop_over_steps(n, steps, period):
     rollout = _random_rollout(n, steps, seed=steps)
-    found, expected = summarise(rollout, 0.05, period), _slow(rollout, 0.05, period)
+    found, expected = summarise(rollout, SENSORS, period), _slow(rollout, SENSORS, period)
     assert found.keys() == FIGURES.keys()
     for name, values in expected.items():
         assert found[name].shape == (n,), name
@@ -90,6 +100,13 @@ def test_figures_equal_a_loop_over_steps(n, steps, period):
 
 def test_threshold_decides_what_counts_as_touching():
     rollout = _random_rollout(6, 30, seed=0)
-    low, high = summarise(rollout, 0.05), summarise(rollout, 0.6)
+    low, high = summarise(rollout, SENSORS), summarise(rollout, SensorConfig(contact_threshold_n=0.6))
     assert (high["both_contact_s"] >= low["both_contact_s"]).all()
     assert (high["both_contact_s"] > low["both_contact_s"]).any()
+
+
+def test_noise_decides_what_counts_as_reached():
+    rollout = _random_rollout(6, 30, seed=0)
+    narrow, wide = (summarise(rollout, SensorConfig(force_std_n=sigma))["reach_s"] for sigma in (0.05, 0.3))
+    assert (wide <= narrow).all()
+    assert (wide < narrow).any()

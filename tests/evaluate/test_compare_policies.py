@@ -16,9 +16,11 @@ from rich.console import Console
 from forcegrasp.config import ActionConfig, EvaluateConfig, GraspConfig, PhysicsConfig, TrainConfig, validate
 from forcegrasp.env.episodes import FIGURES, summarise
 from forcegrasp.errors import CheckpointError, ConfigError
-from forcegrasp.evaluate.compare_policies import evaluate, load_contestants
-from forcegrasp.evaluate.rollouts import kappa_grid, roll_out
-from forcegrasp.runs.policy import load_policy
+from forcegrasp.evaluate.compare_policies import evaluate
+from forcegrasp.evaluate.contestants import load_contestants
+from forcegrasp.evaluate.grids import kappa_grid
+from forcegrasp.evaluate.rollouts import roll_out
+from forcegrasp.runs.policy import load_policy, shipped_policies
 from forcegrasp.runs.run_dir import RunDir
 from forcegrasp.train.loop import Trainer
 
@@ -70,7 +72,7 @@ def compared(tmp_path_factory) -> tuple[dict, Path, str]:
 def trials(compared) -> list[dict]:
     with open(compared[1] / "trials.csv", newline="") as file:
         return [
-            {key: value if key == "policy" else float(value) for key, value in row.items()}
+            {key: value if key in ("policy", "cell") else float(value) for key, value in row.items()}
             for row in csv.DictReader(file)
         ]
 
@@ -89,7 +91,7 @@ def test_files(compared):
 def test_report_is_what_was_written(compared):
     report, out, _ = compared
     assert json.loads((out / "evaluation.json").read_text()) == report
-    assert report["kappas"] == [0.0, 0.5, 1.0]
+    assert report["cells"] == ["0", "0.5", "1"]
     assert list(report["policies"]) == ["force_pi", "close"]
     assert (report["seed"], report["trials"], report["physics"]) == (5, 4, "fast")
     assert all(set(FIGURES) == set(figures) for figures in report["policies"].values())
@@ -103,7 +105,7 @@ def test_one_row_per_trial_and_the_same_grasps_for_both(trials):
     }
     assert len(trials) == 2 * 3 * 4
     assert grasps["force_pi"] == grasps["close"]
-    expected = kappa_grid(GraspConfig(steps=STEPS), 3, 4, seed=5).as_array()
+    expected = kappa_grid(GraspConfig(steps=STEPS), 3, 4, seed=5).grasps.as_array()
     np.testing.assert_allclose(grasps["close"], expected, rtol=1e-8)
 
 
@@ -114,8 +116,8 @@ def test_means_follow_from_the_trials(compared, trials, figure):
         summary = figures[figure]
         assert summary["mean"] == pytest.approx(values.mean(), rel=1e-5, abs=1e-9)
         assert summary["std"] == pytest.approx(values.std(ddof=1), rel=1e-4, abs=1e-9)
-        for kappa, part in zip(compared[0]["kappas"], summary["by_kappa"], strict=True):
-            own = [row[figure] for row in trials if row["policy"] == name and row["kappa"] == kappa]
+        for cell, part in zip(compared[0]["cells"], summary["by_cell"], strict=True):
+            own = [row[figure] for row in trials if row["policy"] == name and row["cell"] == cell]
             assert len(own) == 4
             assert part["mean"] == pytest.approx(np.mean(own), rel=1e-5, abs=1e-9)
 
@@ -123,7 +125,7 @@ def test_means_follow_from_the_trials(compared, trials, figure):
 def test_intervals_hold_the_mean_and_shrink(compared):
     for figures in compared[0]["policies"].values():
         for figure in figures.values():
-            for part in (figure, *figure["by_kappa"]):
+            for part in (figure, *figure["by_cell"]):
                 assert part["low"] - 1e-9 <= part["mean"] <= part["high"] + 1e-9
                 # a 95 % interval of a mean spans about four standard errors
                 assert part["high"] - part["low"] <= 6 * part["std"] / 2 + 1e-9
@@ -139,9 +141,9 @@ def test_table_shows_the_means(compared):
 def test_trials_are_the_rollouts_own_figures(compared, trials):
     contestant = load_contestants(["force_pi"])[0]
     config = evaluate_config()
-    grasps = kappa_grid(config.grasp, 3, 4, 5)
+    grasps = kappa_grid(config.grasp, 3, 4, 5).grasps
     episodes = roll_out(contestant.policy, grasps, config.grasp, 5, physics=FAST, action=contestant.action)
-    for figure, values in summarise(episodes, config.sensors.contact_threshold_n).items():
+    for figure, values in summarise(episodes, config.sensors).items():
         written = [row[figure] for row in trials if row["policy"] == "force_pi"]
         np.testing.assert_allclose(written, values, rtol=1e-5, atol=1e-9)
 
@@ -162,7 +164,7 @@ def test_run_is_evaluated_as_it_was_trained(name, tmp_path, undrawn):
     config = evaluate_config(policies=[str(run.path)], kappas=2, trials=2)
     report = evaluate(config, tmp_path / "out", Console(file=io.StringIO()))
     trained_with = trainer.config
-    grasps = kappa_grid(config.grasp, 2, 2, config.seed)
+    grasps = kappa_grid(config.grasp, 2, 2, config.seed).grasps
     episodes = roll_out(
         trainer.policy,
         grasps,
@@ -173,7 +175,7 @@ def test_run_is_evaluated_as_it_was_trained(name, tmp_path, undrawn):
         observation=trained_with.observation,
     )
     assert episodes["next", "force"].any()
-    for figure, values in summarise(episodes, config.sensors.contact_threshold_n).items():
+    for figure, values in summarise(episodes, config.sensors).items():
         assert report["policies"]["run"][figure]["mean"] == pytest.approx(float(values.double().mean()), rel=1e-6)
 
 
@@ -221,6 +223,41 @@ def test_runs_of_one_name_in_two_folders_are_compared(tmp_path):
         untrained_run(tmp_path / folder / "ib_s0")
     names = [c.name for c in load_contestants([str(tmp_path / "one" / "ib_s0"), str(tmp_path / "two" / "ib_s0")])]
     assert len(set(names)) == 2
+
+
+def test_the_baseline_is_what_the_others_are_held_against(compared, tmp_path, undrawn):
+    report, _, printed = compared
+    better = report["policies"]["close"]["force_reward_normalised"]["improvement"]
+    assert better["low"] <= better["probability"] <= better["high"]
+    assert better["probability"] < 0.5
+    assert "improvement" not in report["policies"]["force_pi"]["force_reward_normalised"]
+    assert "better than force_pi" in printed
+    config = evaluate_config(policies=["force_pi", "close"], baseline="close", kappas=1, trials=2)
+    other = evaluate(config, tmp_path / "out", Console(file=io.StringIO()))
+    assert "improvement" in other["policies"]["force_pi"]["force_reward_normalised"]
+
+
+def test_objects_in_place_of_softness_values(tmp_path, undrawn):
+    config = evaluate_config(policies=["force_pi", "close"], objects="paper", trials=2)
+    report = evaluate(config, tmp_path / "out", Console(file=io.StringIO(), width=200))
+    assert report["cells"] == ["rubber_mat", "sponge", "spray", "pringles", "wood", "mug"]
+    assert report["what"] == "object"
+
+
+@pytest.mark.parametrize("name", shipped_policies())
+def test_shipped_policies_work_by_name(name):
+    contestant = load_contestants([name])[0]
+    assert contestant.name == name
+    grid = kappa_grid(GraspConfig(steps=STEPS), 1, 2, seed=0)
+    episodes = roll_out(
+        contestant.policy,
+        grid.grasps,
+        GraspConfig(steps=STEPS),
+        physics=FAST,
+        action=contestant.action,
+        observation=contestant.observation,
+    )
+    assert episodes["next", "force"].any()
 
 
 def test_many_policies_and_one_softness(tmp_path):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import dataclasses
 import errno
 import json
 import os
@@ -108,8 +109,18 @@ def test_config_round_trip(tmp_path):
 
 
 def test_fingerprint_tells_configurations_apart():
-    assert fingerprint(TrainConfig()) == fingerprint(TrainConfig())
-    assert fingerprint(TrainConfig()) != fingerprint(TrainConfig(seed=1))
+    one, same, other = (dataclasses.asdict(TrainConfig(seed=seed)) for seed in (0, 0, 1))
+    assert fingerprint(one) == fingerprint(same) != fingerprint(other)
+
+
+def test_a_run_made_before_an_option_existed_stays_readable(run):
+    save(run, 1)
+    config = yaml.safe_load(run.config_path.read_text())
+    del config["model"], config["grasp"]["steps"]
+    old = RunDir(run.path)
+    old.config_path.write_text(yaml.safe_dump(config))
+    save(old, 2)
+    assert RunDir.open(run.path).load()[1]["frames"] == 2
 
 
 def test_checkpoint_of_another_config_is_refused(run, tmp_path):
@@ -203,7 +214,7 @@ def test_provenance(run):
     facts = json.loads((run.path / "run.json").read_text())
     assert facts["command"] == ["forcegrasp", "train", "seed=7"]
     assert facts["seed"] == 7
-    assert facts["config"] == fingerprint(TrainConfig(seed=7))
+    assert facts["config"] == fingerprint(dataclasses.asdict(TrainConfig(seed=7)))
     assert facts["python"] == ".".join(map(str, sys.version_info[:3]))
     for package in ("torch", "torchrl", "mujoco", "numpy", "forcegrasp"):
         assert facts["versions"][package] == version(package)

@@ -1,0 +1,51 @@
+"""Who takes part in a comparison: controllers by name, shipped policies by name, trained policies by run directory."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from tensordict.nn import TensorDictModuleBase
+
+from forcegrasp.config import ActionConfig, ObservationConfig, TrainConfig
+from forcegrasp.controllers import CONTROLLERS, make_controller
+from forcegrasp.errors import ConfigError, closest
+from forcegrasp.runs.policy import load_policy, shipped_policies
+
+
+@dataclass
+class Contestant:
+    """A policy under evaluation."""
+
+    name: str
+    policy: TensorDictModuleBase
+    action: ActionConfig
+    observation: ObservationConfig
+
+
+def load_contestants(names: list[str]) -> list[Contestant]:
+    """Loads controllers and policies; a controller's name wins over a policy's, and that over a folder's.
+
+    Raises:
+      ConfigError, CheckpointError: if one can't be loaded.
+    """
+    if not all(names):
+        raise ConfigError(f"policies={names}: a name is empty")
+    paths = {name: Path(name).resolve() for name in names}
+    contestants: dict[str, Contestant] = {}
+    for name, path in paths.items():
+        known = [*CONTROLLERS, *shipped_policies()]
+        if name not in known and not ("/" in name or path.exists()):
+            raise ConfigError(f"no controller, policy or run directory named {name!r}{closest(name, known)}")
+        if name in CONTROLLERS:
+            label, policy, config = name, make_controller(name), TrainConfig(action=ActionConfig(inductive_bias=False))
+        else:
+            same = [other for other in set(paths.values()) if other.name == path.name]
+            label = path.name if len(same) == 1 else f"{path.parent.name}_{path.name}"
+            policy, config = load_policy(name)
+        if label in contestants:
+            raise ConfigError(f"policies: {label} is named twice")
+        contestants[label] = Contestant(label, policy, config.action, config.observation)
+    if len(paths) < len(names):
+        raise ConfigError(f"policies={names}: one is named twice")
+    return list(contestants.values())

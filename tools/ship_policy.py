@@ -1,0 +1,83 @@
+"""Puts a trained policy into the package, with a card that says what it is and how well it does.
+
+    python tools/ship_policy.py RUN_DIR NAME EVALUATION_DIR "what it is, in a sentence"
+
+The evaluation must be one of `forcegrasp evaluate plan=paper` in which the run took part under its folder's name.
+"""
+
+from __future__ import annotations
+
+import json
+import shlex
+import shutil
+import sys
+from pathlib import Path
+
+from forcegrasp.runs.policy import load_policy
+from forcegrasp.runs.run_dir import RunDir
+
+POLICIES = Path(__file__).resolve().parent.parent / "forcegrasp" / "policies"
+
+
+def ship(source: Path, name: str, evaluation: Path, what: str) -> None:
+    """Writes ``forcegrasp/policies/NAME``: the policy's weights alone, its config, and its card."""
+    run, folder = RunDir.open(source), POLICIES / name
+    report = json.loads((evaluation / "evaluation.json").read_text())
+    figures = report["policies"][source.resolve().name]
+    tensors, facts = run.load()
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir()
+    shutil.copy(run.config_path, folder / "config.yaml")
+    shipped = RunDir(folder)
+    shipped.checkpoints.mkdir()
+    policy = {key: value for key, value in tensors.items() if key.startswith("policy.")}
+    shipped.save(facts["frames"], policy, {"batches": facts["batches"]}, keep=1)
+    made = json.loads((source / "run.json").read_text())
+    (folder / "card.md").write_text(_card(name, what, made, facts["frames"], report, figures))
+    load_policy(name)
+    print(f"shipped {folder}")
+
+
+def _card(name: str, what: str, made: dict, frames: int, report: dict, figures: dict) -> str:
+    def cell(key: str, digits: int) -> str:
+        found = figures[key]
+        return f"{found['mean']:.{digits}f} ± {found['std']:.{digits}f} | {found['iqm']:.{digits}f}"
+
+    rows = {
+        "force reward, normalised form (150 at best)": cell("force_reward_normalised", 1),
+        "force reward, paper's form (150 at best)": cell("force_reward_paper", 1),
+        "object moved until both fingers touch [mm]": cell("displacement_until_grasped_mm", 3),
+        "object moved in all [mm]": cell("displacement_total_mm", 3),
+        "overshoot over the goal force [%]": cell("overshoot_percent", 1),
+        "time to the goal force, ± 2 σ_f [s]": cell("reach_s", 2),
+        "force error over the last second [N]": cell("final_force_error_n", 4),
+    }
+    versions = ", ".join(f"{package} {version}" for package, version in made["versions"].items())
+    command = shlex.join(part for part in made["command"] if not part.startswith("hydra."))
+    return "\n".join(
+        [
+            f"# {name}",
+            "",
+            what,
+            "",
+            f"Trained for {frames:,} frames with seed {made['seed']}; everything else is in `config.yaml`. Train it again:",
+            "",
+            f"    {command}",
+            "",
+            f"Evaluated on {len(report['cells'])} softness values × {report['trials']} grasps, physics"
+            f" `{report['physics']}`, seed {report['seed']}:",
+            "",
+            "| | mean ± standard deviation | interquartile mean |",
+            "|---|---|---|",
+            *(f"| {label} | {value} |" for label, value in rows.items()),
+            "",
+            f"Made with Python {made['python']}, {versions}.",
+            "",
+        ]
+    )
+
+
+if __name__ == "__main__":
+    if len(sys.argv) != 5:
+        sys.exit(__doc__)
+    ship(Path(sys.argv[1]), sys.argv[2], Path(sys.argv[3]), sys.argv[4])
