@@ -296,7 +296,9 @@ class EvaluateConfig:
     """`forcegrasp evaluate`."""
 
     policies: list[str] = option(
-        ["force_pi"], "what to compare: controllers and shipped policies by name, or run directories", source="paper, Fig. 2"
+        ["force_pi"],
+        "what to compare: controllers and shipped policies by name, or run directories",
+        source="paper, Fig. 2",
     )
     out: str = option("", "where to write; runs/evaluate_TIME if empty")
     baseline: str = option("force_pi", "policy that the others are held against, if it takes part")
@@ -327,6 +329,21 @@ class CurvesConfig:
 
     folders: list[str] = option([], "folders with runs in or below them; also given plainly, without folders=")
     out: str = option("", "where to write curves.png and curves.json; the first folder if empty")
+
+
+@dataclass
+class ExportConfig:
+    """`forcegrasp export`."""
+
+    run: str = option("", "run directory or shipped policy; also given plainly, without run=")
+    out: str = option("", "folder to write; must not exist or be empty; runs/export_TIME if empty")
+    ceiling_n: float = option(
+        2.0,
+        "force above which no finger is closed further; the simulated gripper reaches 1.5",
+        unit="N",
+        low=0.1,
+        high=100,
+    )
 
 
 def check_deformation(deformation_m: float, radius_m: list[float], name: str) -> None:

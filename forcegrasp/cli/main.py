@@ -17,6 +17,8 @@ VERBS = {
     "add": "add an effect to a model, fit it again, and see the error fall",
     "train": "learn a grasp-force policy with PPO, or resume a run",
     "evaluate": "compare policies and controllers on the same simulated grasps",
+    "curves": "draw the learning curves of a sweep, mean and interval over seeds",
+    "export": "write a trained policy as a folder that runs on a robot, without torch",
     "effects": "list the physical effects that a simulator may lack, or explain one",
 }
 
@@ -31,8 +33,11 @@ examples
   forcegrasp train                                         the paper's method, 4.5 million frames
   forcegrasp train experiment=no_ib budget=quick seed=1    an ablation, about five minutes
   forcegrasp train -m experiment=ib,no_ib,no_rand seed=0,1,2 hydra/launcher=joblib
+  forcegrasp train -m sweep=ablation                       the method and its ablations, five seeds each
+  forcegrasp curves runs/SWEEP                             what they have learned so far
   forcegrasp train resume=runs/RUN                         go on with an interrupted run
   forcegrasp evaluate 'policies=[runs/RUN,force_pi]'
+  forcegrasp export runs/RUN out=my_policy                 for a real gripper: numpy and onnxruntime run it
   forcegrasp effects backlash                              what it looks like, and what looks like it
 
 from measurements to a better model (a set is a folder of CSV files; forcegrasp record shows one)

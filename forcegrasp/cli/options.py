@@ -10,8 +10,10 @@ from typing import Any
 from forcegrasp.config import (
     AddConfig,
     CompareConfig,
+    CurvesConfig,
     DiagnoseConfig,
     EvaluateConfig,
+    ExportConfig,
     FitConfig,
     RecordConfig,
     TrainConfig,
@@ -29,6 +31,8 @@ SCHEMAS: dict[str, type] = {
     "add": AddConfig,
     "train": TrainConfig,
     "evaluate": EvaluateConfig,
+    "export": ExportConfig,
+    "curves": CurvesConfig,
 }
 
 
@@ -43,6 +47,26 @@ def compose(verb: str, overrides: list[str]) -> Any:
 
 def compose_run(verb: str, overrides: list[str]) -> tuple[Any, str]:
     """Like :func:`compose`, and also returns where Hydra would put the run (``hydra.run.dir``)."""
+    config, hydra = _compose(verb, overrides)
+    return config, _folder("hydra.run.dir", hydra["run"]["dir"])
+
+
+def compose_sweep(overrides: list[str]) -> tuple[dict[str, str], str]:
+    """Returns what the preset of ``sweep`` sweeps (option → its values, as text), and the sweep's folder.
+
+    Args:
+      overrides: the command line's, less those that have several values.
+
+    Raises:
+      ConfigError: as :func:`compose`.
+    """
+    _, hydra = _compose("train", overrides)
+    swept = {key: str(values) for key, values in (hydra["sweeper"].get("params") or {}).items()}
+    return swept, _folder("hydra.sweep.dir", hydra["sweep"]["dir"])
+
+
+def _compose(verb: str, overrides: list[str]) -> tuple[Any, dict[str, Any]]:
+    """Returns the verb's configuration, checked, and Hydra's own: run, sweep and sweeper."""
     from hydra import compose as hydra_compose
     from hydra import initialize_config_module
     from hydra.core.global_hydra import GlobalHydra
@@ -60,16 +84,21 @@ def compose_run(verb: str, overrides: list[str]) -> tuple[Any, str]:
         with initialize_config_module("forcegrasp.conf", version_base="1.3"):
             composed = hydra_compose(verb, overrides=overrides, return_hydra_config=True)
         HydraConfig.instance().set_config(composed)
-        run_dir = str(composed.hydra.run.dir)
+        hydra = {"run": {"dir": str(composed.hydra.run.dir)}, "sweeper": composed.hydra.sweeper}
+        hydra["sweep"] = {"dir": str(composed.hydra.sweep.dir)}
         with open_dict(composed):
             del composed.hydra
         config = OmegaConf.to_object(composed)
     except (HydraException, OmegaConfBaseException) as error:
         raise ConfigError(_one_line(error)) from error
     validate(config)
-    if not run_dir.strip():
-        raise ConfigError("hydra.run.dir is empty: name a folder, or leave it out")
-    return config, run_dir
+    return config, hydra
+
+
+def _folder(option: str, value: str) -> str:
+    if not value.strip():
+        raise ConfigError(f"{option} is empty: name a folder, or leave it out")
+    return value
 
 
 def register_schemas() -> None:
@@ -146,9 +175,13 @@ def _one_line(error: Exception) -> str:
     return f"{key}: {text}" if key and key not in text else text
 
 
-def help_text(verb: str, purpose: str, notes: str = "") -> str:
-    """The verb's help: groups, then every option with default, unit, meaning and source."""
-    lines = [f"forcegrasp {verb}: {purpose}", "", f"usage: forcegrasp {verb} [key=value ...]", ""]
+def help_text(verb: str, purpose: str, notes: str = "", plain: str = "") -> str:
+    """The verb's help: groups, then every option with default, unit, meaning and source.
+
+    ``plain`` is what the verb takes without ``key=``.
+    """
+    usage = f"usage: forcegrasp {verb} {plain and f'[{plain}] '}[key=value ...]"
+    lines = [f"forcegrasp {verb}: {purpose}", "", usage, ""]
     if notes:
         lines += [notes.strip("\n"), ""]
     presets = [f"  {name}={'|'.join(choices)}" for name, choices in groups(verb).items()]

@@ -6,8 +6,8 @@ import os
 import sys
 from pathlib import Path
 
-from forcegrasp.cli.options import compose, compose_run, help_text, parse_override
-from forcegrasp.errors import ConfigError
+from forcegrasp.cli.options import compose, compose_run, compose_sweep, help_text, parse_override
+from forcegrasp.errors import ConfigError, ForcegraspError
 
 #: Exit status after Ctrl-C, as shells have it.
 INTERRUPTED = 130
@@ -15,6 +15,7 @@ PURPOSE = "learn a grasp-force policy with PPO"
 NOTES = """
   -m / --multirun    run every combination of comma-separated values:
                      forcegrasp train -m experiment=ib,no_ib seed=0,1,2   (hydra/launcher=joblib: side by side)
+                     forcegrasp train -m sweep=ablation                   the combinations of a preset
   resume=RUN_DIR     go on with an interrupted run, exactly as if it had not been interrupted
   hydra.run.dir=DIR  where to write the run; runs/TIME_EXPERIMENT_SEED by default
 
@@ -43,6 +44,8 @@ def main(arguments: list[str]) -> int:
 
 def _run(overrides: list[str]) -> int:
     config, run_dir = compose_run("train", overrides)
+    if preset := next((o for o in overrides if o.startswith("sweep=") and o != "sweep=none"), ""):
+        raise ConfigError(f"{preset} is several runs: add -m to run one after another")
     _check_model(config)
 
     from forcegrasp.runs.run_dir import RunDir
@@ -59,7 +62,13 @@ def _check_model(config) -> None:
 
 
 def _sweep(overrides: list[str]) -> int:
-    for single in _single_runs(overrides):
+    fixed = [text for text in overrides if not parse_override(text).is_sweep_override()]
+    if preset := next((o for o in overrides if o.startswith("sweep=") and o not in fixed), ""):
+        raise ConfigError(f"{preset}: one preset at a time")
+    swept, folder = compose_sweep(fixed)
+    given = {parse_override(text).get_key_element() for text in overrides}
+    presets = [f"{key}={values}" for key, values in swept.items() if key not in given]
+    for single in _single_runs(presets + overrides):
         _check_model(compose("train", single))  # refuses bad input before anything is written
     import hydra
     from hydra.core.global_hydra import GlobalHydra
@@ -72,9 +81,23 @@ def _sweep(overrides: list[str]) -> int:
     def job(composed: DictConfig) -> int:
         return _sweep_job(composed)
 
-    sys.argv = ["forcegrasp train", "-m", *overrides]
-    job()
+    quoted = folder.replace("\\", "\\\\").replace("'", "\\'")
+    sys.argv = ["forcegrasp train", "-m", *overrides, f"hydra.sweep.dir='{quoted}'"]
+    try:
+        job()
+    finally:  # a sweep that was cut short has something to show, too
+        _draw_curves(Path(folder))
     return 0
+
+
+def _draw_curves(folder: Path) -> None:
+    """Draws what the runs of a sweep have learned; says why where it can't."""
+    from forcegrasp.evaluate.curves import learning_curves
+
+    try:
+        learning_curves([folder], folder)
+    except (ForcegraspError, OSError) as error:
+        print(f"no learning curves: {error}")
 
 
 def _sweep_job(composed) -> int:
@@ -86,7 +109,8 @@ def _sweep_job(composed) -> int:
 
     import_mujoco()  # a launcher may have started a process of its own
     hydra, config = HydraConfig.get(), OmegaConf.to_object(composed)
-    run = RunDir.create(hydra.runtime.output_dir, config, list(hydra.overrides.task))
+    overrides = [text for text in hydra.overrides.task if not text.startswith("sweep=")]  # this run is a single one
+    run = RunDir.create(hydra.runtime.output_dir, config, overrides)
     status = _train(config, run, resume=False)
     if status == INTERRUPTED:
         raise KeyboardInterrupt  # ends the sweep, not just this run

@@ -106,6 +106,28 @@ MISTAKES = [
     (["train", "-m", "seed=0,1", "grasp.deformation_m=0.02"], "eq. 3"),
     (["train", "--multirun", "sead=1,2"], "did you mean seed"),
     (["train", "-m", "hydra/launcher=jobli"], "jobli"),
+    (["train", "sweep=ablation"], "add -m"),
+    (["train", "sweep=ablatoin"], "did you mean ablation"),
+    (["train", "-m", "sweep=ablation,parts"], "one preset at a time"),
+    (["train", "-m", "sweep=ablation", "ppo.grasps=0"], "ppo.grasps=0"),
+    (["train", "-m", "sweep=ablation", "experiment=ib,no_id"], "did you mean no_ib"),
+    (["train", "-m", "sweep=ablation", "hydra.sweep.dir="], "hydra.sweep.dir"),
+    # learning curves
+    (["curves"], "forcegrasp curves runs/SWEEP"),
+    (["curves", "nowhere"], "nowhere: no such folder"),
+    (["curves", "file"], "file: no such folder"),
+    (["curves", "empty"], "empty: no run in it"),
+    (["curves", "finished", "empty"], "empty: no run in it"),
+    (["curves", "folder=finished"], "did you mean folders"),
+    (["curves", "silent"], "no run in it has finished a batch yet"),
+    (["curves", "headless"], "no run in it has finished a batch yet"),
+    (["curves", "broken"], "broken/config.yaml: not a valid configuration"),
+    (["curves", "binary"], "binary/metrics.csv: can't be read"),
+    (["curves", "foreign"], "no column 'episode/force_reward_normalised'"),
+    (["curves", "garbled"], "line 2: episode/force_reward_paper is 'much', not a number"),
+    (["curves", "short"], "line 2: episode/displacement_until_grasped_mm is nothing, not a number"),
+    (["curves", "repeated"], "line 3: frames do not grow"),
+    (["curves", "finished", "out=file"], "could not write"),
     # runs and files
     (["train", "resume=nowhere"], "nowhere: no such run directory"),
     (["train", "resume="], "resume"),
@@ -154,6 +176,20 @@ def folder(tmp_path, finished, monkeypatch) -> Path:
         path.write_bytes(path.read_bytes()[:-1] + b"\x01")
     for path in (tmp_path / "started" / "checkpoints").iterdir():
         path.unlink()
+    header, row = (finished / "metrics.csv").read_text().splitlines()
+    values = dict(zip(header.split(","), row.split(","), strict=True))
+    for name, text in {
+        "headless": header,
+        "binary": b"\xff\xfe\x00",
+        "foreign": "frames,loss\n8,1.0\n",
+        "garbled": f"{header}\n{','.join((values | {'episode/force_reward_paper': 'much'}).values())}\n",
+        "short": f"{header}\n8,1,2,3,4\n",
+        "repeated": f"{header}\n{row}\n{row}\n",
+    }.items():
+        shutil.copytree(finished, tmp_path / name)
+        (tmp_path / name / "metrics.csv").write_bytes(text if isinstance(text, bytes) else text.encode())
+    shutil.copytree(finished, tmp_path / "silent")
+    (tmp_path / "silent" / "metrics.csv").unlink()
     monkeypatch.chdir(tmp_path)
     return tmp_path
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
@@ -60,6 +61,31 @@ def test_one_after_the_other(tiny, tmp_path):
     assert main(["train", "--multirun", "seed=3,4", *tiny["train"]]) == 0
     (sweep,) = (tmp_path / "runs").iterdir()
     assert set(runs_in(sweep)) == {(True, 3), (True, 4)}
+
+
+def test_preset_runs_seed_by_seed_and_draws_its_curves(tiny, tmp_path, capsys):
+    # what is given beside the preset wins over it, and applies to all of its runs
+    values = ["seed=0,1", "experiment=ib,no_stacking", "ppo.epochs=3", "hydra.sweep.dir='it\\'s here'"]
+    assert main(["train", "-m", "sweep=parts", *values, *tiny["train"]]) == 0
+    folder = tmp_path / "it's here"
+    runs = sorted(folder.rglob("config.yaml"), key=lambda path: int(path.parent.name.split("_")[-1]))
+    configs = [yaml.safe_load(path.read_text()) for path in runs]
+    told = [(c["seed"], c["observation"]["frames"], c["ppo"]["epochs"]) for c in configs]
+    assert told == [(0, 3, 3), (0, 1, 3), (1, 3, 3), (1, 1, 3)]
+    command = json.loads((runs[1].parent / "run.json").read_text())["command"]
+    assert "experiment=no_stacking" in command
+    assert not any(word.startswith("sweep=") for word in command)
+    curves = json.loads((folder / "curves.json").read_text())["groups"]
+    assert {label: group["averaged_seeds"] for label, group in curves.items()} == {"ib": [0, 1], "no_stacking": [0, 1]}
+    assert (folder / "curves.png").stat().st_size > 10_000
+    assert "learning curves are in" in capsys.readouterr().out
+
+
+def test_preset_side_by_side_with_a_single_seed(tiny, tmp_path):
+    options = ["seed=4", *tiny["train"], "hydra/launcher=joblib", "hydra.launcher.n_jobs=1", "hydra.sweep.dir=sweep"]
+    assert main(["train", "-m", "sweep=ablation", *options]) == 0
+    curves = json.loads((tmp_path / "sweep" / "curves.json").read_text())["groups"]
+    assert set(curves) == {"ib", "no_ib", "no_rand", "no_curriculum"}
 
 
 def test_ctrl_c_ends_the_sweep_and_not_just_one_run(tiny, monkeypatch, capsys):

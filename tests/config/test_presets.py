@@ -7,14 +7,20 @@ from pathlib import Path
 import pytest
 import yaml
 
-from forcegrasp.cli.options import SCHEMAS, compose, groups, leaves
+from forcegrasp.cli.options import SCHEMAS, compose, compose_sweep, groups, leaves
 from forcegrasp.config import EvaluateConfig, TrainConfig
+from forcegrasp.runs.started_with import DEFAULT_EXPERIMENT
 
 CONF = Path(__file__).parents[2] / "conf"
 FILES = sorted(path for path in CONF.glob("*/*.yaml"))
 EXPERIMENTS = sorted(path.stem for path in CONF.glob("experiment/*.yaml"))
+SWEEPS = sorted(path.stem for path in CONF.glob("sweep/*.yaml"))
+#: Presets that set options; those of ``sweep`` tell Hydra's sweeper what to combine.
 CHOICES = [
-    (verb, path.parent.name, path.stem) for verb in SCHEMAS for path in FILES if path.parent.name in groups(verb)
+    (verb, path.parent.name, path.stem)
+    for verb in SCHEMAS
+    for path in FILES
+    if path.parent.name in set(groups(verb)) - {"sweep"}
 ]
 
 
@@ -120,6 +126,32 @@ def test_recommended_differs_from_ib_in_reward_form_and_waiting():
 
 
 @pytest.mark.parametrize(
+    ("experiment", "without"),
+    [
+        ("no_noise", {"sensors.position_std_m": 0.0, "sensors.force_std_n": 0.0}),
+        ("no_stacking", {"observation.frames": 1}),
+        ("no_had_contact", {"observation.parts": ["position", "force", "force_error", "last_action"]}),
+        ("no_last_action", {"observation.parts": ["position", "force", "force_error", "had_contact"]}),
+    ],
+)
+def test_one_part_is_taken_away_at_a_time(experiment, without):
+    assert changed(train("experiment=ib"), train(f"experiment={experiment}")) == without
+
+
+@pytest.mark.parametrize("sweep", SWEEPS)
+def test_a_sweep_changes_no_option_by_itself(sweep):
+    assert train(f"sweep={sweep}") == TrainConfig()
+
+
+@pytest.mark.parametrize("sweep", SWEEPS)
+def test_a_sweep_holds_presets_that_exist_and_starts_with_all_of_one_seed(sweep):
+    swept, _ = compose_sweep([f"sweep={sweep}"])
+    assert list(swept) == ([] if sweep == "none" else ["seed", "experiment"])
+    for experiment in swept.get("experiment", "ib").split(","):
+        train(f"experiment={experiment}")
+
+
+@pytest.mark.parametrize(
     ("overrides", "name", "value"),
     [
         (["experiment=recommended", "reward=paper"], "reward.form", "paper"),
@@ -139,11 +171,17 @@ def test_what_is_given_explicitly_wins(overrides, name, value):
 @pytest.mark.parametrize("experiment", EXPERIMENTS)
 def test_experiments_mix_with_every_other_preset(experiment):
     others = {"budget": "quick", "physics": "reference", "reward": "goal_normalised", "sensors": "authors"}
-    assert {"experiment", *others} == set(groups("train"))
+    assert {"experiment", "sweep", *others} == set(groups("train"))
+    own = named_options(CONF / "experiment" / f"{experiment}.yaml")
     mixed = options(train(f"experiment={experiment}", *(f"{group}={choice}" for group, choice in others.items())))
     for group, choice in others.items():
-        named = named_options(CONF / group / f"{choice}.yaml")
+        # an ablation stays one: what it takes away, no other preset brings back
+        named = named_options(CONF / group / f"{choice}.yaml") | own
         assert {name: mixed[name] for name in named} == named
+
+
+def test_the_default_experiment_is_the_one_that_runs_are_named_after():
+    assert default_choices("train")["experiment"] == DEFAULT_EXPERIMENT
 
 
 def test_training_is_fast_and_evaluation_faithful_by_default():
