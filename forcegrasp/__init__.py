@@ -3,8 +3,11 @@
 Importing it makes ``gymnasium.make("forcegrasp/Grasp-v0")`` work.
 """
 
-import gymnasium
+import contextlib
 
 __version__ = "0.1.0"
 
-gymnasium.register("forcegrasp/Grasp-v0", entry_point="forcegrasp.env.gymnasium_view:GraspGymnasiumEnv")
+with contextlib.suppress(ImportError):  # a robot's computer runs forcegrasp.deploy with numpy and onnxruntime alone
+    import gymnasium
+
+    gymnasium.register("forcegrasp/Grasp-v0", entry_point="forcegrasp.env.gymnasium_view:GraspGymnasiumEnv")

@@ -26,6 +26,10 @@ class CheckpointError(ForcegraspError):
     """A run directory or checkpoint is missing, broken, or of another configuration."""
 
 
+class DeployError(ForcegraspError):
+    """An exported policy is missing, damaged or can't be run here, or a controller has nothing to hold."""
+
+
 def closest(name: str, known: Iterable[str]) -> str:
     """Returns ``"; did you mean a, b or c?"`` for the (at most three) closest known names, or the list of all."""
     known = sorted(known)

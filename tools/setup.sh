@@ -13,4 +13,4 @@ python="${PYTHON:-python3}"
 }
 # torch alone first, by its exact version: a CPU build is taken where the package index offers one
 "$venv/bin/python" -m pip install --quiet --disable-pip-version-check "$(grep '^torch==' constraints.txt)"
-"$venv/bin/python" -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[dev]'
+"$venv/bin/python" -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[dev,onnx]'

@@ -15,7 +15,7 @@ from forcegrasp.compare.final_force_shapes import BASE, FURTHER, Shape, ShapeFit
 from forcegrasp.compare.report import Section
 from forcegrasp.measure.schema import FinalForceTable
 from forcegrasp.physics.gripper import Gripper
-from forcegrasp.physics.parameters import FORCE_SCALE_RANGE
+from forcegrasp.physics.parameters import kappa_of_force_scale
 
 #: Rows that an object must have to be fitted.
 LEAST_ROWS = 4
@@ -97,8 +97,7 @@ class TableAnalysis:
         """κ of the paper's coupling whose f_α is nearest to an object's under the base law; None if there is none."""
         if not self.has_kappa or self.position_gain is None or self.base is None:
             return None
-        soft, hard = FORCE_SCALE_RANGE
-        return float(np.clip(1 - (self.base.fits[name].slope / self.position_gain - soft) / (hard - soft), 0, 1))
+        return float(kappa_of_force_scale(self.base.fits[name].slope / self.position_gain))
 
     def compare_json(self) -> dict:
         """The base law's errors, for `compare.json`."""

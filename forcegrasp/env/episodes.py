@@ -6,11 +6,13 @@ from tensordict import TensorDictBase
 from torch import Tensor
 
 from forcegrasp.config import SensorConfig
+from forcegrasp.env.reward import normalised_force_reward
 
 #: Figure → what it is. All of shape ``(n,)``, one per episode.
 FIGURES = {
     "force_reward_normalised": "Σ_t of r_force, authors' form (150 at best)",
     "force_reward_paper": "Σ_t of r_force, paper's form (150 at best)",
+    "force_reward_measured": "the same as the authors' form, from what the sensors say before noise: all a robot can tell",
     "displacement_until_grasped_mm": "|object displacement| until both fingers have touched, mm",
     "displacement_total_mm": "|object displacement| over the episode, mm",
     "fast_steps": "control steps in which the object was faster than the threshold",
@@ -51,6 +53,7 @@ def summarise(rollout: TensorDictBase, sensors: SensorConfig, period_s: float = 
     return {
         "force_reward_normalised": terms.get("force_normalised").sum((1, 2)),
         "force_reward_paper": terms.get("force_paper").sum((1, 2)),
+        "force_reward_measured": normalised_force_reward(goal - after.get("measured_force"), goal).sum((1, 2)),
         "displacement_until_grasped_mm": (at_grasp - start).abs() * 1e3,
         "displacement_total_mm": (position[:, -1] - start).abs() * 1e3,
         "fast_steps": -terms.get("object").sum((1, 2)),

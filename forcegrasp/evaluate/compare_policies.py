@@ -23,7 +23,7 @@ from forcegrasp.evaluate.statistics import Bootstrap
 from forcegrasp.evaluate.tables import print_report
 
 #: Figures of which more is better; of the others less is.
-_MORE_IS_BETTER = ("force_reward_normalised", "force_reward_paper")
+_MORE_IS_BETTER = ("force_reward_normalised", "force_reward_paper", "force_reward_measured")
 
 
 def evaluate(config: EvaluateConfig, out: Path, console: Console | None = None) -> dict:

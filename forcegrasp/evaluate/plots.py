@@ -67,9 +67,7 @@ def figure_pixels(figure: Figure) -> np.ndarray:
     return np.asarray(canvas.buffer_rgba())[..., :3].copy()
 
 
-def cell_boxes(
-    results: dict[str, np.ndarray], cells: list[str], xlabel: str, ylabel: str, log: bool = False
-) -> Figure:
+def cell_boxes(results: dict[str, np.ndarray], cells: list[str], xlabel: str, ylabel: str, log: bool = False) -> Figure:
     """Box plot of a figure per cell (softness value, or object) and policy, as in the paper's Fig. 2 (left).
 
     Args:

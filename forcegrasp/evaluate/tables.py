@@ -9,6 +9,7 @@ from rich.table import Table
 FIGURES = (
     ("force_reward_normalised", "force reward, normalised form", 1),
     ("force_reward_paper", "force reward, paper's form", 1),
+    ("force_reward_measured", "normalised form, of measured forces", 1),
     ("displacement_until_grasped_mm", "object moved until both touch, mm", 3),
     ("displacement_total_mm", "object moved in all, mm", 3),
     ("fast_steps", "steps over the speed threshold", 2),
@@ -22,18 +23,16 @@ def print_report(report: dict, console: Console) -> None:
     """All cells together, then cell by cell, then how likely each policy beats the baseline."""
     policies = report["policies"]
     _overall(report, policies, console)
-    for figure, heading, digits in FIGURES[:4]:
+    for figure, heading, digits in FIGURES[:5]:
         table = _table(f"{heading}: mean ± half of its 95 % interval", report["what"], policies)
         for index, cell in enumerate(report["cells"]):
             found = [values[figure]["by_cell"][index] for values in policies.values()]
-            table.add_row(
-                cell, *(f"{c['mean']:.{digits}f} ± {(c['high'] - c['low']) / 2:.{digits}f}" for c in found)
-            )
+            table.add_row(cell, *(f"{c['mean']:.{digits}f} ± {(c['high'] - c['low']) / 2:.{digits}f}" for c in found))
         console.print(table)
     if report["baseline"]:
         others = [name for name in policies if name != report["baseline"]]
         table = _table(f"probability of being better than {report['baseline']} [95 % interval]", "figure", others)
-        for figure, heading, _ in FIGURES[:4]:
+        for figure, heading, _ in FIGURES[:5]:
             found = [policies[name][figure]["improvement"] for name in others]
             table.add_row(heading, *(f"{p['probability']:.2f} [{p['low']:.2f}, {p['high']:.2f}]" for p in found))
         console.print(table)

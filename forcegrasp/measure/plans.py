@@ -84,7 +84,7 @@ def make_plan(
       open_m: finger position when open.
       rng: draws speeds, depths and offsets.
     """
-    deepest, kinds, simple = open_m / 15, PLANS[plan], plan == "close_and_hold"
+    deepest, kinds, simple = open_m / 9, PLANS[plan], plan == "close_and_hold"
     planned = []
     for index in range(grasps):
         turn, thing = divmod(index, len(radii_m))

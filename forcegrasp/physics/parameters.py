@@ -26,6 +26,12 @@ def force_scale_of_kappa(kappa: np.ndarray) -> np.ndarray:
     return soft + (1 - kappa) * (hard - soft)
 
 
+def kappa_of_force_scale(force_scale: np.ndarray) -> np.ndarray:
+    """Softness κ whose f_α is nearest: the inverse of :func:`force_scale_of_kappa`, within [0, 1]."""
+    soft, hard = FORCE_SCALE_RANGE
+    return np.clip(1 - (force_scale - soft) / (hard - soft), 0.0, 1.0)
+
+
 @dataclass(frozen=True)
 class GraspParameters:
     """The parameters of n grasps. Every field is a float64 array of shape ``(n,)``."""

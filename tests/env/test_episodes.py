@@ -40,8 +40,16 @@ def _random_rollout(n: int, steps: int, seed: int) -> TensorDict:
         batch_size=(n, steps),
     )
     goal = (uniform(n, 1, 1) + 0.1).expand(n, steps, 1)
+    read = force + 0.1 * uniform(n, steps, 2)
     after = TensorDict(
-        {"force": force, "object_position": position, "goal_force": goal, "reward_terms": terms}, batch_size=(n, steps)
+        {
+            "force": force,
+            "measured_force": read,
+            "object_position": position,
+            "goal_force": goal,
+            "reward_terms": terms,
+        },
+        batch_size=(n, steps),
     )
     return TensorDict({"object_position": before, "next": after}, batch_size=(n, steps))
 
@@ -72,6 +80,8 @@ def _slow(rollout: TensorDict, sensors: SensorConfig, period: float) -> dict[str
         errors = [abs(goal[i, t, 0] - force[i, t, finger]) for t in last for finger in (0, 1)]
         figures["force_reward_normalised"].append(sum(terms["force_normalised"][i]))
         figures["force_reward_paper"].append(sum(terms["force_paper"][i]))
+        apart = np.abs(goal[i] - after["measured_force"][i].double().numpy()).sum(1)
+        figures["force_reward_measured"].append(np.sum(1 - np.tanh(apart / goal[i, :, 0])))
         figures["displacement_until_grasped_mm"].append(1000 * abs(grasped_at - position[i, 0]))
         figures["displacement_total_mm"].append(1000 * abs(position[i, -1] - position[i, 0]))
         figures["fast_steps"].append(sum(terms["object"][i] < 0))

@@ -109,7 +109,9 @@ def test_threshold_of_reward_reaches_the_environment():
     config = GraspConfig(steps=60, offset_m=[0.004, 0.004], radius_m=[0.03, 0.03])
     grasps = kappa_grid(config, 2, 2, seed=0).grasps
     strict, lax = (
-        summarise(play("close", grasps, config, reward=RewardConfig(speed_threshold_m=limit)), SensorConfig())["fast_steps"]
+        summarise(play("close", grasps, config, reward=RewardConfig(speed_threshold_m=limit)), SensorConfig())[
+            "fast_steps"
+        ]
         for limit in (0.0, 1.0)
     )
     assert (strict > 5).all()
