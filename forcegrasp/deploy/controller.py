@@ -1,0 +1,218 @@
+"""From readings to commands, 25 times a second: what training built from transforms, in numpy, and within limits."""
+
+from __future__ import annotations
+
+import dataclasses
+import logging
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from forcegrasp.deploy.contract import FINGERS, Contract
+from forcegrasp.deploy.policies import ForcePI, OnnxPolicy, Policy
+from forcegrasp.errors import DeployError
+
+_log = logging.getLogger("forcegrasp.deploy")
+
+
+class GraspController:
+    """Brings both fingertip forces to a goal: ``reset(goal_n)``, then ``step(q, f)`` once per control period.
+
+    Whatever the policy says: a command is within Δq_max of the position read and within the joint range; above the
+    force ceiling no finger is closed further; and where a reading or an action can't be trusted, the last command is
+    held and ``fault`` says why. A held step leaves the memory (contact, observations, last action, integral) as it
+    was, and the next good reading goes on from there. Each kind of fault is logged once per grasp, as a warning of
+    the logger ``forcegrasp.deploy``.
+
+    Attributes:
+      fault: why the last step held, or did not close further, in one line; None if all is well.
+      action: the policy's last action, clipped to [−1, 1], ``(2,)``.
+      delta_m: Δq of the last command that was not a hold, metres, ``(2,)``.
+
+    Args:
+      policy: what decides.
+      contract: how readings become observations and actions commands; and the limits.
+    """
+
+    def __init__(self, policy: Policy, contract: Contract) -> None:
+        self.policy, self.contract = policy, contract
+        self.goal_n: float | None = None
+        self.fault: str | None = None
+
+    @classmethod
+    def load(cls, folder: Path | str, ceiling_n: float | None = None) -> GraspController:
+        """The controller of a folder that ``forcegrasp export`` wrote.
+
+        Args:
+          folder: with ``policy.onnx`` and ``contract.json``.
+          ceiling_n: another force ceiling than the contract's, newtons.
+
+        Raises:
+          DeployError: if the folder is missing, damaged, or can't be run here.
+          ValueError: if the ceiling isn't positive.
+        """
+        policy, contract = OnnxPolicy.load(folder)
+        return cls(policy, _with_ceiling(contract, ceiling_n))
+
+    @classmethod
+    def baseline(cls, ceiling_n: float | None = None, **gains: float) -> GraspController:
+        """The hand-written controller with the paper's gripper; ``gains`` are those of :class:`ForcePI`.
+
+        Raises:
+          ValueError: if the ceiling isn't positive.
+        """
+        contract = _with_ceiling(Contract(inductive_bias=False), ceiling_n)
+        return cls(ForcePI(contract.max_delta_m, contract.control_period_s, **gains), contract)
+
+    def reset(self, goal_n: float) -> None:
+        """Begins a grasp: forgets all readings and commands. The fingers should be open and touch nothing.
+
+        Args:
+          goal_n: goal force of each finger, newtons.
+
+        Raises:
+          ValueError: if the policy was not trained for that goal, or it is above the ceiling; nothing is changed.
+        """
+        low, high = self.contract.goal_range_n
+        if not low <= goal_n <= min(high, self.contract.ceiling_n):
+            raise ValueError(
+                f"goal_n={goal_n}: must lie in [{low:g}, {high:g}] N, which was trained,"
+                f" and not above the ceiling of {self.contract.ceiling_n:g} N"
+            )
+        self.goal_n = float(goal_n)
+        self.policy.reset()
+        self.fault = None
+        self.action, self.delta_m = np.zeros(FINGERS, np.float32), np.zeros(FINGERS)
+        self._had_contact: np.ndarray | None = None  # None until the first good reading
+        self._commanded: np.ndarray | None = None
+        self._time: float | None = None  # of the last good reading
+        self._told: set[str] = set()
+
+    def step(self, q: ArrayLike, f: ArrayLike, t: float | None = None) -> np.ndarray:
+        """The command for one control period.
+
+        Args:
+          q: finger positions (left, right), metres.
+          f: fingertip forces (left, right), newtons.
+          t: when they were read, seconds on any clock that only moves forward; without it, staleness goes unnoticed.
+
+        Returns:
+          q_des (left, right), metres, ``(2,)``.
+
+        Raises:
+          RuntimeError: before the first reset.
+          DeployError: if nothing is to be held yet: no good position was read since the reset. Nothing was commanded.
+        """
+        if self.goal_n is None:
+            raise RuntimeError("call reset(goal_n) before the first step")
+        position, force = _pair(q), _pair(f)
+        fault = self._doubt(position, force, t)
+        if fault:
+            return self._hold(position, fault)
+        parts = self._observe(position, force)
+        raw = np.asarray(self.policy.act(parts), np.float32)
+        if not np.isfinite(raw).all():
+            return self._hold(position, f"action is not finite: the policy gave {_show(raw)}")
+        self.action = np.clip(raw, -1, 1)
+        delta = (self.action * np.float32(self.contract.max_delta_m) * self._bias(parts)).astype(np.float64)
+        fault = None
+        if force.max() > self.contract.ceiling_n:
+            # either finger: its forces come from both, and the other one's sensor may be dead
+            delta = np.maximum(delta, 0.0)
+            fault = f"force is above the ceiling of {self.contract.ceiling_n:g} N: {_show(force)} N; not closing"
+        self._tell(fault)
+        self.delta_m = delta
+        self._commanded = np.clip(position + delta, *self.contract.joint_range_m)
+        return self._commanded.copy()
+
+    def _doubt(self, position: np.ndarray | None, force: np.ndarray | None, t: float | None) -> str | None:
+        """Why a reading can't be trusted, or None; the part before the colon is the kind of fault."""
+        for name, unit, value, bounds in (
+            ("position", "m", position, self.contract.position_reading_m),
+            ("force", "N", force, self.contract.force_reading_n),
+        ):
+            if value is None:
+                return f"{name} reading is not two numbers: holding"
+            if not np.isfinite(value).all():
+                return f"{name} reading is not finite: {_show(value)} {unit}; holding"
+            if value.min() < bounds[0] or value.max() > bounds[1]:
+                return f"{name} reading can't be true: {_show(value)} is not in {_show(bounds)} {unit}; holding"
+        if t is None:
+            return None
+        if not math.isfinite(t):
+            return f"time of the reading is not finite: {t} s; holding"
+        gap = math.inf if self._time is None else t - self._time
+        if gap <= 0:
+            return f"reading is stale: its time {t:.3f} s is not after {self._time:.3f} s, the last one's; holding"
+        shortest, longest = self.contract.gap_s
+        if gap < shortest:
+            return f"reading comes too soon: {gap:.3f} s after the last one, not {self.contract.control_period_s:g} s"
+        first, self._time = self._time is None, t
+        if gap > longest and not first:
+            return f"readings have a gap: {gap:.3f} s, more than {longest:g} s; holding for one step"
+        return None
+
+    def _observe(self, position: np.ndarray, force: np.ndarray) -> dict[str, np.ndarray]:
+        """Every part of o(t), float32 as in training; remembers contact, h(t) = (f > f_θ) ∨ h(t−1) with h(0) = 0."""
+        contract, force = self.contract, force.astype(np.float32)
+        if self._had_contact is None:
+            self._had_contact = np.zeros(FINGERS, np.float32)
+        else:
+            self._had_contact = np.maximum(self._had_contact, force > contract.contact_threshold_n).astype(np.float32)
+        scale, offset = np.float32(contract.position_scale_per_m), np.float32(contract.position_offset)
+        return {
+            "position": position.astype(np.float32) * scale + offset,
+            "force": force,
+            "force_error": np.float32(self.goal_n) - force,
+            "last_action": self.action,
+            "had_contact": self._had_contact,
+        }
+
+    def _bias(self, parts: dict[str, np.ndarray]) -> np.ndarray | float:
+        """φ of each finger (paper, eq. 7), in [0, 1]."""
+        contract, touched = self.contract, parts["had_contact"] > 0.5
+        if not contract.inductive_bias:
+            return np.float32(1)
+        if touched.all():
+            near_goal = 1 - np.abs(parts["force_error"]) / np.float32(self.goal_n)
+            return np.maximum(near_goal, np.float32(contract.bias_floor))
+        return np.where(touched, np.float32(contract.bias_one_contact), np.float32(1))
+
+    def _hold(self, position: np.ndarray | None, fault: str) -> np.ndarray:
+        """The last command again; before the first one, the position where the fingers stand."""
+        if self._commanded is None:
+            low, high = self.contract.position_reading_m
+            if position is None or not ((position >= low) & (position <= high)).all():
+                raise DeployError(f"{fault}, but no good position was read since the reset: there is nothing to hold")
+            self._commanded = np.clip(position, *self.contract.joint_range_m)
+        self._tell(fault)
+        return self._commanded.copy()
+
+    def _tell(self, fault: str | None) -> None:
+        """Says what is wrong, and logs it unless that kind of fault was already logged in this grasp."""
+        self.fault = fault
+        if fault:
+            kind = fault.partition(":")[0]
+            if kind not in self._told:
+                _log.warning(fault)
+            self._told.add(kind)
+
+
+def _with_ceiling(contract: Contract, ceiling_n: float | None) -> Contract:
+    return contract if ceiling_n is None else dataclasses.replace(contract, ceiling_n=float(ceiling_n))
+
+
+def _pair(reading: Any) -> np.ndarray | None:
+    """A reading as float64 ``(2,)``; None if it is something else."""
+    try:
+        pair = np.asarray(reading, np.float64)
+    except (TypeError, ValueError):
+        return None
+    return pair if pair.shape == (FINGERS,) else None
+
+
+def _show(values: ArrayLike) -> str:
+    return "[" + ", ".join(f"{v:.4g}" for v in values) + "]"
