@@ -338,11 +338,7 @@ class ExportConfig:
     run: str = option("", "run directory or shipped policy; also given plainly, without run=")
     out: str = option("", "folder to write; must not exist or be empty; runs/export_TIME if empty")
     ceiling_n: float = option(
-        2.0,
-        "force above which no finger is closed further; the simulated gripper reaches 1.5",
-        unit="N",
-        low=0.1,
-        high=100,
+        2.0, "force above which no finger is closed further; the simulated one reaches 1.5", unit="N", low=0.1, high=20
     )
 
 

@@ -73,16 +73,22 @@ class Contract:
             numbers = value if isinstance(value, tuple) else (value,)
             if not all(isinstance(n, str) or math.isfinite(n) for n in numbers):
                 raise ValueError(f"{name}={value}: must be finite")
-            if name.endswith(("range_m", "range_n", "reading_m", "reading_n", "gap_s")) and numbers[0] >= numbers[1]:
-                raise ValueError(f"{name}={list(numbers)}: must be [low, high] with low < high")
+            if isinstance(value, tuple) and name != "parts" and value[0] > value[1]:
+                raise ValueError(f"{name}={list(value)}: must be [low, high] with low ≤ high")
         for name in ("bias_one_contact", "bias_floor"):
             if not 0 <= getattr(self, name) <= 1:
                 raise ValueError(f"{name}={getattr(self, name)}: must lie in [0, 1]")
-        for name in ("position_scale_per_m", "max_delta_m", "control_period_s", "ceiling_n"):
+        for name in ("position_scale_per_m", "max_delta_m", "control_period_s"):
             if getattr(self, name) <= 0:
                 raise ValueError(f"{name}={getattr(self, name)}: must be positive")
         if self.goal_range_n[0] <= 0 or self.contact_threshold_n < 0 or self.gap_s[0] < 0:
             raise ValueError("goal_range_n, contact_threshold_n and gap_s must not reach below 0")
+        if not self.goal_range_n[0] <= self.ceiling_n <= self.force_reading_n[1]:
+            lowest, highest = self.goal_range_n[0], self.force_reading_n[1]
+            raise ValueError(
+                f"ceiling_n={self.ceiling_n:g}: must lie between the smallest goal, {lowest:g} N,"
+                f" and the largest reading that can be true, {highest:g} N"
+            )
 
     @property
     def observation_size(self) -> int:

@@ -52,7 +52,7 @@ class GraspController:
 
         Raises:
           DeployError: if the folder is missing, damaged, or can't be run here.
-          ValueError: if the ceiling isn't positive.
+          ValueError: if the ceiling is below the smallest goal, or above what a sensor can read.
         """
         policy, contract = OnnxPolicy.load(folder)
         return cls(policy, _with_ceiling(contract, ceiling_n))
@@ -62,7 +62,7 @@ class GraspController:
         """The hand-written controller with the paper's gripper; ``gains`` are those of :class:`ForcePI`.
 
         Raises:
-          ValueError: if the ceiling isn't positive.
+          ValueError: if the ceiling is below the smallest goal, or above what a sensor can read.
         """
         contract = _with_ceiling(Contract(inductive_bias=False), ceiling_n)
         return cls(ForcePI(contract.max_delta_m, contract.control_period_s, **gains), contract)

@@ -52,14 +52,18 @@ def export_policy(name: Path | str, out: Path, ceiling_n: float) -> Exported:
 
     Raises:
       CheckpointError: if there is no such policy.
-      DeployError: if packages are missing, the folder holds something, or the exported network acts differently.
+      DeployError: if packages are missing, the folder holds something, the ceiling is below every goal that was
+        trained, or the exported network acts differently.
       OSError: if the folder can't be written.
     """
     torch.set_num_threads(1)  # the network is far too small for more
     policy, config = load_policy(name)
     if out.is_dir() and any(out.iterdir()):
         raise DeployError(f"out={out}: is not empty; name a new folder")
-    contract = contract_of(config, ceiling_n)
+    try:
+        contract = contract_of(config, ceiling_n)
+    except ValueError as error:
+        raise DeployError(f"{name}: {error}") from error
     mean = policy[0].module[0]  # of the Gaussian; its deviation is for training
     network, versions = to_onnx(mean, contract.observation_size)
     difference = largest_difference(mean, OnnxPolicy(network, contract), contract)

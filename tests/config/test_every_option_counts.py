@@ -120,6 +120,8 @@ TRAIN_CASES: dict[str, Any] = {
 EVALUATE_CASES: dict[str, Any] = {
     "policies": ["informed"],
     "out": "elsewhere",
+    "baseline": "run",
+    "objects": "paper",
     "kappas": 3,
     "trials": 3,
     "seed": 1,
@@ -229,7 +231,7 @@ def no_pictures(monkeypatch):
 
 @pytest.fixture(scope="module")
 def run_path(tmp_path_factory) -> Path:
-    return tmp_path_factory.mktemp("train")
+    return tmp_path_factory.mktemp("train") / "run"
 
 
 @pytest.fixture(scope="module")
@@ -239,8 +241,8 @@ def plain_training(run_path):
 
 @pytest.fixture(scope="module")
 def learned(plain_training, run_path) -> dict[str, list[str]]:
-    """A policy that sees every reading, which the hand-written controllers do not."""
-    return {"policies": [str(run_path)]}
+    """A policy that sees every reading, which the hand-written controllers do not, and something to hold it against."""
+    return {"policies": [str(run_path), "close"], "baseline": "close"}
 
 
 @pytest.fixture(scope="module")
