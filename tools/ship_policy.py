@@ -60,7 +60,7 @@ def _card(name: str, what: str, made: dict, frames: int, report: dict, figures: 
             "",
             what,
             "",
-            f"Trained for {frames:,} frames with seed {made['seed']}; everything else is in `config.yaml`. Train it again:",
+            f"Trained for {frames:,} frames with seed {made['seed']}; the rest is in `config.yaml`. Train it again:",
             "",
             f"    {command}",
             "",

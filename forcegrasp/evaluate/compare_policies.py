@@ -20,7 +20,7 @@ from forcegrasp.evaluate.grids import Grid, kappa_grid, object_grid, read_object
 from forcegrasp.evaluate.plots import cell_boxes, force_traces
 from forcegrasp.evaluate.rollouts import roll_out
 from forcegrasp.evaluate.statistics import Bootstrap
-from forcegrasp.evaluate.tables import print_report
+from forcegrasp.evaluate.tables import markdown, print_report
 
 #: Figures of which more is better; of the others less is.
 _MORE_IS_BETTER = ("force_reward_normalised", "force_reward_paper", "force_reward_measured")
@@ -29,8 +29,8 @@ _MORE_IS_BETTER = ("force_reward_normalised", "force_reward_paper", "force_rewar
 def evaluate(config: EvaluateConfig, out: Path, console: Console | None = None) -> dict:
     """Rolls every policy out on the same grasps; prints tables and writes everything into ``out``.
 
-    Writes ``evaluation.json`` (the returned summary), ``trials.csv`` (one row per trial), ``force_reward.png``,
-    ``displacement.png``, and ``traces_<policy>.png``.
+    Writes ``evaluation.json`` (the returned summary), ``tables.md``, ``trials.csv`` (one row per trial),
+    ``force_reward.png``, ``displacement.png``, and ``traces_<policy>.png``.
 
     Raises:
       ConfigError, CheckpointError, MeasurementError, PhysicsError: with what to do about it.
@@ -70,6 +70,7 @@ def evaluate(config: EvaluateConfig, out: Path, console: Console | None = None) 
         "baseline": baseline,
         "policies": _describe(figures, baseline, config.seed),
     }
+    (out / "tables.md").write_text(markdown(report), "utf-8")
     (out / "evaluation.json").write_text(json.dumps(report, indent=1, ensure_ascii=False) + "\n", "utf-8")
     _write_trials(out / "trials.csv", grid, figures)
     rewards = {name: values["force_reward_normalised"] for name, values in figures.items()}

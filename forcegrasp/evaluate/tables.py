@@ -1,11 +1,15 @@
-"""An evaluation as tables on the terminal, narrow enough for one."""
+"""An evaluation as tables, for the terminal and as Markdown."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import dataclass
+
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
-#: Figures that are printed: name, heading, digits.
+#: Figures that are shown: name, heading, digits. The first five also cell by cell.
 FIGURES = (
     ("force_reward_normalised", "force reward, normalised form", 1),
     ("force_reward_paper", "force reward, paper's form", 1),
@@ -19,44 +23,99 @@ FIGURES = (
 )
 
 
+@dataclass(frozen=True)
+class Sheet:
+    """A table before it is drawn."""
+
+    title: str
+    header: list[str]
+    rows: list[list[str]]
+
+
 def print_report(report: dict, console: Console) -> None:
-    """All cells together, then cell by cell, then how likely each policy beats the baseline."""
+    """Shows every table of an evaluation's report."""
+    for sheet in sheets(report):
+        table = Table(title=escape(sheet.title))
+        for index, name in enumerate(sheet.header):
+            table.add_column(escape(name), justify="right" if index else "left", overflow="fold")
+        for row in sheet.rows:
+            table.add_row(*map(escape, row))
+        console.print(table)
+
+
+def markdown(report: dict) -> str:
+    """The same as text to paste into a document."""
+    parts = []
+    for sheet in sheets(report):
+        lines = [
+            sheet.header,
+            ["---"] * len(sheet.header),
+            *([c.replace("\n", "; ") for c in row] for row in sheet.rows),
+        ]
+        parts.append(f"{sheet.title}\n\n" + "\n".join(f"| {' | '.join(line)} |" for line in lines) + "\n")
+    return "\n".join(parts)
+
+
+def sheets(report: dict) -> Iterator[Sheet]:
+    """All cells together, cell by cell, and how likely the baseline is beaten; of objects also the paper's table."""
     policies = report["policies"]
-    _overall(report, policies, console)
+    names = list(policies)
+    yield Sheet(
+        f"mean ± standard deviation; interquartile mean [its 95 % interval]; episodes of {report['steps']} steps",
+        ["figure", *names],
+        [
+            [heading, *(_overall(policies[name][figure], digits) for name in names)]
+            for figure, heading, digits in FIGURES
+        ],
+    )
     for figure, heading, digits in FIGURES[:5]:
-        table = _table(f"{heading}: mean ± half of its 95 % interval", report["what"], policies)
-        for index, cell in enumerate(report["cells"]):
-            found = [values[figure]["by_cell"][index] for values in policies.values()]
-            table.add_row(cell, *(f"{c['mean']:.{digits}f} ± {(c['high'] - c['low']) / 2:.{digits}f}" for c in found))
-        console.print(table)
-    if report["baseline"]:
-        others = [name for name in policies if name != report["baseline"]]
-        table = _table(f"probability of being better than {report['baseline']} [95 % interval]", "figure", others)
-        for figure, heading, _ in FIGURES[:5]:
-            found = [policies[name][figure]["improvement"] for name in others]
-            table.add_row(heading, *(f"{p['probability']:.2f} [{p['low']:.2f}, {p['high']:.2f}]" for p in found))
-        console.print(table)
-
-
-def _overall(report: dict, policies: dict, console: Console) -> None:
-    title = f"mean ± standard deviation and interquartile mean [its 95 % interval], episodes of {report['steps']} steps"
-    table = _table(title, "figure", policies)
-    for figure, heading, digits in FIGURES:
-        cells = [values[figure] for values in policies.values()]
-        table.add_row(
-            heading,
-            *(
-                f"{c['mean']:.{digits}f} ± {c['std']:.{digits}f}\n"
-                f"{c['iqm']:.{digits}f} [{c['iqm_low']:.{digits}f}, {c['iqm_high']:.{digits}f}]"
-                for c in cells
-            ),
+        cells = {name: policies[name][figure]["by_cell"] for name in names}
+        yield Sheet(
+            f"{heading}: mean ± half of its 95 % interval",
+            [report["what"], *names],
+            [
+                [cell, *(_half(cells[name][index], digits) for name in names)]
+                for index, cell in enumerate(report["cells"])
+            ],
         )
-    console.print(table)
+    if report["what"] == "object":
+        yield _as_in_the_paper(report)
+    if report["baseline"]:
+        others = [name for name in names if name != report["baseline"]]
+        yield Sheet(
+            f"probability of being better than {report['baseline']} [95 % interval]",
+            ["figure", *others],
+            [
+                [heading, *(_probability(policies[name][figure]["improvement"]) for name in others)]
+                for figure, heading, _ in FIGURES[:5]
+            ],
+        )
 
 
-def _table(title: str, first: str, policies: object) -> Table:
-    table = Table(title=title)
-    table.add_column(first)
-    for name in policies:
-        table.add_column(name, justify="right", overflow="fold")
-    return table
+def _as_in_the_paper(report: dict) -> Sheet:
+    """Rows and columns of the paper's Table 1."""
+    rows = []
+    for name, figures in report["policies"].items():
+        for label, figure in (("reward", "force_reward_measured"), ("moved, mm", "displacement_total_mm")):
+            found = [*figures[figure]["by_cell"], figures[figure]]
+            rows.append([f"{name}: {label}", *(f"{c['mean']:.1f} ± {c['std']:.1f}" for c in found)])
+    return Sheet(
+        "as in the paper's Table 1: mean ± standard deviation, reward of measured forces",
+        ["method", *report["cells"], "average"],
+        rows,
+    )
+
+
+def _overall(found: dict, digits: int) -> str:
+    return (
+        f"{found['mean']:.{digits}f} ± {found['std']:.{digits}f}\n"
+        f"{found['iqm']:.{digits}f} [{found['iqm_low']:.{digits}f}, {found['iqm_high']:.{digits}f}]"
+    )
+
+
+def _half(found: dict, digits: int) -> str:
+    return f"{found['mean']:.{digits}f} ± {(found['high'] - found['low']) / 2:.{digits}f}"
+
+
+def _probability(found: dict) -> str:
+    return f"{found['probability']:.2f} [{found['low']:.2f}, {found['high']:.2f}]"

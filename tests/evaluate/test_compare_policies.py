@@ -79,7 +79,7 @@ def trials(compared) -> list[dict]:
 
 def test_files(compared):
     _, out, _ = compared
-    names = {"evaluation.json", "trials.csv", "force_reward.png", "displacement.png"}
+    names = {"evaluation.json", "tables.md", "trials.csv", "force_reward.png", "displacement.png"}
     assert {path.name for path in out.iterdir()} == names | {"traces_force_pi.png", "traces_close.png"}
     for path in out.glob("*.png"):
         with Image.open(path) as picture:
@@ -242,6 +242,10 @@ def test_objects_in_place_of_softness_values(tmp_path, undrawn):
     report = evaluate(config, tmp_path / "out", Console(file=io.StringIO(), width=200))
     assert report["cells"] == ["rubber_mat", "sponge", "spray", "pringles", "wood", "mug"]
     assert report["what"] == "object"
+    text = (tmp_path / "out" / "tables.md").read_text()
+    assert "| method | rubber_mat | sponge | spray | pringles | wood | mug | average |" in text
+    mug = report["policies"]["close"]["force_reward_measured"]["by_cell"][-1]
+    assert f"{mug['mean']:.1f} ± {mug['std']:.1f}" in text
 
 
 @pytest.mark.parametrize("name", shipped_policies())
