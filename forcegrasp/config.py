@@ -342,6 +342,30 @@ class ExportConfig:
     )
 
 
+@dataclass
+class RenderConfig:
+    """`forcegrasp render`."""
+
+    policies: list[str] = option(
+        ["force_pi"], "what to show: controllers and shipped policies by name, or run directories; policy= for one"
+    )
+    out: str = option("", "file to write, NAME.gif; runs/render_TIME.gif if empty")
+    seed: int = option(0, "seed of what is not given, and of the sensor noise", low=0, high=2**31 - 1)
+    kappa: float | None = option(None, "softness of the object; 0 is hard", source="paper, Sec. 3", low=0, high=1)
+    b2: float | None = option(None, "velocity gain of the actuators", source="paper, Sec. 3", low=-50, high=0)
+    radius_m: float | None = option(
+        None, "object radius; the paper's w_o", unit="m", source="paper, Table 2", low=0.0121, high=0.04
+    )
+    offset_m: float | None = option(
+        None, "object offset along the grasp axis, o_y", unit="m", source="paper, Table 2", low=-0.045, high=0.045
+    )
+    goal_force_n: float | None = option(None, "goal force of each finger", unit="N", low=0.01, high=5)
+    steps: int = option(150, "control steps of the grasp, 40 ms each", source="authors' code", low=1, high=1500)
+    model: str = option("", "model file of forcegrasp fit or add to simulate the grasp with")
+    physics: PhysicsConfig = field(default_factory=PhysicsConfig)
+    sensors: SensorConfig = field(default_factory=SensorConfig)
+
+
 def check_deformation(deformation_m: float, radius_m: list[float], name: str) -> None:
     """Raises ConfigError unless d_p < r for the smallest object (paper, eq. 3)."""
     if deformation_m >= radius_m[0]:

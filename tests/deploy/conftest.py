@@ -1,0 +1,49 @@
+"""Policies with random weights that close, and what is exported of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+import torch
+
+from forcegrasp.config import ActionConfig, GraspConfig, PhysicsConfig, PPOConfig, SensorConfig, TrainConfig
+from forcegrasp.controllers.policy import make_policy
+from forcegrasp.runs.export import export_policy
+from forcegrasp.runs.run_dir import RunDir
+
+#: Objects that the fingers reach within a second, one some time after the other.
+NEAR = GraspConfig(radius_m=[0.03, 0.035], offset_m=[-0.006, 0.006])
+TRAINING = TrainConfig(grasp=NEAR, physics=PhysicsConfig("fast", 1), ppo=PPOConfig(hidden=[16]))
+
+Make = Callable[..., tuple[Path, TrainConfig]]
+
+
+@pytest.fixture(scope="session")
+def make_run(tmp_path_factory) -> Make:
+    """``make_run(**parts)``: a run with random weights, and its configuration."""
+
+    def make(**parts) -> tuple[Path, TrainConfig]:
+        config = replace(TRAINING, **parts)
+        torch.manual_seed(0)
+        policy = make_policy(2 * len(config.observation.parts) * config.observation.frames, config.ppo)
+        with torch.no_grad():
+            for tensor in policy.parameters():  # much of [-1, 1], and beyond
+                tensor.normal_(0.0, 0.4)
+            policy[0].module[0].get_submodule("net" if config.ppo.mirrored else "")[-1].bias.fill_(-1.0)
+        run = RunDir.create(tmp_path_factory.mktemp("deploy") / "run", config, [])
+        run.save(0, {f"policy.{name}": tensor for name, tensor in policy.state_dict().items()}, {}, keep=1)
+        return run.path, config
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def exported(make_run, tmp_path_factory) -> Path:
+    """A folder that forcegrasp export wrote. Copy it before you change it."""
+    out = tmp_path_factory.mktemp("exported") / "policy"
+    run, _ = make_run(sensors=SensorConfig(), action=ActionConfig())
+    export_policy(run, out, ceiling_n=2.0)
+    return out
