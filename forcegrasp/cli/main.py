@@ -19,6 +19,7 @@ VERBS = {
     "evaluate": "compare policies and controllers on the same simulated grasps",
     "curves": "draw the learning curves of a sweep, mean and interval over seeds",
     "export": "write a trained policy as a folder that runs on a robot, without torch",
+    "render": "play one grasp and show it as a video: the scene, the forces, the object's displacement",
     "effects": "list the physical effects that a simulator may lack, or explain one",
 }
 
@@ -38,6 +39,7 @@ examples
   forcegrasp train resume=runs/RUN                         go on with an interrupted run
   forcegrasp evaluate 'policies=[runs/RUN,force_pi]'
   forcegrasp export runs/RUN out=my_policy                 for a real gripper: numpy and onnxruntime run it
+  forcegrasp render policy=force_pi kappa=0.8 out=grasp.gif
   forcegrasp effects backlash                              what it looks like, and what looks like it
 
 from measurements to a better model (a set is a folder of CSV files; forcegrasp record shows one)

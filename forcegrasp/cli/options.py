@@ -16,6 +16,7 @@ from forcegrasp.config import (
     ExportConfig,
     FitConfig,
     RecordConfig,
+    RenderConfig,
     TrainConfig,
     validate,
 )
@@ -33,6 +34,7 @@ SCHEMAS: dict[str, type] = {
     "evaluate": EvaluateConfig,
     "export": ExportConfig,
     "curves": CurvesConfig,
+    "render": RenderConfig,
 }
 
 

@@ -46,18 +46,6 @@ def force_traces(episodes: TensorDictBase, title: str) -> Figure:
     return figure
 
 
-def draw_episode(episode: TensorDictBase, width: int, height: int) -> Figure:
-    """One episode's forces, sized in pixels, for use beside a video. The axes span 0.19-0.96 × 0.14-0.92."""
-    figure = Figure(figsize=(width / 100, height / 100), dpi=100)
-    axes = figure.add_axes((0.19, 0.14, 0.77, 0.78))
-    _draw_forces(axes, episode)
-    axes.set_xlabel("time [s]")
-    axes.set_ylabel("force [N]")
-    axes.legend(fontsize=8, loc="lower right")
-    axes.set_title(f"softness κ = {float(episode['grasp_parameters'][0, 0]):.2f}", fontsize=10)
-    return figure
-
-
 def figure_pixels(figure: Figure) -> np.ndarray:
     """A figure as an RGB array, ``(height, width, 3)`` bytes."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg

@@ -13,6 +13,7 @@ from forcegrasp.config import TrainConfig
 from forcegrasp.evaluate.plots import force_traces
 from forcegrasp.evaluate.video import NoRendererError, grasp_video
 from forcegrasp.runs.run_dir import RunDir
+from forcegrasp.train.board import card, layout, tag
 
 #: Episodes drawn in a figure of force traces.
 TRACES = 6
@@ -27,7 +28,9 @@ class TrainingLog:
         run.drop_metrics_after(frames)
         self.writer = SummaryWriter(str(run.tensorboard), purge_step=frames + 1 if frames else None)
         if not frames:
-            self.writer.add_text("config", "```\n" + run.config_path.read_text() + "```")
+            self.writer.add_text("1_about_this_run", card(run, config))
+            self.writer.add_text("2_config", "```\n" + run.config_path.read_text() + "```")
+            self.writer.add_custom_scalars(layout())
 
     def batch(self, number: int, frames: int, groups: dict[str, dict[str, float]], episodes: TensorDictBase) -> None:
         """Logs one batch.
@@ -35,14 +38,16 @@ class TrainingLog:
         Args:
           number: of the batch, from 1.
           frames: trained so far.
-          groups: scalars by group and name; they become TensorBoard tags ``group/name``.
+          groups: scalars by group and name; metrics.csv has a column ``group/name`` for each, TensorBoard its
+            :func:`~forcegrasp.train.board.tag`.
           episodes: the batch itself, ``(n, T)``.
         """
         row = {"frames": frames}
         for group, scalars in groups.items():
             for name, value in scalars.items():
-                self.writer.add_scalar(f"{group}/{name}", value, frames)
-                row[f"{group}/{name}"] = value
+                column = f"{group}/{name}"
+                self.writer.add_scalar(tag(column), value, frames)
+                row[column] = value
         self.run.log_metrics(row)
         every = self.config.log
         if every.histograms_every and number % every.histograms_every == 0:
@@ -64,7 +69,7 @@ class TrainingLog:
             return None
         path = self.run.figures / f"grasp_{frames:012d}.gif"
         try:
-            data = grasp_video(episode, self.config.physics.tier)
+            data = grasp_video({f"after {frames:,} frames": episode}, self.config.sensors)
         except NoRendererError as error:
             print(f"forcegrasp: no video: {error}", file=sys.stderr)
             self._told_no_renderer = True

@@ -4,15 +4,28 @@ from __future__ import annotations
 
 import io
 
+import numpy as np
 import pytest
 import torch
 from PIL import Image
 from tensordict import TensorDict
 
-from forcegrasp.config import GraspConfig, TrainConfig
+from forcegrasp.config import GraspConfig, SensorConfig, TrainConfig
 from forcegrasp.controllers import make_controller
 from forcegrasp.env import build_env
-from forcegrasp.evaluate.video import HEIGHT, WIDTH, NoRendererError, grasp_video
+from forcegrasp.env.episodes import summarise
+from forcegrasp.evaluate.grasp_figure import draw_grasp, from_the_start
+from forcegrasp.evaluate.grasp_layout import (
+    BOTTOM_EDGE,
+    HEIGHT,
+    LEFT_EDGE,
+    RIGHT_EDGE,
+    SCENE_HEIGHT,
+    SCENE_WIDTH,
+    TOP_EDGE,
+    WIDTH,
+)
+from forcegrasp.evaluate.video import NoRendererError, grasp_video
 from forcegrasp.runs.run_dir import RunDir
 from forcegrasp.train.loop import train
 
@@ -27,22 +40,58 @@ def episode() -> TensorDict:
 def test_video_or_a_reason(episode, monkeypatch):
     monkeypatch.delenv("MUJOCO_GL", raising=False)
     try:
-        data = grasp_video(episode, "reference", every=4)
+        data = grasp_video({"close": episode, "again": episode}, SensorConfig(), every=6)
     except NoRendererError:
         return
+    pictures = []
     with Image.open(io.BytesIO(data)) as video:
-        assert (video.format, video.size, video.n_frames) == ("GIF", (2 * WIDTH, HEIGHT), 8)
-        first = video.convert("L").crop((0, 0, WIDTH, HEIGHT)).tobytes()
-        video.seek(video.n_frames - 1)
-        last = video.convert("L").crop((0, 0, WIDTH, HEIGHT)).tobytes()
-    assert len(set(first)) > 5, "the scene must not be blank"
-    assert first != last, "the fingers must move"
+        # steps 0, 6, ... 30, and the last
+        assert (video.format, video.size, video.n_frames) == ("GIF", (WIDTH, 2 * HEIGHT), 7)
+        for number in (0, 2, 6):
+            video.seek(number)
+            pictures.append(np.asarray(video.convert("RGB")).astype(int))
+    scenes = [picture[HEIGHT - SCENE_HEIGHT : HEIGHT, :SCENE_WIDTH] for picture in pictures]
+    assert len(np.unique(scenes[0].reshape(-1, 3), axis=0)) > 20, "the scene must not be blank"
+    assert (scenes[0] != scenes[2]).any(), "the fingers must move"
+    for picture, scene in zip(pictures, scenes, strict=True):  # the same grasp twice
+        assert (picture[2 * HEIGHT - SCENE_HEIGHT :, :SCENE_WIDTH] == scene).all()
+    # what is ahead is faded: until half of the episode is over, there is less ink in the second half of the chart
+    half = slice((LEFT_EDGE + RIGHT_EDGE) // 2 + 20, RIGHT_EDGE)
+    ink = [(255 - picture[TOP_EDGE:BOTTOM_EDGE, half]).sum() for picture in pictures]
+    assert ink[0] == pytest.approx(ink[1], rel=0.2)
+    assert ink[1] < 0.5 * ink[2]
+
+
+def test_scene_is_where_the_grasp_was(episode):
+    """Nothing is simulated again, so the positions are those of the episode, whatever model it came from."""
+    positions = from_the_start(episode, "joint_position")
+    assert positions.shape == (32, 2)
+    np.testing.assert_array_equal(positions[0], episode["joint_position"][0])
+    np.testing.assert_array_equal(positions[-1], episode["next", "joint_position"][-1])
+
+
+def test_phases_are_marked_when_they_happened(episode):
+    figure = draw_grasp(episode, "close", SensorConfig())
+    forces, moved = figure.axes
+    seconds = summarise(episode[None], SensorConfig())
+    assert float(seconds["both_contact_s"]) < 31 * 0.04
+    for axes in (forces, moved):
+        marks = {line.get_xdata()[0] for line in axes.lines if line.get_linestyle() == ":"}
+        assert marks == {float(seconds["first_contact_s"][0]), float(seconds["both_contact_s"][0])}
+    goal = float(episode["goal_force"][0])
+    (band,) = forces.patches
+    assert band.get_y() == pytest.approx(goal - 2 * SensorConfig().force_std_n)
+    assert band.get_height() == pytest.approx(4 * SensorConfig().force_std_n)
+    drawn = next(line for line in forces.lines if line.get_label() == "right")
+    np.testing.assert_array_equal(drawn.get_ydata()[1:], episode["next", "force"][:, 1])
+    moves = (episode["next", "object_position"][:, 0] - episode["object_position"][0, 0]) * 1e3
+    np.testing.assert_allclose(moved.lines[0].get_ydata()[1:], moves, atol=1e-4)
 
 
 def test_no_renderer(episode, monkeypatch):
     monkeypatch.setenv("MUJOCO_GL", "nonsense")
     with pytest.raises(NoRendererError, match="install") as caught:
-        grasp_video(episode, "reference")
+        grasp_video({"close": episode}, SensorConfig())
     assert "\n" not in str(caught.value)
 
 

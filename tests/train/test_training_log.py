@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import io
+import re
 import warnings
 
 import numpy as np
 import pytest
 from PIL import Image
+from tensorboard.plugins.custom_scalar import layout_pb2
 
+from forcegrasp.env.episodes import FIGURES
 from forcegrasp.runs.run_dir import RunDir
+from forcegrasp.train.board import CHARTS, OVERVIEW, tag
 from forcegrasp.train.logging import TrainingLog
 from forcegrasp.train.loop import train
 
@@ -48,10 +52,11 @@ def run(config, gif, tmp_path_factory, trained):
 def test_tensorboard_shows_every_group(run):
     found = events(run)
     tags = found.Tags()
-    assert {tag.split("/")[0] for tag in tags["scalars"]} == {"episode", "reward", "ppo", "curriculum", "speed"}
+    shown = ["1_overview", "2_episode", "3_reward", "4_ppo", "5_curriculum", "6_speed"]
+    assert sorted({tag.split("/")[0] for tag in tags["scalars"]}) == shown
     assert set(tags["histograms"]) == {"actions/policy", "forces/touching_n"}
     assert set(tags["images"]) == {"grasps/force_traces", "grasps/video"}
-    assert "config/text_summary" in tags["tensors"]
+    assert {"1_about_this_run/text_summary", "2_config/text_summary"} <= set(tags["tensors"])
     expected = {
         "episode/return",
         "episode/force_reward_normalised",
@@ -71,17 +76,43 @@ def test_tensorboard_shows_every_group(run):
         "curriculum/speed_threshold_m",
         "speed/frames_per_s",
     }
-    assert expected <= set(tags["scalars"])
+    assert {tag(column) for column in expected} <= set(tags["scalars"])
+
+
+def test_what_matters_comes_first(run):
+    first = sorted(events(run).Tags()["scalars"])[: len(OVERVIEW)]
+    assert first == [tag(column) for column in OVERVIEW]
+
+
+def test_every_chart_of_the_layout_shows_what_is_logged(run):
+    found = events(run)
+    (event,) = found.Tensors("custom_scalars__config__")
+    pages = layout_pb2.Layout.FromString(event.tensor_proto.string_val[0]).category
+    assert [page.title for page in pages] == list(CHARTS)
+    for page in pages:
+        for chart in page.chart:
+            for pattern in chart.multiline.tag:
+                assert len([name for name in found.Tags()["scalars"] if re.match(pattern, name)]) == 1, pattern
+
+
+def test_the_card_tells_how_to_go_on_and_what_the_names_mean(run, config):
+    (event,) = events(run).Tensors("1_about_this_run/text_summary")
+    text = event.tensor_proto.string_val[0].decode()
+    assert text.startswith(f"# ib, seed {config.seed}\n")
+    assert f"resume={run.path}" in text
+    for name in FIGURES:
+        assert f"`{name}`" in text
 
 
 def test_metrics_are_tensorboards(run, metrics):
     found, rows = events(run), metrics(run)
-    scalars = [tag for tag in found.Tags()["scalars"] if not tag.startswith("speed/")]
-    assert {"frames", *scalars} == set(rows[0])
-    for tag in scalars:
-        logged = [(event.step, event.value) for event in found.Scalars(tag)]
+    columns = [column for column in rows[0] if column != "frames"]
+    scalars = {name for name in found.Tags()["scalars"] if not name.startswith("6_speed/")}
+    assert {tag(column) for column in columns} == scalars
+    for column in columns:
+        logged = [(event.step, event.value) for event in found.Scalars(tag(column))]
         assert [step for step, _ in logged] == [row["frames"] for row in rows]
-        np.testing.assert_allclose([value for _, value in logged], [row[tag] for row in rows], rtol=1e-6)
+        np.testing.assert_allclose([value for _, value in logged], [row[column] for row in rows], rtol=1e-6)
 
 
 def test_parts_appear_as_often_as_asked(run):
@@ -151,4 +182,4 @@ def test_a_resumed_run_hides_what_it_repeats(tiny, tmp_path):
         with pytest.raises(ZeroDivisionError):
             train(config, run)
     assert train(config, run, resume=True)
-    assert [event.step for event in events(run).Scalars("episode/return")] == [60, 120, 180, 240, 300]
+    assert [event.step for event in events(run).Scalars(tag("episode/return"))] == [60, 120, 180, 240, 300]

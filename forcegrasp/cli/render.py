@@ -1,0 +1,43 @@
+"""``forcegrasp render``: one grasp as a video."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+from forcegrasp.cli.options import compose, help_text
+from forcegrasp.errors import ConfigError
+
+PURPOSE = "play one grasp and show it as a video: the scene, the forces, the object's displacement"
+NOTES = """
+  policy=NAME        the same as policies=[NAME]: a run directory, a shipped policy or a controller
+  policies=[A,B]     several, on the same grasp, one below the other
+
+What is not given of the grasp is drawn from the seed.
+"""
+
+
+def main(arguments: list[str]) -> int:
+    """Runs the verb; returns the exit status."""
+    if any(a in ("-h", "--help") for a in arguments):
+        print(help_text("render", PURPOSE, NOTES), end="")
+        return 0
+    alone = [a.partition("=")[2] for a in arguments if a.startswith("policy=")]
+    rest = [a for a in arguments if not a.startswith("policy=")]
+    if len(alone) > 1 or (alone and any(a.startswith("policies=") for a in rest)):
+        raise ConfigError("several policies are given as policies=[A,B]")
+    config = compose("render", rest)
+    config.policies = alone or config.policies
+    out = Path(config.out or f"runs/render_{time.strftime('%Y-%m-%d_%H-%M-%S')}.gif")
+    if out.suffix.lower() != ".gif":
+        raise ConfigError(f"out={out}: videos are written as GIF; name a file that ends with .gif")
+    if config.model and config.b2 is not None:
+        raise ConfigError("b2: the model brings its own; leave it out, or the model")
+
+    from forcegrasp.evaluate.render import render
+
+    try:
+        render(config, out)
+    except OSError as error:
+        raise ConfigError(f"out={out}: could not write ({error.strerror})") from error
+    return 0

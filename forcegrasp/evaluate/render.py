@@ -1,0 +1,58 @@
+"""Plays one grasp with each of some policies, and shows them in one video."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import torch
+
+from forcegrasp.config import GraspConfig, RenderConfig
+from forcegrasp.effects.variation import read_tiago_model
+from forcegrasp.env.episodes import summarise
+from forcegrasp.evaluate.contestants import load_contestants
+from forcegrasp.evaluate.grasp_figure import describe
+from forcegrasp.evaluate.one_grasp import draw_one_grasp
+from forcegrasp.evaluate.rollouts import roll_out
+from forcegrasp.evaluate.video import grasp_video
+
+
+def render(config: RenderConfig, out: Path) -> dict[str, dict[str, float]]:
+    """Writes the video and prints what happened; returns every policy's figures of the episode.
+
+    Raises:
+      ConfigError, CheckpointError, PhysicsError: with what to do about it.
+      NoRendererError: where there is no OpenGL.
+    """
+    torch.set_num_threads(1)
+    grasp = draw_one_grasp(config)
+    model = read_tiago_model(config.model) if config.model else None
+    episodes = {
+        contestant.name: roll_out(
+            contestant.policy,
+            grasp,
+            GraspConfig(steps=config.steps),
+            config.seed,
+            physics=config.physics,
+            sensors=config.sensors,
+            model=model,
+            action=contestant.action,
+            observation=contestant.observation,
+        )[0]
+        for contestant in load_contestants(config.policies)
+    }
+    data = grasp_video(episodes, config.sensors)
+    out.parent.mkdir(parents=True, exist_ok=True)
+    out.write_bytes(data)
+    found = {
+        name: {figure: float(value[0]) for figure, value in summarise(episode[None], config.sensors).items()}
+        for name, episode in episodes.items()
+    }
+    print(describe(next(iter(episodes.values()))))
+    for name, figures in found.items():
+        print(
+            f"{name}: force reward {figures['force_reward_normalised']:.1f} of {config.steps},"
+            f" moved {figures['displacement_until_grasped_mm']:.3f} mm until both fingers touched"
+            f" after {figures['both_contact_s']:.2f} s"
+        )
+    print(f"video: {out}")
+    return found

@@ -1,0 +1,85 @@
+"""How TensorBoard shows a training: names that put what matters first, a page of charts, and a card that explains."""
+
+from __future__ import annotations
+
+from forcegrasp.config import TrainConfig
+from forcegrasp.env.episodes import FIGURES
+from forcegrasp.runs.run_dir import RunDir
+from forcegrasp.runs.started_with import experiment
+
+#: What the first screen shows, in its order; TensorBoard sorts by name, hence the numbers.
+OVERVIEW = (
+    "episode/force_reward_normalised",
+    "episode/force_reward_paper",
+    "episode/return",
+    "episode/displacement_until_grasped_mm",
+    "episode/displacement_total_mm",
+    "episode/fast_steps",
+)
+GROUPS = ("overview", "episode", "reward", "ppo", "curriculum", "speed")
+
+#: Page → chart → columns of metrics.csv drawn in it.
+CHARTS = {
+    "Is it learning?": {
+        "force reward of an episode": ("episode/force_reward_normalised", "episode/force_reward_paper"),
+        "return": ("episode/return",),
+        "force error at the end, N": ("episode/final_force_error_n",),
+    },
+    "Does it push the object?": {
+        "object moved, mm": ("episode/displacement_until_grasped_mm", "episode/displacement_total_mm"),
+        "steps over the speed threshold": ("episode/fast_steps",),
+        "time until contact, s": ("episode/first_contact_s", "episode/both_contact_s"),
+    },
+    "PPO health": {
+        "KL divergence": ("ppo/kl_approx",),
+        "clip fraction": ("ppo/clip_fraction",),
+        "entropy": ("ppo/entropy",),
+        "losses": ("ppo/loss_objective", "ppo/loss_critic"),
+    },
+    "Curriculum": {
+        "weight of the object's speed": ("curriculum/object_weight",),
+        "object radius, m": ("curriculum/radius_low_m", "curriculum/radius_high_m"),
+    },
+    "Speed": {"frames per second": ("speed/frames_per_s", "speed/collect_frames_per_s")},
+}
+
+
+def tag(column: str) -> str:
+    """TensorBoard's name of a column of metrics.csv: ``episode/return`` is ``1_overview/3_return``."""
+    group, name = column.split("/")
+    if column in OVERVIEW:
+        return f"1_overview/{1 + OVERVIEW.index(column)}_{name}"
+    return f"{1 + GROUPS.index(group)}_{group}/{name}"
+
+
+def layout() -> dict[str, dict[str, list]]:
+    """The page of charts, for ``SummaryWriter.add_custom_scalars``; it takes tags as patterns, hence the anchors."""
+    return {
+        page: {chart: ["Multiline", [f"^{tag(column)}$" for column in columns]] for chart, columns in charts.items()}
+        for page, charts in CHARTS.items()
+    }
+
+
+def card(run: RunDir, config: TrainConfig) -> str:
+    """What this run is, how to go on with it and what the names mean, as Markdown."""
+    meanings = "\n".join(f"* `{name}`: {meaning}" for name, meaning in FIGURES.items())
+    return f"""# {experiment(run.path) or "training"}, seed {config.seed}
+
+{config.ppo.total_frames:,} frames, {config.ppo.grasps} grasps at once, reward `{config.reward.form}`.
+
+    forcegrasp train resume={run.path}                        go on with it, should it have been interrupted
+    forcegrasp evaluate 'policies=[{run.path},force_pi]'      compare it with the hand-written controller
+    forcegrasp curves {run.path}                              its learning curves as a picture
+
+**Custom scalars** has one page per question: is it learning, does it push the object, is PPO healthy, how fast is it.
+**Scalars** has everything, what matters first; the numbers in the names only sort. All are means over a batch of
+episodes with exploring actions, so `forcegrasp evaluate` finds a little more.
+
+{meanings}
+* `return`: sum of all rewards, with the weights of the day: the curriculum changes them
+* `3_reward`: terms of the reward, per step and unweighted
+* `4_ppo`: in trainings that went well `kl_approx` stayed below 0.02 and `clip_fraction` below 0.2 (0.06 and 0.35 with
+  `budget=quick`); `action_std` and `entropy` fall as the policy makes up its mind; `ESS` is the effective share of a
+  minibatch
+* `5_curriculum`: what is annealed; `6_speed`: frames per second, and the share of time that the updates take
+"""
