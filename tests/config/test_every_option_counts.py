@@ -20,13 +20,17 @@ from forcegrasp.cli.options import leaves
 from forcegrasp.config import (
     AddConfig,
     CompareConfig,
+    CurvesConfig,
     DiagnoseConfig,
     EvaluateConfig,
+    ExportConfig,
     FitConfig,
     RecordConfig,
+    RenderConfig,
     TrainConfig,
     validate,
 )
+from forcegrasp.errors import ForcegraspError
 from forcegrasp.evaluate.compare_policies import evaluate
 from forcegrasp.runs import checkpoint
 from forcegrasp.runs.run_dir import RunDir
@@ -302,10 +306,39 @@ def test_out_is_where_evaluate_writes(tmp_path, monkeypatch):
 
 
 def test_every_section_is_a_dataclass_with_documented_options():
-    for schema in (TrainConfig, EvaluateConfig, RecordConfig, *MEASURED):
+    for schema in (TrainConfig, EvaluateConfig, ExportConfig, RecordConfig, *MEASURED):
         for name, entry, _ in leaves(schema):
             assert entry.metadata["doc"], name
         assert all(dataclasses.is_dataclass(value) or value is not None for value in vars(schema()).values())
+
+
+# --- export: what it writes is tested in tests/deploy ---------------------------------------------------------------
+
+EXPORT_CASES: dict[str, Any] = {"run": "other", "out": "elsewhere", "ceiling_n": 1.0}
+
+
+def exporting(monkeypatch, **values: Any) -> tuple:
+    """What the verb sets out to export, where to, and with which ceiling."""
+    asked = []
+
+    def stop(*arguments):
+        asked.extend(arguments)
+        raise ForcegraspError("enough")
+
+    monkeypatch.setattr("forcegrasp.runs.export.export_policy", stop)
+    monkeypatch.setattr("time.strftime", lambda *_: "NOW")
+    assert main(["export", *(f"{name}={value}" for name, value in ({"run": "one"} | values).items())]) == 2
+    return tuple(asked)
+
+
+def test_every_option_of_export_has_a_case():
+    assert list(EXPORT_CASES) == [name for name, *_ in leaves(ExportConfig)]
+
+
+@pytest.mark.parametrize("name", EXPORT_CASES)
+def test_option_of_export(name, monkeypatch):
+    plain = exporting(monkeypatch)
+    assert exporting(monkeypatch) == plain != exporting(monkeypatch, **{name: EXPORT_CASES[name]})
 
 
 # --- record, compare, fit, diagnose, add ---------------------------------------------------------------------------
@@ -415,3 +448,75 @@ def test_option_of_a_measuring_verb(schema, name, sets, monkeypatch):
         for changed in ({}, {}, {name: MEASURED_CASES[schema][name]})
     ]
     assert results[0] == results[1] != results[2]
+
+
+# --- curves, render ---------------------------------------------------------------------------------------------------
+
+CURVES_CASES: dict[str, Any] = {"folders": "[other]", "out": "elsewhere"}
+
+#: Option → another value than in a rendering of 45 steps of force_pi. Whether a thread more is used is tested below.
+RENDER_CASES: dict[str, Any] = {
+    "policies": "[informed]",
+    "out": "elsewhere.gif",
+    "seed": 1,
+    "kappa": 0.1,
+    "b2": -6.5,
+    "radius_m": 0.03,
+    "offset_m": 0.003,
+    "goal_force_n": 0.1,
+    "steps": 44,
+    "model": "model.yaml",
+    "physics.tier": "reference",
+    "physics.threads": 2,
+    "sensors.position_std_m": 0.001,
+    "sensors.force_std_n": 0.1,
+    "sensors.contact_threshold_n": 0.2,
+}
+
+
+def test_every_option_of_curves_and_render_has_a_case():
+    assert list(CURVES_CASES) == [name for name, *_ in leaves(CurvesConfig)]
+    assert list(RENDER_CASES) == [name for name, *_ in leaves(RenderConfig)]
+
+
+def with_curves(monkeypatch, **values: str) -> list:
+    """Which folders are read, and where the curves would be written."""
+    asked = []
+    monkeypatch.setattr("forcegrasp.evaluate.curves.learning_curves", lambda *arguments: asked.extend(arguments))
+    assert main(["curves", *(f"{name}={value}" for name, value in ({"folders": "[one,two]"} | values).items())]) == 0
+    return asked
+
+
+@pytest.mark.parametrize("name", CURVES_CASES)
+def test_option_of_curves(name, monkeypatch):
+    plain = with_curves(monkeypatch)
+    assert with_curves(monkeypatch) == plain != with_curves(monkeypatch, **{name: CURVES_CASES[name]})
+
+
+def rendered(monkeypatch, capsys, **values: Any) -> tuple:
+    """What would be shown, what is said, where it is written, and with how many threads it was simulated."""
+    from mujoco.batch import Batch
+
+    shown, threads = [], []
+
+    def show(episodes, sensors):
+        shown.extend(episode["next", "force"].tolist() for episode in episodes.values())
+        return b"GIF"
+
+    def engine(model, n, nthread):
+        threads.append(nthread)
+        return Batch(model, n, nthread)
+
+    monkeypatch.setattr("forcegrasp.evaluate.render.grasp_video", show)
+    monkeypatch.setattr("forcegrasp.physics.plant.Batch", engine)
+    tiny = {"steps": 45, "physics": "fast", "physics.threads": 1, "out": "plain.gif"}
+    assert main(["render", *(f"{name}={value}" for name, value in (tiny | values).items())]) == 0
+    return shown, threads, capsys.readouterr().out
+
+
+@pytest.mark.parametrize("name", RENDER_CASES)
+def test_option_of_render(name, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    Path("model.yaml").write_text(MODEL.replace("EFFECTS", "{}"))
+    plain = rendered(monkeypatch, capsys)
+    assert rendered(monkeypatch, capsys) == plain != rendered(monkeypatch, capsys, **{name: RENDER_CASES[name]})
