@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import dataclasses
+import inspect
 import re
 from pathlib import Path
 
 import matplotlib as mpl
 import pytest
 
+from forcegrasp.deploy import Contract, controller
 from forcegrasp.errors import ConfigError
 from forcegrasp.physics.gripper import load_gripper
 
@@ -35,7 +38,7 @@ def page(root, tmp_path, monkeypatch):
     return unpack
 
 
-@pytest.mark.parametrize("name", ["your-gripper.md"])
+@pytest.mark.parametrize("name", ["calibration.md", "your-gripper.md"])
 def test_python_blocks_run(page, root, name):
     mpl.use("Agg")
     program = page(name)
@@ -75,3 +78,22 @@ def test_messages_are_as_quoted(page, root, file, old, new):
         load_gripper("./my_gripper.yaml")
     quoted = re.findall(r"^\| [^|]* \| `([^`]+)`", (root / "docs/your-gripper.md").read_text(), re.MULTILINE)
     assert any(message in str(caught.value) for message in quoted), str(caught.value)
+
+
+def test_loop_of_the_deploy_page_reaches_its_goal(page, root, capsys):
+    code = compile(page("deploy.md"), str(root / "docs/deploy.md"), "exec")
+    exec(code, {"__name__": "__main__"})
+    printed = capsys.readouterr().out
+    assert [float(number) for number in re.findall(r"\d\.\d+", printed)] == pytest.approx([0.5, 0.5], abs=0.05)
+
+
+def test_faults_and_entries_of_the_deploy_page_are_those_of_the_controller(root):
+    text = (root / "docs/deploy.md").read_text(encoding="utf-8")
+    table_rows = [re.split(r"(?<!\\)\|", line)[1:-1] for line in text.splitlines() if line.startswith("| ")]
+    rows = [row for row in table_rows if len(row) == 3]
+    entries = {name for row in rows for name in re.findall(r"`(\w+)`", row[2])}
+    assert {"max_delta_m", "ceiling_n", "gap_s"} <= entries <= {field.name for field in dataclasses.fields(Contract)}
+    source = inspect.getsource(controller).replace("{name}", "position")
+    quoted = [kind for row in rows for kind in re.findall(r"`(\w+ [\w' ]+)`", row[1])]
+    assert len(quoted) >= 9
+    assert all(kind.replace("force reading", "position reading") in source for kind in quoted)
