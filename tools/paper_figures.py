@@ -19,7 +19,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-import torch
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Rectangle
@@ -38,16 +37,15 @@ from forcegrasp.calibration.figures import COLOURS, draw_power_grasps, draw_pres
 from forcegrasp.calibration.power_grasp import PAPER_B2
 from forcegrasp.calibration.staircase import PAPER_SLOPES_N_M
 from forcegrasp.config import TrainConfig
-from forcegrasp.curriculum.schedule import LinearSchedule
-from forcegrasp.env.reward import force_reward, normalised_force_reward
 from forcegrasp.physics.parameters import RHO_RANGE_M, force_scale_of_kappa, kappa_of_force_scale
 from forcegrasp.physics.sampling import OPEN_M, offset_limit_m
-from forcegrasp.transforms.inductive_bias import contact_bias
 
 ROOT = Path(__file__).resolve().parent.parent
 #: A figure, and a table of its numbers in Markdown; either may be missing.
 Drawn = tuple[Figure | None, str]
 KAPPAS = np.linspace(0, 1, 5)
+#: A smaller delta, to show that the slope of a press depends on it.
+SLOWLY_M = 0.001
 BLUE, ORANGE, GREEN = COLOURS[0], COLOURS[4], COLOURS[2]
 
 
@@ -65,14 +63,16 @@ def act_var() -> Drawn:
 def solimp_var() -> Drawn:
     """Appendix, variation of ρ: ∂f/∂q changes, the final force does not."""
     rho = np.linspace(*RHO_RANGE_M, 5)
-    closing = vary_rho(rho)
+    closing, slowly = vary_rho(rho), vary_rho(rho, delta_m=SLOWLY_M, seconds=5.0)
     figure = draw_presses(closing, [f"ρ = {1e3 * r:.3g} mm" for r in rho])
     figure.suptitle("Pressing at full action with $f_\\alpha$ = 1, by ρ (paper: variation of ρ)", fontsize=11)
     rows = [
-        f"{1e3 * r:.2f} | {s:.0f} | {f:.3f}"
-        for r, s, f in zip(rho, contact_slope(closing), closing.final_force_n, strict=True)
+        f"{1e3 * r:.2f} | {fast:.0f} | {slow:.0f} | {f:.3f}"
+        for r, fast, slow, f in zip(
+            rho, contact_slope(closing), contact_slope(slowly), closing.final_force_n, strict=True
+        )
     ]
-    return figure, table("ρ [mm] | ∂f/∂q while pressing [N/m] | f(T) [N]", rows)
+    return figure, table("ρ [mm] | ∂f/∂q at Δq = 3 mm [N/m] | at Δq = 1 mm [N/m] | f(T) at 3 mm [N]", rows)
 
 
 def fscale_var() -> Drawn:
@@ -82,7 +82,7 @@ def fscale_var() -> Drawn:
     figure.suptitle("Pressing at full action, by κ (paper: variation of κ)", fontsize=11)
     numbers = zip(KAPPAS, force_scale_of_kappa(KAPPAS), contact_slope(closing), closing.final_force_n, strict=True)
     return figure, table(
-        "κ | f_α | ∂f/∂q while pressing [N/m] | f(T) [N]",
+        "κ | f_α | ∂f/∂q at Δq = 3 mm [N/m] | f(T) [N]",
         [f"{k:g} | {a:g} | {s:.0f} | {f:.3f}" for k, a, s, f in numbers],
     )
 
@@ -97,7 +97,7 @@ def stiffness() -> Drawn:
     )
     figure.suptitle("Staircases of final forces (paper: final forces of sponge and wood)", fontsize=11)
     rows = [
-        f"simulator, κ {k:g} | {s.n_per_m:.1f} [{s.low:.1f}, {s.high:.1f}] | {1e3 * s.offset_n:+.1f} | {a:g} | {k:g}"
+        f"simulator, κ {k:g} | {s.n_per_m:.1f} [{s.low:.1f}, {s.high:.1f}] | {1e3 * s.offset_n:.1f} | {a:g} | {k:g}"
         for k, a, s in zip(KAPPAS, scales, stairs.slopes, strict=True)
     ]
     for name, slope in PAPER_SLOPES_N_M.items():
@@ -169,6 +169,8 @@ def draw_constraints(axes: Axes) -> None:
 
 def curriculum() -> Drawn:
     """Table 2: annealed parameters, initial and final, and how they run in between."""
+    from forcegrasp.curriculum.schedule import LinearSchedule  # here: torch takes seconds, and few figures need it
+
     config = TrainConfig()
     schedule = LinearSchedule(config.curriculum, config.grasp, config.reward, config.ppo.total_frames)
     frames = np.linspace(0, config.ppo.total_frames, 200)
@@ -207,6 +209,10 @@ def curriculum() -> Drawn:
 
 def reward() -> Drawn:
     """Eq. 8: the force reward as printed, and in the form that the authors' code divides by the goal."""
+    import torch
+
+    from forcegrasp.env.reward import force_reward, normalised_force_reward
+
     total = torch.linspace(0, 2, 201, dtype=torch.float64)
     error = torch.stack([total / 2, total / 2], dim=-1)
     figure = Figure(figsize=(6.6, 4), layout="constrained")
@@ -231,6 +237,10 @@ def reward() -> Drawn:
 
 def bias() -> Drawn:
     """Eq. 7: the inductive bias φ by contact state."""
+    import torch
+
+    from forcegrasp.transforms.inductive_bias import contact_bias
+
     config, goal = TrainConfig().action, 0.5
     force = torch.linspace(0, 2 * goal, 401, dtype=torch.float64)
     figure = Figure(figsize=(6.6, 3.6), layout="constrained")

@@ -77,7 +77,7 @@ def close(
       touching: whether there is anything to touch; without, fingers close until they stop.
       start_m: where the fingers start, metres, ``(n,)`` or one for all; open by default.
       tier: physics tier, ``"reference"`` or ``"fast"``.
-      period_s: seconds for which each command is held.
+      period_s: seconds for which each command is held, to the nearest physics step.
       threads: threads of the engine; 0 uses every core.
 
     Raises:

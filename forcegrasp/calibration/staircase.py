@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -49,11 +50,10 @@ class Slope:
 def staircase(
     kappa: Values | None = None,
     *,
-    values: dict[str, Values] | None = None,
+    values: Mapping[str, Values] | None = None,
     deltas_m: Values = DELTAS_M,
     seconds: float = 6.0,
     gripper: Gripper | None = None,
-    radius_m: float = RADIUS_M,
     **more,
 ) -> Staircase:
     """Squeezes each object once per command and notes the final force (paper, appendix).
@@ -62,11 +62,11 @@ def staircase(
 
     Args:
       kappa: softness of the objects, ``(objects,)``.
-      values: or the objects' parameters by their names in the gripper's description, each ``(objects,)`` or one value.
+      values: or the objects' parameters by their names in the gripper's description, each ``(objects,)`` or one value;
+        objects have a radius of 25 mm unless it is given.
       deltas_m: Δq, metres, ``(d,)``.
       seconds: how long each squeeze is held.
       gripper: TIAGo's by default.
-      radius_m: of the objects.
       **more: further arguments of :func:`~forcegrasp.calibration.rig.close`.
 
     Raises:
@@ -75,19 +75,21 @@ def staircase(
     if (kappa is None) == (values is None):
         raise ConfigError("a staircase needs the objects' kappa, or their values, and not both")
     gripper = gripper or load_gripper("tiago")
-    given = kappa_values(kappa) if values is None else {k: column_of(k, v) for k, v in values.items()}
-    objects = max((len(column) for column in given.values()), default=1)
-    deltas = column_of("deltas_m", deltas_m)
-    if any(len(column) not in (1, objects) for column in given.values()):
-        counts = ", ".join(f"{name} {len(column)}" for name, column in given.items() if len(column) > 1)
+    given = {"radius_m": RADIUS_M} | (kappa_values(kappa) if values is None else dict(values))
+    columns = {name: column_of(name, value) for name, value in given.items()}
+    objects = max(map(len, columns.values()))
+    if any(len(column) not in (1, objects) for column in columns.values()):
+        counts = ", ".join(f"{name} {len(column)}" for name, column in columns.items() if len(column) > 1)
         raise ConfigError(f"one value each, or as many as there are objects: got {counts}")
-    repeated = {name: np.repeat(np.broadcast_to(v, objects), len(deltas)) for name, v in given.items()}
+    deltas = column_of("deltas_m", deltas_m)
+    columns = {name: np.repeat(np.broadcast_to(column, objects), len(deltas)) for name, column in columns.items()}
+    near = columns["radius_m"] + np.abs(columns.get("offset_m", 0.0)) + _GAP_M
     closing = close(
         np.tile(deltas, objects),
         seconds,
-        repeated | {"radius_m": radius_m},
+        columns,
         gripper=gripper,
-        start_m=min(radius_m + _GAP_M, gripper.open_m),
+        start_m=np.clip(near, 0.0, gripper.open_m),
         **more,
     )
     _demand_settled(closing, seconds)

@@ -33,6 +33,13 @@ def test_closing_speeds_at_full_action():
     np.testing.assert_allclose(closing_speed(power_grasps(radius_m=0.025)), [0.0189, 0.0252, 0.0337], rtol=0.01)
 
 
+@pytest.mark.parametrize("period_s", [0.02, 0.04, 0.08])
+def test_speed_follows_from_the_drive_and_the_rate_of_commands(period_s):
+    b2 = np.array([-13.0, -6.0])
+    law = 100 * 0.003 / (1 - b2 + 100 * period_s / 2)  # kp Δq / (d − b₂ + kp T/2)
+    np.testing.assert_allclose(closing_speed(power_grasps(b2, period_s=period_s, tier="fast")), law, rtol=0.04)
+
+
 def test_without_an_object_the_fingers_close_fully_and_feel_nothing():
     closing = power_grasps([-6.0], seconds=2.0)
     assert (closing.final_position_m < 1e-4).all()

@@ -70,10 +70,16 @@ def test_regression_is_least_squares_with_an_interval_of_the_right_size():
 
 def test_other_gripper(root):
     gripper = load_gripper(str(root / "tests/grippers/second.yaml"))
-    given = {"servo_stiffness": [200.0, 400.0]}
-    soft, stiff = staircase(values=given, gripper=gripper, deltas_m=DELTAS_M[3:], seconds=3.0, radius_m=0.02).slopes
+    given = {"servo_stiffness": [200.0, 400.0], "radius_m": 0.02}
+    soft, stiff = staircase(values=given, gripper=gripper, deltas_m=DELTAS_M[3:], seconds=3.0).slopes
     assert soft.n_per_m == pytest.approx(200, rel=0.01)
     assert stiff.n_per_m == pytest.approx(400, rel=0.01)
+
+
+def test_objects_of_any_radius_and_place():
+    values = {"radius_m": [0.018, 0.03], "offset_m": [0.004, -0.01], "force_scale": 1.0}
+    stairs = staircase(values=values, deltas_m=[0.001, 0.002, 0.003], tier="fast")
+    np.testing.assert_allclose(stairs.force_n, [[0.1, 0.2, 0.3]] * 2, rtol=0.01)
 
 
 @pytest.mark.parametrize(
