@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import dataclasses
 import io
@@ -454,7 +455,7 @@ def test_option_of_a_measuring_verb(schema, name, sets, monkeypatch):
 
 CURVES_CASES: dict[str, Any] = {"folders": "[other]", "out": "elsewhere"}
 
-#: Option → another value than in a rendering of 45 steps of force_pi. Whether a thread more is used is tested below.
+#: Option → another value than in a rendering of 45 steps of a policy that reads everything.
 RENDER_CASES: dict[str, Any] = {
     "policies": "[informed]",
     "out": "elsewhere.gif",
@@ -493,11 +494,11 @@ def test_option_of_curves(name, monkeypatch):
     assert with_curves(monkeypatch) == plain != with_curves(monkeypatch, **{name: CURVES_CASES[name]})
 
 
-def rendered(monkeypatch, capsys, **values: Any) -> tuple:
+def rendered(folder: Path, **values: Any) -> tuple:
     """What would be shown, what is said, where it is written, and with how many threads it was simulated."""
     from mujoco.batch import Batch
 
-    shown, threads = [], []
+    shown, threads, said = [], [], io.StringIO()
 
     def show(episodes, sensors):
         shown.extend(episode["next", "force"].tolist() for episode in episodes.values())
@@ -507,16 +508,25 @@ def rendered(monkeypatch, capsys, **values: Any) -> tuple:
         threads.append(nthread)
         return Batch(model, n, nthread)
 
-    monkeypatch.setattr("forcegrasp.evaluate.render.grasp_video", show)
-    monkeypatch.setattr("forcegrasp.physics.plant.Batch", engine)
     tiny = {"steps": 45, "physics": "fast", "physics.threads": 1, "out": "plain.gif"}
-    assert main(["render", *(f"{name}={value}" for name, value in (tiny | values).items())]) == 0
-    return shown, threads, capsys.readouterr().out
+    with pytest.MonkeyPatch.context() as patch, contextlib.redirect_stdout(said):
+        patch.chdir(folder)
+        patch.setattr("forcegrasp.evaluate.render.grasp_video", show)
+        patch.setattr("forcegrasp.physics.plant.Batch", engine)
+        assert main(["render", *(f"{name}={value}" for name, value in (tiny | values).items())]) == 0
+    return shown, threads, said.getvalue()
+
+
+@pytest.fixture(scope="module")
+def plain_rendering(tmp_path_factory, plain_training, run_path):
+    return rendered(tmp_path_factory.mktemp("render"), policies=[str(run_path)])
+
+
+def test_the_same_rendering_shows_the_same(tmp_path, plain_rendering, run_path):
+    assert rendered(tmp_path, policies=[str(run_path)]) == plain_rendering
 
 
 @pytest.mark.parametrize("name", RENDER_CASES)
-def test_option_of_render(name, tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    Path("model.yaml").write_text(MODEL.replace("EFFECTS", "{}"))
-    plain = rendered(monkeypatch, capsys)
-    assert rendered(monkeypatch, capsys) == plain != rendered(monkeypatch, capsys, **{name: RENDER_CASES[name]})
+def test_option_of_render(name, tmp_path, plain_rendering, run_path):
+    (tmp_path / "model.yaml").write_text(MODEL.replace("EFFECTS", "{}"))
+    assert rendered(tmp_path, **{"policies": [str(run_path)], name: RENDER_CASES[name]}) != plain_rendering
