@@ -21,6 +21,8 @@ _TABLE = 25
 # Largest squeeze: a finger that stops at an object may have touched it this much earlier.
 _SQUEEZE_M = 0.004
 _LEAST_SAMPLES, _LEAST_WAY_M = 10, 0.006
+# How far the first command may be from where the finger seems to have set off, and how long a closing may take.
+_SLACK_S, _LONGEST_S = 0.5, 60.0
 # Residuals are counted in these, so that the optimiser's tolerances fit: the order of an encoder's noise.
 _UNIT_M = 1e-5
 
@@ -79,10 +81,18 @@ def fit_power_grasp(
     """
     gripper = gripper or load_gripper("tiago")
     entry = parameter_of(gripper, parameter)
-    time, position = _free_closing(time_s, position_m, gripper)
-    if start_s is not None and not time[0] - FINAL_S <= start_s < time[-1]:
-        raise ConfigError(f"start_s={start_s:g}: must lie in the measurement, before the stop at {time[-1]:g} s")
-    first = time[0] if start_s is None else min(start_s, time[0])
+    clock_s, position = _free_closing(time_s, position_m, gripper)
+    time = clock_s - clock_s[0]  # a robot's clock may count from 1970, where differences drown in round-off
+    if start_s is not None and not -_SLACK_S <= start_s - clock_s[0] < time[-1]:
+        raise ConfigError(f"start_s={start_s:g}: must lie in the measurement, before the stop at {clock_s[-1]:g} s")
+    begun = _onset(time, position)
+    first = begun - _SLACK_S if start_s is None else start_s - clock_s[0]
+    took = time[-1] - begun
+    if not 2 * period_s <= took <= _LONGEST_S:
+        raise MeasurementError(
+            f"power grasp: it closed within {took:g} s, and must within {2 * period_s:g} to {_LONGEST_S:g} s: give times in"
+            " seconds"
+        )
     values = np.linspace(entry.low, entry.high, _TABLE)
     closing = close(
         delta_m, max(time[-1] - first + SAMPLE_S, FINAL_S), {parameter: values},
@@ -92,14 +102,14 @@ def fit_power_grasp(
     travel = RectBivariateSpline(values, closing.time_s, way)
 
     def predict(vector: np.ndarray) -> np.ndarray:
-        since = time - (vector[2] if start_s is None else start_s)
+        since = time - (vector[2] if start_s is None else first)
         return vector[1] - np.where(since > 0, travel(vector[0], np.maximum(since, 0.0), grid=False), 0.0)
 
     opened = float(np.median(position[: max(3, len(position) // 50)]))
     low, high = [entry.low, opened - 0.002], [entry.high, opened + 0.002]
     guess = [opened]
     if start_s is None:
-        low, high, guess = [*low, time[0] - 1e-6], [*high, time[-1]], [*guess, _onset(time, position)]
+        low, high, guess = [*low, first], [*high, begun + _SLACK_S], [*guess, begun]
     vector, error = _least_squares(lambda x: (predict(x) - position) / _UNIT_M, low, high, guess)
     return PowerGraspFit(
         parameter,
@@ -107,9 +117,9 @@ def fit_power_grasp(
         float(max(vector[0] - error, entry.low)),
         float(min(vector[0] + error, entry.high)),
         bool(min(vector[0] - entry.low, entry.high - vector[0]) < 1e-3 * (entry.high - entry.low)),
-        float(vector[2] if start_s is None else start_s),
+        float(clock_s[0] + vector[2] if start_s is None else start_s),
         float(vector[1]),
-        time,
+        clock_s,
         position,
         predict(vector),
     )

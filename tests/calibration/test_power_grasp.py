@@ -79,6 +79,14 @@ def test_a_known_start_and_one_finger_will_do():
     assert fit_power_grasp(time, position[:, 1], start_s=0.4).rms_m > 5 * fit.rms_m
 
 
+def test_the_clock_may_count_from_anywhere():
+    time, position = grasp_of(-8.0, np.random.default_rng(1))
+    here, there = (fit_power_grasp(time + offset, position) for offset in (0.0, 1.7e9))
+    assert there.value == pytest.approx(here.value, abs=0.001)
+    assert there.start_s - 1.7e9 == pytest.approx(here.start_s, abs=1e-4)
+    np.testing.assert_array_equal(there.time_s, time[: len(there.time_s)] + 1.7e9)
+
+
 def test_residuals_in_runs_widen_the_interval():
     rng = np.random.default_rng(2)
     time, position = grasp_of(-9.0, rng, 0.0)
@@ -114,6 +122,8 @@ RISING, FALLING = np.arange(60) * 0.04, np.linspace(0.045, 0.0, 60)
     ("time", "position", "message"),
     [
         (RISING, 1e3 * FALLING, "give metres"),
+        (1e3 * RISING, FALLING, "give times in seconds"),
+        (1e-3 * RISING, FALLING, "give times in seconds"),
         (RISING, FALLING[::-1], "positions fall while closing"),
         (RISING, np.full(60, 0.045), "closed by 0.0 mm"),
         (RISING[::-1], FALLING, "at sample 1 it does not"),
