@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
@@ -30,6 +29,8 @@ LEAST_SHARE = 0.25
 EXPLAINED = 0.5
 # Refitted per step: signatures only rank.
 _REFITTED = 5
+# Of these the best ones are fitted to the end.
+_SETTLED = 3
 # A signature this much worse than the best is not refitted.
 _HOPELESS = 0.2
 # A refit gains at most about twice what a signature promises.
@@ -138,9 +139,7 @@ def diagnose(
         steps.append(step)
         if step.verdict == "none":
             break
-        fit = polish(step.candidates[0].fit, target, simulators)
-        step = dataclasses.replace(step, error_after=rms(heldout_residual(fit, target, folds), target))
-        steps[-1] = step
+        fit = step.candidates[0].fit
         progress(f"found {step.effects[0]}: held-out error {step.error_before:.2f} → {step.error_after:.2f} × noise")
         if not excess(heldout_residual(fit, target, folds), numerical, target):
             break
@@ -185,6 +184,7 @@ def _look_further(
     ranked = sorted((group[0] for group in groups), key=lambda s: -s.gain)
     null = null_gains(groups, rng)
     held = heldout_residual(fit, target, folds)
+    start = _Round(target, fit, simulators, folds, held)
     error = rms(held, target)
     bar = float(np.quantile(null, 1 - ALARM))
     beyond = np.sum(fit.residual**2) - target.mask.sum() * 4
@@ -193,11 +193,11 @@ def _look_further(
     candidates = []
     for number, score in enumerate(hopeful, 1):
         progress(f"refitting with {score.effect.name} {score.variant} ({number} of {len(hopeful)})")
-        candidates.append(_refit(score, target, fit, simulators, folds, held, null))
+        candidates.append(start.refit(score, null))
     best: dict[str, Candidate] = {}
     for candidate in sorted(candidates, key=lambda c: -c.heldout_gain):
         best.setdefault(candidate.effect.name, candidate)  # of several variants the best one
-    ordered = tuple(best.values())
+    ordered = start.settle(tuple(best.values()), progress)
     least_gain = LEAST_GAIN if excess(held, numerical, target) else LEAST_GAIN_AT_FLOOR
     if not ordered or not _convincing(ordered[0], least_gain):
         return Step("none", (), ordered, tuple(ranked), error, error)
@@ -210,24 +210,43 @@ def _look_further(
     return Step(verdict, names, ordered, tuple(ranked), error, winner.error_after)
 
 
-def _refit(
-    score: Score,
-    target: Target,
-    fit: Fit,
-    simulators: Simulators,
-    folds: Sequence[np.ndarray],
-    held: np.ndarray,
-    null: np.ndarray,
-) -> Candidate:
-    refit = refine([score], target, fit, simulators)
-    after = heldout_residual(refit, target, folds)
-    gains = log_likelihood(after) - log_likelihood(held)
-    fall = max((1 - rms(after, target, w) / rms(held, target, w) for _, w in cells(target)), default=0.0)
-    before, behind = rms(held, target), rms(after, target)
-    p_family = (1 + int(np.sum(null >= score.gain))) / (1 + len(null))
-    return Candidate(
-        score.effect, score.variant, refit, p_family, gains, behind, _share(before, behind), fall, score.signature
-    )
+@dataclass(frozen=True, eq=False)
+class _Round:
+    """What one round of the search starts from."""
+
+    target: Target
+    fit: Fit
+    simulators: Simulators
+    folds: Sequence[np.ndarray]
+    held: np.ndarray  #: residuals of held-out grasps, ``(G, S, 4)``
+
+    def refit(self, score: Score, null: np.ndarray) -> Candidate:
+        """A rough fit with one more effect, from where its best signature puts it."""
+        p_family = (1 + int(np.sum(null >= score.gain))) / (1 + len(null))
+        refit = refine([score], self.target, self.fit, self.simulators)
+        return self._judge(score.effect, score.variant, refit, p_family, score.signature)
+
+    def settle(self, ordered: Sequence[Candidate], progress: Callable[[str], None]) -> tuple[Candidate, ...]:
+        """Fits the best one, and what comes near it, with the model itself: rough fits may stop short of an optimum."""
+        near = [c for c in ordered if c is ordered[0] or _equal(ordered[0], c)][:_SETTLED]
+        settled = []
+        for c in near:
+            progress(f"fitting {c.effect.name} {c.variant} to the end")
+            exact = fit_exactly(self.target, c.fit.problem, self.simulators, c.fit.vector)
+            settled.append(self._judge(c.effect, c.variant, exact, c.p_family, c.signature))
+        settled.sort(key=lambda c: -c.heldout_gain)
+        return (*settled, *(c for c in ordered if c not in near))
+
+    def _judge(
+        self, effect: type[Effect], variant: str, refit: Fit, p_family: float, signature: np.ndarray
+    ) -> Candidate:
+        """What held-out grasps say of a fit with one more effect."""
+        target, held = self.target, self.held
+        after = heldout_residual(refit, target, self.folds)
+        gains = log_likelihood(after) - log_likelihood(held)
+        fall = max((1 - rms(after, target, w) / rms(held, target, w) for _, w in cells(target)), default=0.0)
+        before, behind = rms(held, target), rms(after, target)
+        return Candidate(effect, variant, refit, p_family, gains, behind, _share(before, behind), fall, signature)
 
 
 def refine(scores: Sequence[Score], target: Target, fit: Fit, simulators: Simulators) -> Fit:
@@ -237,11 +256,6 @@ def refine(scores: Sequence[Score], target: Target, fit: Fit, simulators: Simula
     added = [e.coordinate(v) for e, v in zip(problem.entries[len(old) :], score.values, strict=True)]
     start = np.r_[fit.vector, added]
     return fit_once(target, problem, simulators, start, fit.correction, rounds=0, known_slopes=fit.jacobian)
-
-
-def polish(fit: Fit, target: Target, simulators: Simulators) -> Fit:
-    """Goes on from a refined fit with the model itself and slopes of its own."""
-    return fit_exactly(target, fit.problem, simulators, fit.vector)
 
 
 def _convincing(candidate: Candidate, least_gain: float) -> bool:

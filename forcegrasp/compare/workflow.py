@@ -10,8 +10,8 @@ import numpy as np
 
 from forcegrasp.compare.base_fit import BaseFit, check_gradient, fit_base
 from forcegrasp.compare.comparison import Comparison
-from forcegrasp.compare.diagnose import Diagnosis, diagnose, polish, refine
-from forcegrasp.compare.fit import Fit, Simulators, fit_once
+from forcegrasp.compare.diagnose import Diagnosis, diagnose, refine
+from forcegrasp.compare.fit import Fit, Simulators, fit_exactly, fit_once
 from forcegrasp.compare.floor import beyond_fit, numerical_error, numerical_floor
 from forcegrasp.compare.heldout import heldout_residual, make_folds, rms
 from forcegrasp.compare.intervals import intervals, standard_errors, warnings
@@ -157,7 +157,8 @@ def add_effect(loaded: Loaded, model: Model, effect: type[Effect], progress: Pro
             f"effect={effect.name}: leaves no trace in these data at any size; record grasps that show it"
         )
     fits = [refine(group, target, before, simulators) for group in groups]
-    after = polish(min(fits, key=lambda f: f.cost), target, simulators)
+    nearest = min(fits, key=lambda f: f.cost)
+    after = fit_exactly(target, nearest.problem, simulators, nearest.vector)
     errors = [rms(heldout_residual(f, target, folds), target) for f in (before, after)]
     return Added(target, before, after, *errors, model_of(after, target, loaded, numerical_error(after, target)))
 
