@@ -16,6 +16,7 @@ NOTES = """
 
   The verdict is one of: effect (one or several, in the order found), one_of (these data can't tell which), explained
   (nothing is missing), unknown (none of the effects), not_fitted (the base model can't be fitted to these data).
+  If effects are found, model.yaml beside the report holds the model with all of them (with one_of: with the first).
 """
 
 
@@ -39,8 +40,9 @@ def main(arguments: list[str]) -> int:
     )
     from forcegrasp.compare import diagnose_output, workflow
     from forcegrasp.compare.advice import advise
+    from forcegrasp.compare.floor import numerical_error
     from forcegrasp.effects import catalogue
-    from forcegrasp.effects.model_file import read_model
+    from forcegrasp.effects.model_file import read_model, write_model
 
     tried = check_effects("effects", config.effects) or list(catalogue().values())
     out = check_folder(default_out("diagnose", config.out))
@@ -61,6 +63,10 @@ def main(arguments: list[str]) -> int:
     if diagnosis.verdict in ("effect", "one_of"):
         known = config.model or "model.yaml"
         print(f"add it: forcegrasp add data={data} model={known} effect={diagnosis.effects[0]} out=better.yaml")
+        numerical = numerical_error(diagnosis.fit, diagnosis.target)
+        better = workflow.model_of(diagnosis.fit, diagnosis.target, loaded, numerical)
+        write_model(better, out / "model.yaml")
+        print(f"or take the model with {', '.join(e.effect.name for e in better.effects)}: {out / 'model.yaml'}")
     write_results(
         out,
         "diagnosis",

@@ -18,7 +18,7 @@ from forcegrasp.effects import Effect
 from forcegrasp.effects.quantisation import Quantisation
 
 #: Largest number of effects that are looked for.
-MOST_EFFECTS = 4
+MOST_EFFECTS = 6
 #: Family-wise probability of a false alarm that is accepted at each step.
 ALARM = 0.01
 #: An effect must lower the error of some signal in some phase by this share; by more where all is at the floor already.
