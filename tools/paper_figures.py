@@ -46,6 +46,8 @@ Drawn = tuple[Figure | None, str]
 KAPPAS = np.linspace(0, 1, 5)
 #: A smaller delta, to show that the slope of a press depends on it.
 SLOWLY_M = 0.001
+#: Pictures of the scene: how many, height, width, colours.
+PICTURES = (2, 480, 640, 3)
 BLUE, ORANGE, GREEN = COLOURS[0], COLOURS[4], COLOURS[2]
 
 
@@ -269,12 +271,12 @@ def scene() -> Drawn:
         # In a process of its own: where there is no OpenGL, some drivers end it.
         environment = {**os.environ, "MUJOCO_GL": backend}
         done = subprocess.run([sys.executable, __file__, "--render"], env=environment, capture_output=True, check=False)
-        if done.returncode == 0:
+        if done.returncode == 0 and len(done.stdout) == np.prod(PICTURES):
             break
     else:
         print("      left out: no OpenGL without a display; install libegl1 or libosmesa6 (Debian's names)")
         return None, ""
-    pictures = np.frombuffer(done.stdout, np.uint8).reshape(2, 480, 640, 3)
+    pictures = np.frombuffer(done.stdout, np.uint8).reshape(PICTURES)
     figure = Figure(figsize=(9, 3.7), layout="constrained")
     for axes, picture, name in zip(figure.subplots(1, 2), pictures, ("fully open", "grasping"), strict=True):
         axes.imshow(picture)
@@ -292,7 +294,7 @@ def render() -> None:
 
     simulator = GraspSimulator(1, threads=1)
     simulator.reset(GraspParameters(0.5, -9.0, 0.025, 0.006, 0.5))
-    renderer = mujoco.Renderer(simulator.scene(0)[0], 480, 640)
+    renderer = mujoco.Renderer(simulator.scene(0)[0], *PICTURES[1:3])
     camera = mujoco.MjvCamera()
     camera.lookat, camera.distance, camera.azimuth, camera.elevation = (0, 0, 0.045), 0.27, 190, -24
     for steps in (5, 60):

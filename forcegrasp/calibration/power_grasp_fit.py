@@ -90,8 +90,8 @@ def fit_power_grasp(
     took = time[-1] - begun
     if not 2 * period_s <= took <= _LONGEST_S:
         raise MeasurementError(
-            f"power grasp: it closed within {took:g} s, and must within {2 * period_s:g} to {_LONGEST_S:g} s: give times in"
-            " seconds"
+            f"power grasp: it closed within {took:g} s, and must within {2 * period_s:g} to {_LONGEST_S:g} s:"
+            " give times in seconds"
         )
     values = np.linspace(entry.low, entry.high, _TABLE)
     closing = close(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import re
+import subprocess
 
 import pytest
 
@@ -31,6 +32,14 @@ def test_a_figure_and_its_table(draw, tmp_path):
     assert "not yet" not in text
     assert text.startswith("before\n")
     assert text.endswith("after\n")
+
+
+def test_without_opengl_the_scene_is_left_out(draw, tmp_path, monkeypatch, capsys):
+    failed = subprocess.CompletedProcess([], 1, b"", b"")
+    monkeypatch.setattr(subprocess, "run", lambda *_, **__: failed)
+    draw("--only", "scene", "--out", tmp_path)
+    assert not list(tmp_path.iterdir())
+    assert "no OpenGL" in capsys.readouterr().out
 
 
 def test_unknown_figures_are_refused(draw, capsys):
