@@ -62,14 +62,11 @@ def _check_model(config) -> None:
 
 
 def _sweep(overrides: list[str]) -> int:
-    fixed = [text for text in overrides if not parse_override(text).is_sweep_override()]
-    if preset := next((o for o in overrides if o.startswith("sweep=") and o not in fixed), ""):
+    if preset := next((o for o in overrides if o.startswith("sweep=") and "," in o), ""):
         raise ConfigError(f"{preset}: one preset at a time")
-    swept, folder = compose_sweep(fixed)
-    given = {parse_override(text).get_key_element() for text in overrides}
-    presets = [f"{key}={values}" for key, values in swept.items() if key not in given]
-    for single in _single_runs(presets + overrides):
+    for single in single_runs(overrides):
         _check_model(compose("train", single))  # refuses bad input before anything is written
+    _, folder = compose_sweep(_without_several_values(overrides))
     import hydra
     from hydra.core.global_hydra import GlobalHydra
     from omegaconf import DictConfig
@@ -117,10 +114,15 @@ def _sweep_job(composed) -> int:
     return status
 
 
-def _single_runs(overrides: list[str]) -> list[list[str]]:
-    """Checks a sweep's values one at a time: each override list has no sweep in it."""
+def single_runs(overrides: list[str]) -> list[list[str]]:
+    """A sweep's values one at a time, to check them: each override list has no sweep in it.
+
+    What is given for an option replaces what the preset of ``sweep`` has for it.
+    """
+    preset, _ = compose_sweep(_without_several_values(overrides))
+    given = {parse_override(text).get_key_element() for text in overrides}
     fixed, swept = [], []
-    for text in overrides:
+    for text in [f"{key}={values}" for key, values in preset.items() if key not in given] + overrides:
         parsed = parse_override(text)
         if parsed.is_sweep_override() and parsed.is_discrete_sweep():
             swept.append([f"{parsed.get_key_element()}={value}" for value in parsed.sweep_string_iterator()])
@@ -131,6 +133,10 @@ def _single_runs(overrides: list[str]) -> list[list[str]]:
     for index, values in enumerate(swept):
         runs += [fixed + first[:index] + [value] + first[index + 1 :] for value in values[1:]]
     return runs
+
+
+def _without_several_values(overrides: list[str]) -> list[str]:
+    return [text for text in overrides if not parse_override(text).is_sweep_override()]
 
 
 def _resume(path: Path) -> int:

@@ -37,7 +37,8 @@ def final(run: RunDir) -> bytes:
 
 
 def test_two_experiments_and_two_seeds_side_by_side(tiny, tmp_path):
-    command = ["train", "-m", "experiment=ib,no_ib", "seed=0,1", *tiny["train"], "hydra/launcher=joblib"]
+    swept = ["sweep=ablation", "experiment=ib,no_ib", "seed=0,1"]
+    command = ["train", "-m", *swept, *tiny["train"], "hydra/launcher=joblib"]
     done = subprocess.run(
         [sys.executable, "-m", "forcegrasp.cli.main", *command, "hydra.launcher.n_jobs=2", "hydra.sweep.dir=sweep"],
         env={**os.environ, "OMP_NUM_THREADS": "1"},
@@ -47,9 +48,10 @@ def test_two_experiments_and_two_seeds_side_by_side(tiny, tmp_path):
     )
     assert done.returncode == 0, done.stderr
     assert "Traceback" not in done.stderr
+    assert "learning curves are in sweep/curves.png" in done.stdout
     runs = runs_in(tmp_path / "sweep")
     assert set(runs) == {(True, 0), (True, 1), (False, 0), (False, 1)}
-    assert sorted(run.path.name for run in runs.values()) == ["ib_s0_0", "ib_s1_1", "no_ib_s0_2", "no_ib_s1_3"]
+    assert sorted(run.path.name for run in runs.values()) == ["ib_s0_0", "ib_s1_2", "no_ib_s0_1", "no_ib_s1_3"]
     assert len({final(run) for run in runs.values()}) == 4
     # a process of the sweep trains several runs: the last one is as good as the first
     assert main(["train", "experiment=no_ib", "seed=1", *tiny["train"], "hydra.run.dir=alone"]) == 0
@@ -81,13 +83,6 @@ def test_preset_runs_seed_by_seed_and_draws_its_curves(tiny, tmp_path, capsys):
     assert "learning curves are in" in capsys.readouterr().out
 
 
-def test_preset_side_by_side_with_a_single_seed(tiny, tmp_path):
-    options = ["seed=4", *tiny["train"], "hydra/launcher=joblib", "hydra.launcher.n_jobs=1", "hydra.sweep.dir=sweep"]
-    assert main(["train", "-m", "sweep=ablation", *options]) == 0
-    curves = json.loads((tmp_path / "sweep" / "curves.json").read_text())["groups"]
-    assert set(curves) == {"ib", "no_ib", "no_rand", "no_curriculum"}
-
-
 def test_ctrl_c_ends_the_sweep_and_not_just_one_run(tiny, monkeypatch, capsys):
     started = []
     monkeypatch.setattr("forcegrasp.train.loop.train", lambda config, *_: started.append(config.seed))
@@ -98,12 +93,18 @@ def test_ctrl_c_ends_the_sweep_and_not_just_one_run(tiny, monkeypatch, capsys):
 def test_a_failing_run_is_named_without_a_traceback(tiny, monkeypatch, capsys):
     from forcegrasp.errors import PhysicsError
 
-    def diverge(*args):
+    started = []
+
+    def diverge(config, *_):
+        started.append(config.seed)
         raise PhysicsError("grasp 3 diverged")
 
     monkeypatch.setattr("forcegrasp.train.loop.train", diverge)
     assert main(["train", "-m", "seed=0,1", *tiny["train"]]) == 2
-    lines = capsys.readouterr().err.splitlines()
+    assert started == [0, 1], "it must not take the others along"
+    out, err = capsys.readouterr()
+    assert "no learning curves: " in out
+    lines = err.splitlines()
     assert "seed=0" in lines[0]
     assert lines[-1] == "forcegrasp: grasp 3 diverged"
     assert len(lines) == 2
