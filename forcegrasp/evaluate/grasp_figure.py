@@ -16,6 +16,16 @@ from forcegrasp.physics.model import CONTROL_PERIOD_S
 OBJECT = "#009e73"
 
 
+def draw_grasps(episodes: dict[str, TensorDictBase], sensors: SensorConfig) -> list[Figure]:
+    """A picture per policy, title → whole episode ``(T,)``, all on the same scales."""
+    figures = [draw_grasp(episode, name, sensors) for name, episode in episodes.items()]
+    for alike in zip(*(figure.axes for figure in figures), strict=True):
+        lows, highs = zip(*(axes.get_ylim() for axes in alike), strict=True)
+        for axes in alike:
+            axes.set_ylim(min(lows), max(highs))
+    return figures
+
+
 def draw_grasp(episode: TensorDictBase, name: str, sensors: SensorConfig) -> Figure:
     """Draws a whole episode ``(T,)`` of a policy called ``name``, with room for the scene."""
     figure = Figure(figsize=(WIDTH / 100, HEIGHT / 100), dpi=100)

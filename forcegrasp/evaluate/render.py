@@ -14,6 +14,7 @@ from forcegrasp.evaluate.grasp_figure import describe
 from forcegrasp.evaluate.one_grasp import draw_one_grasp
 from forcegrasp.evaluate.rollouts import roll_out
 from forcegrasp.evaluate.video import grasp_video
+from forcegrasp.physics.model import CONTROL_PERIOD_S
 
 
 def render(config: RenderConfig, out: Path) -> dict[str, dict[str, float]]:
@@ -49,10 +50,13 @@ def render(config: RenderConfig, out: Path) -> dict[str, dict[str, float]]:
     }
     print(describe(next(iter(episodes.values()))))
     for name, figures in found.items():
+        touched = figures["both_contact_s"]
+        never = touched >= config.steps * CONTROL_PERIOD_S
+        when = "never in both fingers" if never else f"in both fingers after {touched:.2f} s"
         print(
-            f"{name}: force reward {figures['force_reward_normalised']:.1f} of {config.steps},"
-            f" moved {figures['displacement_until_grasped_mm']:.3f} mm until both fingers touched"
-            f" after {figures['both_contact_s']:.2f} s"
+            f"{name}: force reward {figures['force_reward_normalised']:.1f} of {config.steps}, {when},"
+            f" object moved {figures['displacement_until_grasped_mm']:.3f} mm until then,"
+            f" {figures['displacement_total_mm']:.3f} mm in all"
         )
     print(f"video: {out}")
     return found

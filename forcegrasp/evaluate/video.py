@@ -51,7 +51,7 @@ def grasp_video(episodes: dict[str, TensorDictBase], sensors: SensorConfig, ever
     Raises:
       NoRendererError: where there is no OpenGL.
     """
-    from forcegrasp.evaluate.grasp_figure import draw_grasp, from_the_start
+    from forcegrasp.evaluate.grasp_figure import draw_grasps, from_the_start
     from forcegrasp.evaluate.plots import figure_pixels
 
     asked = os.environ.get("MUJOCO_GL")
@@ -62,7 +62,7 @@ def grasp_video(episodes: dict[str, TensorDictBase], sensors: SensorConfig, ever
             parameters=np.stack([e["grasp_parameters"][0].double().numpy() for e in episodes.values()]),
             fingers=np.stack([from_the_start(e, "joint_position") for e in episodes.values()]),
             objects=np.stack([from_the_start(e, "object_position")[:, 0] for e in episodes.values()]),
-            charts=np.stack([figure_pixels(draw_grasp(e, title, sensors)) for title, e in episodes.items()]),
+            charts=np.stack([figure_pixels(figure) for figure in draw_grasps(episodes, sensors)]),
         )
         for backend in (asked,) if asked else _BACKENDS.get(sys.platform, ("glfw",)):
             command = [sys.executable, "-m", "forcegrasp.evaluate.video", str(source), str(target), str(every)]

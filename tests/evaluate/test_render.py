@@ -47,6 +47,7 @@ def test_policies_get_the_same_grasp(shown, capsys):
     assert "κ 0.25" in out
     assert "close: force reward" in out
     assert "video: grasp.gif" in out
+    assert "in both fingers after" in out
 
 
 def test_one_policy_by_its_short_name(shown):

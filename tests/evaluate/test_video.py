@@ -14,7 +14,7 @@ from forcegrasp.config import GraspConfig, SensorConfig, TrainConfig
 from forcegrasp.controllers import make_controller
 from forcegrasp.env import build_env
 from forcegrasp.env.episodes import summarise
-from forcegrasp.evaluate.grasp_figure import draw_grasp, from_the_start
+from forcegrasp.evaluate.grasp_figure import draw_grasp, draw_grasps, from_the_start
 from forcegrasp.evaluate.grasp_layout import (
     BOTTOM_EDGE,
     HEIGHT,
@@ -86,6 +86,17 @@ def test_phases_are_marked_when_they_happened(episode):
     np.testing.assert_array_equal(drawn.get_ydata()[1:], episode["next", "force"][:, 1])
     moves = (episode["next", "object_position"][:, 0] - episode["object_position"][0, 0]) * 1e3
     np.testing.assert_allclose(moved.lines[0].get_ydata()[1:], moves, atol=1e-4)
+
+
+def test_pictures_of_several_policies_have_the_same_scales(episode):
+    env = build_env(1, grasp=GraspConfig(steps=31, radius_m=[0.033, 0.033]), seed=3)
+    with torch.no_grad():
+        other = env.rollout(31, make_controller("nothing"))[0]
+    one, two = draw_grasps({"close": episode, "nothing": other}, SensorConfig())
+    alone = draw_grasp(episode, "close", SensorConfig())
+    for axes, same, own in zip(one.axes, two.axes, alone.axes, strict=True):
+        assert axes.get_ylim() == same.get_ylim()
+        assert axes.get_ylim()[1] >= own.get_ylim()[1]
 
 
 def test_no_renderer(episode, monkeypatch):
