@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import sys
 
 import numpy as np
@@ -42,6 +43,13 @@ def test_command(run, same_network, tmp_path, capsys, monkeypatch):
     controller = GraspController.load("folder")
     assert controller.contract.ceiling_n == 0.9
     assert json.loads((tmp_path / "folder/contract.json").read_text())["source"]["policy"] == "run"
+
+
+def test_a_run_of_a_sweep_may_be_called_like_an_option(run, same_network, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    shutil.copytree(run, "seed=0")
+    assert main(["export", "seed=0", "out=folder"]) == 0
+    assert json.loads((tmp_path / "folder/contract.json").read_text())["source"]["policy"] == "seed=0"
 
 
 def test_exports_of_one_policy_are_the_same_file(run, exported, tmp_path):
