@@ -20,14 +20,13 @@ CONTRACT_FILE, NETWORK_FILE = "contract.json", "policy.onnx"
 #: Name, number type and meaning of what goes in and comes out of the network.
 INPUT, OUTPUT = "observation", "action"
 FINGERS = 2
-_ANY = 1 << 30
-#: Type of an entry → JSON types of its value or items, items of its list (0: it is none), and how to say that.
-_KINDS: dict[str, tuple[set[type], int, str]] = {
-    "bool": ({bool}, 0, "true or false"),
-    "int": ({int}, 0, "a whole number"),
-    "float": ({int, float}, 0, "a number"),
-    "tuple[float, float]": ({int, float}, 2, "[low, high]"),
-    "tuple[str, ...]": ({str}, _ANY, "a list of names"),
+#: Type of an entry → types of its value or of its list's items, as JSON gives them, and how to say that.
+_KINDS: dict[str, tuple[set[type], str]] = {
+    "bool": ({bool}, "true or false"),
+    "int": ({int}, "a whole number"),
+    "float": ({int, float}, "a number"),
+    "tuple[float, float]": ({int, float}, "[low, high]"),
+    "tuple[str, ...]": ({str}, "a list of names"),
 }
 #: Part of the observation → unit; (left, right) each.
 PARTS = {"position": "1, scaled", "force": "N", "force_error": "N", "last_action": "1", "had_contact": "0 or 1"}
@@ -186,10 +185,11 @@ def _contract(control: dict[str, Any]) -> Contract:
         if name not in control:
             raise ValueError(f"control: {name} is missing")
         value = control[name]
-        types, length, said = _KINDS[kind]
+        types, said = _KINDS[kind]
         items = value if isinstance(value, list) else [value]
-        fits = isinstance(value, list) == (length > 0) and length in (0, len(items), _ANY)
-        if not fits or not all(type(item) in types for item in items):  # a bool is an int, but not one to take here
+        fits = isinstance(value, list) == kind.startswith("tuple")
+        fits &= all(type(item) in types for item in items)  # a bool is an int, but not one to take here
+        if not fits or (kind == "tuple[float, float]" and len(items) != 2):
             raise ValueError(f"control: {name}={value!r}: must be {said}")
         values[name] = tuple(value) if isinstance(value, list) else value
     return Contract(**values)
