@@ -25,6 +25,8 @@ CURVES = (
     ("episode/displacement_until_grasped_mm", "object moved until both touch [mm]", 3),
     ("episode/fast_steps", "steps over the speed threshold", 2),
 )
+#: The same for the head of a narrow table.
+SHORT = ("force\nreward,\nnormalised", "force\nreward,\npaper's", "object\nmoved [mm]", "fast\nsteps")
 #: Share of a training, at its end, that the table averages over.
 LAST = 0.1
 #: Frames at which curves are compared.
@@ -173,9 +175,9 @@ def _json(value: float) -> float | None:
 
 def _table(groups: list[Group]) -> Table:
     table = Table(title=f"last {LAST:.0%} of training: mean over seeds ± half of its 95 % t-interval")
-    table.add_column("trained with", overflow="fold", min_width=13)
+    table.add_column("trained with", overflow="fold")
     table.add_column("seeds", justify="right")
-    for _, heading, _ in CURVES:
+    for heading in SHORT:
         table.add_column(escape(heading), justify="right")
     for group in groups:
         cells = []
