@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from forcegrasp.compare.heldout import rms
-from forcegrasp.compare.target import PHASES, SIGNALS, UNITS, Target
+from forcegrasp.compare.target import PHASES, SIGNALS, UNITS, Target, contacts
 
 #: What a residual is held against, in reports and where nothing explains it.
 COVARIATES = ("time_since_contact_s", "velocity_m_s", "direction", "force_n", "command_m", "position_m", "time_s")
@@ -70,13 +70,26 @@ class Comparison:
         return value if np.isfinite(value) else rms(self.residual, self.target)
 
     def covariates(self) -> dict[str, np.ndarray]:
-        """What the residual may depend on, each ``(G, S, 2)``, left and right finger.
+        """What the residual may depend on, see :data:`COVARIATES`; each ``(G, S, 2)``, NaN where a sample has none.
 
         Positions and forces are the predicted ones: the noise of the measured ones is in the residual, too.
         """
-        found = covariates(self.target)
-        for name, part in (("position_m", slice(0, 2)), ("force_n", slice(2, 4))):
-            found[name] = np.where(self.target.mask[..., None], self.predicted[..., part], np.nan)
+        target = self.target
+        inside = target.mask[..., None]
+        found = {name: np.full((*target.mask.shape, 2), np.nan) for name in COVARIATES}
+        found["position_m"] = np.where(inside, self.predicted[..., :2], np.nan)
+        found["force_n"] = np.where(inside, self.predicted[..., 2:], np.nan)
+        for index, grasp in enumerate(target.grasps):
+            n, time = len(grasp.time_s), grasp.time_s - grasp.time_s[0]
+            velocity = np.gradient(grasp.position_m, time, axis=0) if n > 1 else np.zeros((n, 2))
+            slow = 4 * target.sigma[0] / max(np.median(np.diff(time)), 1e-9) if n > 1 else 0.0
+            touched = np.maximum.accumulate(contacts(grasp, target.sigma[2:]))
+            first = time[np.argmax(touched, axis=0)]
+            found["time_since_contact_s"][index, :n] = np.where(touched, time[:, None] - first, np.nan)
+            found["velocity_m_s"][index, :n] = velocity
+            found["direction"][index, :n] = np.where(np.abs(velocity) < slow, 0.0, np.sign(velocity))
+            found["command_m"][index, :n] = grasp.command_m
+            found["time_s"][index, :n] = time[:, None]
         return found
 
     def explanations(self) -> list[tuple[str, str, float]]:
@@ -87,29 +100,6 @@ class Comparison:
                 share = _binned_share(values, self.residual[..., k : k + 2], self.target.mask)
                 shares.append((name, kind, share))
         return sorted(shares, key=lambda s: -s[2])
-
-
-def covariates(target: Target) -> dict[str, np.ndarray]:
-    """The covariates of :data:`COVARIATES`, each ``(G, S, 2)``; NaN where a sample has none."""
-    shape = (*target.mask.shape, 2)
-    found = {name: np.full(shape, np.nan) for name in COVARIATES}
-    for index, grasp in enumerate(target.grasps):
-        n = len(grasp.time_s)
-        velocity = np.gradient(grasp.position_m, grasp.time_s, axis=0) if n > 1 else np.zeros((n, 2))
-        touching = grasp.force_n - np.median(grasp.force_n[: max(3, n // 20)], axis=0) > 5 * target.sigma[2:]
-        for side in range(2):
-            first = np.argmax(touching[:, side]) if touching[:, side].any() else None
-            if first is not None:
-                since = grasp.time_s - grasp.time_s[first]
-                found["time_since_contact_s"][index, :n, side] = np.where(since >= 0, since, np.nan)
-        slow = 4 * target.sigma[0] / max(np.median(np.diff(grasp.time_s)), 1e-9) if n > 1 else 0.0
-        found["velocity_m_s"][index, :n] = velocity
-        found["direction"][index, :n] = np.where(np.abs(velocity) < slow, 0.0, np.sign(velocity))
-        found["force_n"][index, :n] = grasp.force_n
-        found["command_m"][index, :n] = grasp.command_m
-        found["position_m"][index, :n] = grasp.position_m
-        found["time_s"][index, :n] = (grasp.time_s - grasp.time_s[0])[:, None]
-    return found
 
 
 def _binned_share(values: np.ndarray, residual: np.ndarray, mask: np.ndarray) -> float:
