@@ -12,7 +12,7 @@ from forcegrasp.env.reward import normalised_force_reward
 FIGURES = {
     "force_reward_normalised": "Σ_t of r_force, authors' form (150 at best)",
     "force_reward_paper": "Σ_t of r_force, paper's form (150 at best)",
-    "force_reward_measured": "the same as the authors' form, from what the sensors say before noise: all a robot can tell",
+    "force_reward_measured": "Σ_t of r_force, authors' form, of what the sensors say before noise, as a robot has it",
     "displacement_until_grasped_mm": "|object displacement| until both fingers have touched, mm",
     "displacement_total_mm": "|object displacement| over the episode, mm",
     "fast_steps": "control steps in which the object was faster than the threshold",

@@ -133,10 +133,7 @@ def train(config: TrainConfig, run: RunDir, resume: bool = False) -> bool:
             values = trainer.curriculum.apply(trainer.frames)
             batch = next(batches)
             collected = time.perf_counter()
-            figures = {
-                name: float(value.mean())
-                for name, value in summarise(batch, config.sensors).items()
-            }
+            figures = {name: float(value.mean()) for name, value in summarise(batch, config.sensors).items()}
             rate = trainer.ppo.set_progress(trainer.frames / total)
             losses = trainer.ppo.update(batch, trainer.shuffle)
             ended = time.perf_counter()
