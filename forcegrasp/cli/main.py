@@ -21,6 +21,7 @@ VERBS = {
     "export": "write a trained policy as a folder that runs on a robot, without torch",
     "render": "play one grasp and show it as a video: the scene, the forces, the object's displacement",
     "effects": "list the physical effects that a simulator may lack, or explain one",
+    "doctor": "check this installation and say what to do where something is wrong",
 }
 
 USAGE = """forcegrasp {version}: simulate tactile grasping, train grasp-force controllers, compare them
@@ -50,7 +51,8 @@ from measurements to a better model (a set is a folder of CSV files; forcegrasp 
   forcegrasp add data=my_set model=model.yaml effect=backlash out=better.yaml
   forcegrasp compare data=my_set model=better.yaml         the error fell
 
-Every verb explains its options with --help. Exit status: 0 done, 2 bad input, 130 interrupted (and saved).
+Every verb explains its options with --help. Exit status: 0 done, 1 the doctor found something to mend, 2 bad input,
+130 interrupted (and saved).
 """
 
 
@@ -68,9 +70,14 @@ def main(arguments: list[str] | None = None) -> int:
     try:
         if verb not in VERBS:
             raise ForcegraspError(f"no verb {verb!r}{closest(verb, VERBS)}")
-        if not {"-h", "--help"} & set(rest):
+        if verb != "doctor" and not {"-h", "--help"} & set(rest):
             import_mujoco()
         return importlib.import_module(f"forcegrasp.cli.{verb}").main(rest)
+    except ImportError as error:
+        if (error.name or "").startswith("forcegrasp"):
+            raise  # a fault of this project's, not of the installation
+        print(f"forcegrasp: {_in_a_line(error)}; see what is wrong with: forcegrasp doctor", file=sys.stderr)
+        return 2
     except ForcegraspError as error:
         print(f"forcegrasp: {error}", file=sys.stderr)
         return 2
@@ -80,6 +87,10 @@ def main(arguments: list[str] | None = None) -> int:
     except KeyboardInterrupt:
         print("forcegrasp: interrupted", file=sys.stderr)
         return 130
+
+
+def _in_a_line(error: Exception) -> str:
+    return " ".join(str(error).split()).rstrip(".")
 
 
 def import_mujoco() -> None:

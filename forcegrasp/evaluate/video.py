@@ -32,12 +32,19 @@ if TYPE_CHECKING:
     from tensordict import TensorDictBase
 
 _BACKENDS = {"linux": ("egl", "osmesa"), "darwin": ("cgl",)}
+NO_RENDERER = "no OpenGL without a display; install libegl1 or libosmesa6 (Debian's names) to get videos"
 #: How much of what has not happened yet shines through.
 _AHEAD = 0.15
 
 
 class NoRendererError(ForcegraspError):
     """This machine can't render; the message says what would help."""
+
+
+def backends() -> tuple[str, ...]:
+    """MuJoCo's renderers to try in turn: the one that the user asked for, or those that need no display."""
+    asked = os.environ.get("MUJOCO_GL")
+    return (asked,) if asked else _BACKENDS.get(sys.platform, ("glfw",))
 
 
 def grasp_video(episodes: dict[str, TensorDictBase], sensors: SensorConfig, every: int = 2) -> bytes:
@@ -54,7 +61,6 @@ def grasp_video(episodes: dict[str, TensorDictBase], sensors: SensorConfig, ever
     from forcegrasp.evaluate.grasp_figure import draw_grasps, from_the_start
     from forcegrasp.evaluate.plots import figure_pixels
 
-    asked = os.environ.get("MUJOCO_GL")
     with tempfile.TemporaryDirectory() as folder:
         source, target = Path(folder) / "episodes.npz", Path(folder) / "grasp.gif"
         np.savez(
@@ -64,13 +70,13 @@ def grasp_video(episodes: dict[str, TensorDictBase], sensors: SensorConfig, ever
             objects=np.stack([from_the_start(e, "object_position")[:, 0] for e in episodes.values()]),
             charts=np.stack([figure_pixels(figure) for figure in draw_grasps(episodes, sensors)]),
         )
-        for backend in (asked,) if asked else _BACKENDS.get(sys.platform, ("glfw",)):
+        for backend in backends():
             command = [sys.executable, "-m", "forcegrasp.evaluate.video", str(source), str(target), str(every)]
             environment = {**os.environ, "MUJOCO_GL": backend}
             subprocess.run(command, env=environment, cwd=folder, capture_output=True, check=False)
             if target.exists():
                 return target.read_bytes()
-    raise NoRendererError("no OpenGL without a display; install libegl1 or libosmesa6 (Debian's names) to get videos")
+    raise NoRendererError(NO_RENDERER)
 
 
 def _render(source: Path, target: Path, every: int) -> None:
