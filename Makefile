@@ -1,10 +1,11 @@
 # make train: learn a grasp-force policy and compare it with the hand-written controller. make test: the tests.
-# Both set themselves up in .venv; set PYTHON to use another interpreter (3.11 or newer).
+# make check: the tests and all else that must hold before a commit.
+# They set themselves up in .venv; set PYTHON to use another interpreter (3.11 or newer).
 PYTHON ?= python3
 VENV := .venv
 RUN := runs/latest_$(shell date +%Y-%m-%d_%H-%M-%S)
 
-.PHONY: train test setup clean
+.PHONY: train test check setup clean
 
 train: setup
 	$(VENV)/bin/forcegrasp train experiment=recommended budget=quick hydra.run.dir=$(RUN)
@@ -12,6 +13,9 @@ train: setup
 
 test: setup
 	$(VENV)/bin/python -m pytest -q -n auto --dist loadgroup
+
+check: setup
+	$(VENV)/bin/python tools/check.py
 
 setup: $(VENV)/.ready
 

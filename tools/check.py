@@ -1,0 +1,62 @@
+"""Everything that must hold before a commit: style, import rules, types, tests.
+
+    python tools/check.py               all of it; make check does the same in its own environment
+    python tools/check.py style types   these parts alone
+
+Ends with a table. Exit status: 0 if all parts are in order.
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+import subprocess
+import sys
+import sysconfig
+import time
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+PROGRAMS = Path(sysconfig.get_path("scripts"))
+#: Fails nothing as yet: its verdict is a count.
+COUNTED = "pyright"
+#: Part → its commands.
+PARTS = {
+    "style": [["ruff", "check", "."], ["ruff", "format", "--check", "."]],
+    "imports": [["lint-imports", "--no-logo"]],
+    "types": [["pyright", "--pythonpath", sys.executable]],
+    "tests": [["python", "-m", "pytest", "-q", "-n", "auto", "--dist", "loadgroup"]],
+}
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("parts", nargs="*", help=f"of {', '.join(PARTS)}; all by default")
+    asked = parser.parse_args().parts
+    if unknown := set(asked) - set(PARTS):
+        parser.error(f"no part {', '.join(sorted(unknown))}: there are {', '.join(PARTS)}")
+    rows = [examine(*command) for part in asked or PARTS for command in PARTS[part]]
+    print("\n" + "\n".join(f"{name:<22}{seconds:7.1f} s  {verdict}" for name, seconds, verdict in rows))
+    return int(any(verdict.startswith("failed") for _, _, verdict in rows))
+
+
+def examine(program: str, *arguments: str) -> tuple[str, float, str]:
+    """Runs one command and shows what it says; returns its name, how long it took, and a verdict."""
+    name = " ".join([program, *(word for word in arguments if word in ("check", "format", "pytest"))])
+    found = Path(sys.executable) if program == "python" else PROGRAMS / program
+    print(f"\n== {name}", flush=True)
+    if not found.exists():
+        absent = "left out, not installed" if program == COUNTED else "failed, not installed: make setup"
+        return name, 0.0, absent
+    started = time.monotonic()
+    output = subprocess.PIPE if program == COUNTED else None
+    done = subprocess.run([found, *arguments], cwd=ROOT, stdout=output, text=True, check=False)
+    verdict = "failed" if done.returncode else "ok"
+    if program == COUNTED:
+        print(done.stdout, end="", flush=True)
+        verdict = ", ".join(re.findall(r"\d+ errors?|\d+ warnings?", done.stdout)[-2:])
+    return name, time.monotonic() - started, verdict
+
+
+if __name__ == "__main__":
+    sys.exit(main())
