@@ -9,7 +9,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, cast
 
 from forcegrasp.errors import ConfigError
 
@@ -27,7 +27,7 @@ def option(
     """A dataclass field that also says what it means, and what it may be. ``low`` and ``high`` are inclusive."""
     meta = {"doc": doc, "unit": unit, "source": source, "low": low, "high": high, "choices": choices}
     if isinstance(default, list):
-        return field(default_factory=lambda: list(default), metadata=meta)
+        return field(default_factory=lambda: list(cast("list[Any]", default)), metadata=meta)
     return field(default=default, metadata=meta)
 
 
@@ -394,7 +394,7 @@ def validate(config: Any, path: str = "") -> None:
         is_range = str(entry.type) == "list[float]"
         if is_range and (len(value) != 2 or value[0] > value[1]):
             raise ConfigError(f"{name}={value}: must be [low, high] with low ≤ high ({meta['doc']})")
-        if listed and not value and entry.default_factory():
+        if listed and not value and entry.default_factory is not dataclasses.MISSING and entry.default_factory():
             raise ConfigError(f"{name}=[]: must not be empty ({meta['doc']})")
         for item in value if listed else [value]:
             if meta["choices"] and item not in meta["choices"]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import mujoco
@@ -26,7 +26,7 @@ _NO_CONTACT = int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
 _MOST_S = 50_000.0
 
 #: What a parameter may be given as: one value for all simulations, or one for each.
-Values = float | np.ndarray
+Values = float | Sequence[float] | np.ndarray
 
 
 @dataclass(frozen=True)
@@ -104,6 +104,7 @@ def close(
 def _record(plant: Plant, delta: np.ndarray, seconds: float, period_s: float) -> Closing:
     steps, stride = max(1, round(period_s / plant.dt)), max(1, round(SAMPLE_S / plant.dt))
     position, force, time = [plant.measured_position], [plant.measured_force], [0.0]
+    command = plant.measured_position
     for step in range(max(1, round(seconds / plant.dt))):
         if step % steps == 0:
             command = np.clip(plant.measured_position - delta[:, None], 0.0, plant.gripper.open_m)

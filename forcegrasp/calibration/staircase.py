@@ -75,7 +75,7 @@ def staircase(
     if (kappa is None) == (values is None):
         raise ConfigError("a staircase needs the objects' kappa, or their values, and not both")
     gripper = gripper or load_gripper("tiago")
-    given = {"radius_m": RADIUS_M} | (kappa_values(kappa) if values is None else dict(values))
+    given = {"radius_m": RADIUS_M} | (dict(values or {}) if kappa is None else kappa_values(kappa))
     columns = {name: column_of(name, value) for name, value in given.items()}
     objects = max(map(len, columns.values()))
     if any(len(column) not in (1, objects) for column in columns.values()):

@@ -43,8 +43,7 @@ def main(arguments: list[str]) -> int:
     (effect,) = check_effects("effect", [config.effect])
     folder = check_folder(default_out("add", ""))
     path = check_file(folder / "model.yaml" if not config.out else need(config.out, "out", "better.yaml"))
-    loaded = workflow.load(data)
-    refuse_table(loaded, "add")
+    loaded = refuse_table(workflow.load(data), "add")
     if len(loaded.measured.grasps) < 2:
         raise ConfigError(f"data={data}: has one grasp, so that none can be held out to tell whether the error falls")
     model = read_model(old)

@@ -31,8 +31,7 @@ def main(arguments: list[str]) -> int:
 
     folder = check_folder(default_out("fit", ""))
     path = check_file(folder / "model.yaml" if not config.out else need(config.out, "out", "model.yaml"))
-    loaded = workflow.load(data)
-    refuse_table(loaded, "fit")
+    loaded = refuse_table(workflow.load(data), "fit")
     tell_warnings(loaded)
     target, _, base = workflow.fit_model(loaded, config.seed, narrator())
     model = workflow.model_of(base.fit, target, loaded, numerical_error(base.fit, target))

@@ -11,9 +11,12 @@ from forcegrasp.cli.results import write_json
 from forcegrasp.errors import ConfigError, closest
 
 if TYPE_CHECKING:
+    from typing_extensions import TypeIs
+
     from forcegrasp.compare.report import Section
     from forcegrasp.compare.workflow import Loaded
     from forcegrasp.effects import Effect
+    from forcegrasp.measure import FinalForceTable, MeasurementSet
 
 
 def check_folder(folder: Path) -> Path:
@@ -66,15 +69,15 @@ def write_results(
     print(f"report: {report}, figures: {out / f'{name}.json'}")
 
 
-def is_table(loaded: Loaded) -> bool:
+def is_table(loaded: Loaded) -> TypeIs[Loaded[FinalForceTable]]:
     """Whether a set is a table of final forces."""
     from forcegrasp.measure import FinalForceTable
 
     return isinstance(loaded.measured, FinalForceTable)
 
 
-def refuse_table(loaded: Loaded, verb: str) -> None:
-    """Refuses a table of final forces.
+def refuse_table(loaded: Loaded[MeasurementSet] | Loaded[FinalForceTable], verb: str) -> Loaded[MeasurementSet]:
+    """Returns the set, but refuses a table of final forces.
 
     Raises:
       ConfigError: if the set is one.
@@ -84,9 +87,10 @@ def refuse_table(loaded: Loaded, verb: str) -> None:
             f"data={loaded.measured.path}: is a table of final forces, which fixes no model: it has no motion. "
             f"forcegrasp {verb} needs grasps; forcegrasp compare and forcegrasp diagnose read the table"
         )
+    return loaded
 
 
-def report_table(loaded: Loaded, name: str, out: Path, **unused: object) -> None:
+def report_table(loaded: Loaded[FinalForceTable], name: str, out: Path, **unused: object) -> None:
     """Analyses a table of final forces, prints and writes what was found.
 
     Args:

@@ -123,7 +123,7 @@ def groups(verb: str) -> dict[str, list[str]]:
     return found
 
 
-def leaves(schema: type, prefix: str = "") -> Iterator[tuple[str, dataclasses.Field, Any]]:
+def leaves(schema: Any, prefix: str = "") -> Iterator[tuple[str, dataclasses.Field, Any]]:
     """Every option of a schema: dotted name, field, default."""
     instance = schema() if isinstance(schema, type) else schema
     for entry in dataclasses.fields(instance):

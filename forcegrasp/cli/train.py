@@ -5,9 +5,13 @@ from __future__ import annotations
 import os
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING, cast
 
 from forcegrasp.cli.options import compose, compose_run, compose_sweep, help_text, parse_override
 from forcegrasp.errors import ConfigError, ForcegraspError
+
+if TYPE_CHECKING:
+    from forcegrasp.config import TrainConfig
 
 #: Exit status after Ctrl-C, as shells have it.
 INTERRUPTED = 130
@@ -105,7 +109,7 @@ def _sweep_job(composed) -> int:
     from forcegrasp.runs.run_dir import RunDir
 
     import_mujoco()  # a launcher may have started a process of its own
-    hydra, config = HydraConfig.get(), OmegaConf.to_object(composed)
+    hydra, config = HydraConfig.get(), cast("TrainConfig", OmegaConf.to_object(composed))
     overrides = [text for text in hydra.overrides.task if not text.startswith("sweep=")]  # this run is a single one
     run = RunDir.create(hydra.runtime.output_dir, config, overrides)
     status = _train(config, run, resume=False)

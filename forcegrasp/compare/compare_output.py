@@ -218,7 +218,7 @@ def _by_signal_and_phase(comparison: Comparison) -> Section:
         for c in cells
     ]
     head = ("signal", "phase", "samples", "rms error", "÷ noise", "mean of measured − model")
-    shown = ~np.isnan(grid).all(axis=1)
+    shown = ~np.all(np.isnan(grid), axis=1)
     phases = [words(phase) for phase, there in zip(PHASES, shown, strict=True) if there]
     return Section(
         "Error by signal and phase",

@@ -15,7 +15,9 @@ LEFT, RIGHT, WITHOUT, WITH, MEASURED = "#0072b2", "#d55e00", "#d55e00", "#0072b2
 SECOND = "#009e73"
 #: Shown unit of a signal's unit, and its factor.
 SHOWN = {"m": ("mm", 1e3), "N": ("N", 1.0)}
-NAMES = dict(zip(SIGNALS, ("position left", "position right", "force left", "force right"), strict=True))
+NAMES: dict[str, str] = dict(
+    zip(SIGNALS, ("position left", "position right", "force left", "force right"), strict=True)
+)
 #: Covariate → its axis' words and the factor from SI.
 AXES = {
     "time_since_contact_s": ("time since contact [s]", 1.0),
@@ -43,7 +45,7 @@ def heat_map(grid: np.ndarray, rows: Sequence[str], columns: Sequence[str]) -> F
     chosen = np.arange(len(rows))
     if len(rows) > _ROWS:
         chosen = np.sort(np.argsort(-np.nanmax(grid, axis=1))[:_ROWS])
-    grid, rows = grid[chosen], [rows[i] for i in chosen]
+    grid, rows = grid[chosen], [rows[i] for i in chosen.tolist()]
     top = max(2.0, float(np.nanmax(grid, initial=0)))
     figure = Figure(figsize=(7.5, 1.1 + 0.27 * len(rows)), layout="constrained")
     axes = figure.subplots()

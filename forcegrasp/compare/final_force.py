@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -70,7 +71,7 @@ class TableAnalysis:
     reason: str  #: of the verdict, in a sentence
     effects: tuple[str, ...] = ()  #: what could make the shape that was found
     found: tuple[str, ...] = ()  #: names of the shapes that are equally good, best first; empty if none is needed
-    noise_n: float | None = None
+    noise_n: float = math.nan
     noise_from: str = ""
     base: Candidate | None = None
     candidates: tuple[Candidate, ...] = ()  #: further shapes, best leave-one-out error first
@@ -88,10 +89,11 @@ class TableAnalysis:
 
     def force_scale(self, name: str) -> tuple[float, float, float] | None:
         """f_α of an object under the best shape, with its 95 % interval; None if the gripper gives no gain."""
-        if self.position_gain is None or self.best is None:
+        gain, best = self.position_gain, self.best
+        if gain is None or best is None:
             return None
-        low, high = self.intervals[name][self.best.shape.name][0]
-        return tuple(float(v) / self.position_gain for v in (self.best.fits[name].slope, low, high))
+        low, high = self.intervals[name][best.shape.name][0]
+        return float(best.fits[name].slope) / gain, float(low) / gain, float(high) / gain
 
     def kappa(self, name: str) -> float | None:
         """κ of the paper's coupling whose f_α is nearest to an object's under the base law; None if there is none."""
@@ -216,7 +218,7 @@ def _noise(table: FinalForceTable, rows: Mapping[str, Rows], fits: Mapping) -> t
         if sigma:
             # Where no shape comes down to it, it is no measure of what chance does to a table.
             trusted = best / sigma**2 <= chi2.ppf(0.99, freedom)
-            return sigma, source, trusted and source.startswith("given")
+            return sigma, source, bool(trusted) and source.startswith("given")
     return max(scatter, _rounding(rows)), "scatter about the best shape: a lower bound, for there are no repeats", False
 
 
@@ -316,7 +318,8 @@ def _ratio(best: Candidate, rows: Mapping[str, Rows], rng: np.random.Generator) 
     order = sorted(best.fits, key=lambda name: best.fits[name].slope)
     low, high = (bootstrap(best.fits[name], rows[name].delta_m, rng)[:, 0] for name in (order[0], order[-1]))
     value = best.fits[order[-1]].slope / best.fits[order[0]].slope
-    return (value, *(float(q) for q in np.quantile(high / low, (0.025, 0.975))))
+    least, most = np.quantile(high / low, (0.025, 0.975))
+    return value, float(least), float(most)
 
 
 def _shared(rows: Mapping[str, Rows], fits: Mapping) -> dict[str, float]:

@@ -144,24 +144,33 @@ def lines(analysis: TableAnalysis) -> list[str]:
     return text
 
 
+def _laws(analysis: TableAnalysis) -> tuple[Candidate, Candidate]:
+    """The base law and the best shape, of a table that could be fitted."""
+    if analysis.base is None or analysis.best is None:
+        raise ValueError("no object could be fitted")
+    return analysis.base, analysis.best
+
+
 def _row(analysis: TableAnalysis, name: str) -> tuple[str, ...]:
-    base, best = analysis.base.fits[name], analysis.best.fits[name]
+    law, best = _laws(analysis)
+    base, fit = law.fits[name], best.fits[name]
     scale = analysis.force_scale(name)
     return (
         name,
         str(len(base.residual)),
         f"{base.slope:.0f}",
         f"{_rms(base.residual):.3f}",
-        analysis.best.shape.name.replace("_", " "),
+        best.shape.name.replace("_", " "),
         "; ".join(_with_intervals(analysis, name)),
-        f"{_rms(best.residual):.3f}",
+        f"{_rms(fit.residual):.3f}",
         "–" if scale is None else f"{scale[0]:.2f} [{scale[1]:.2f}, {scale[2]:.2f}]",
     )
 
 
 def _with_intervals(analysis: TableAnalysis, name: str) -> list[str]:
-    shape, texts = analysis.best.shape, []
-    found = zip(shape.parameters, analysis.best.fits[name].values, analysis.intervals[name][shape.name], strict=True)
+    best, texts = _laws(analysis)[1], []
+    intervals = analysis.intervals[name][best.shape.name]
+    found = zip(best.shape.parameters, best.fits[name].values, intervals, strict=True)
     for parameter, value, (low, high) in found:
         words, unit = {"slope_n_m": ("slope", "N/m"), "bias_n": ("bias", "N")}.get(parameter, (parameter, ""))
         if parameter.endswith("_m") and parameter != "slope_n_m":
@@ -174,7 +183,7 @@ def _with_intervals(analysis: TableAnalysis, name: str) -> list[str]:
 def facts(analysis: TableAnalysis) -> list[str]:
     """What the table tells beyond its fits, one sentence each."""
     text = []
-    if analysis.slope_ratio is not None:
+    if analysis.slope_ratio is not None and analysis.slopes_differ_p is not None:
         value, low, high = analysis.slope_ratio
         sure = analysis.slopes_differ_p < 0.05
         judged = "no one slope fits all objects" if sure else "one slope for all objects can't be ruled out"
@@ -185,7 +194,7 @@ def facts(analysis: TableAnalysis) -> list[str]:
     kappas = {name: analysis.kappa(name) for name in analysis.rows}
     if analysis.has_kappa:
         soft, hard = FORCE_SCALE_RANGE
-        scales = [analysis.force_scale(name)[0] for name in analysis.rows]
+        scales = [scale[0] for name in analysis.rows if (scale := analysis.force_scale(name))]
         named = ", ".join(f"{name} {kappa:.3f}" for name, kappa in kappas.items())
         inside = all(soft <= scale <= hard for scale in scales)
         text.append(
@@ -264,23 +273,23 @@ def _limits(analysis: TableAnalysis) -> Section:
 
 def draw(analysis: TableAnalysis) -> Figure:
     """Measured points, base law and best shape of each object, and residuals of both below."""
+    law, best = _laws(analysis)
     figure = Figure(figsize=(8, 5.2), layout="constrained")
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2.2, 1))
     for k, (name, rows) in enumerate(analysis.rows.items()):
-        colour, base, best = _COLOURS[k % len(_COLOURS)], analysis.base.fits[name], analysis.best.fits[name]
+        colour, base, fit = _COLOURS[k % len(_COLOURS)], law.fits[name], best.fits[name]
         x = np.linspace(0.0, rows.delta_m.max(), 301)
         above.plot(1e3 * rows.delta_m, rows.force_n, "o", color=colour, label=name)
         above.plot(1e3 * x, base.predict(x), "--", color=colour, lw=1)
         below.plot(1e3 * rows.delta_m, base.residual, "x--", color=colour, lw=0.7, ms=5)
         if analysis.found:
-            above.plot(1e3 * x, best.predict(x), color=colour, lw=1.6)
-            below.plot(1e3 * rows.delta_m, best.residual, "o-", color=colour, lw=0.9, ms=4)
+            above.plot(1e3 * x, fit.predict(x), color=colour, lw=1.6)
+            below.plot(1e3 * rows.delta_m, fit.residual, "o-", color=colour, lw=0.9, ms=4)
     below.axhspan(-analysis.noise_n, analysis.noise_n, color="0.92", zorder=0)
     below.axhline(0, color="0.5", lw=0.6)
-    shape = analysis.best.shape.name.replace("_", " ")
     above.plot([], [], "--", color="0.4", label="base law")
     if analysis.found:
-        above.plot([], [], "-", color="0.4", label=shape)
+        above.plot([], [], "-", color="0.4", label=best.shape.name.replace("_", " "))
     above.set_ylabel("final force [N]")
     below.set_ylabel("residual [N]")
     below.set_xlabel("commanded Δq [mm]")

@@ -67,7 +67,7 @@ def fit_once(
     problem: Problem,
     simulators: Simulators,
     start: np.ndarray,
-    correction: np.ndarray | None = None,
+    correction: np.ndarray | float | None = None,
     rounds: int = 2,
     free: np.ndarray | None = None,
     known_slopes: np.ndarray | None = None,
@@ -133,7 +133,8 @@ def _descend(
     solution = least_squares(
         lambda part: -local.target.residual(local.value(whole(part)) + shift).ravel(),
         start[free],
-        jac=lambda part: local.slopes(whole(part)).reshape(-1, len(problem))[:, free],
+        # scipy is not annotated: its type is guessed from its default, a string
+        jac=lambda part: local.slopes(whole(part)).reshape(-1, len(problem))[:, free],  # pyright: ignore[reportArgumentType]
         bounds=(problem.low[free], problem.high[free]),
         x_scale="jac",
         ftol=tolerance,

@@ -89,7 +89,7 @@ def _texts(row: Row) -> tuple[str, str, str, str]:
 def parameters_section(model: Model) -> Section:
     """All parameters with their intervals and warnings."""
     rows = list(parameter_rows(model))
-    placed = [(r.name, *(r.place(v) for v in (r.fitted.value, r.fitted.low, r.fitted.high))) for r in rows[:60]]
+    placed = [(r.name, r.place(r.fitted.value), r.place(r.fitted.low), r.place(r.fitted.high)) for r in rows[:60]]
     blocks: list = [Text(f"Warning: {warning}.") for warning in model.warnings]
     blocks += [
         Picture(
@@ -177,13 +177,12 @@ def add_json(added: Added, effect: type[Effect], name: str, path: Path) -> dict[
 
 def _by_signal(added: Added, effect: type[Effect]) -> list[tuple[str, float, float]]:
     """Held-out error ÷ noise of each signal, before and after."""
-    held = [held_out(fit, added.target) for fit in (added.before, added.after)]
+    target = added.target
+    before, after = held_out(added.before, target), held_out(added.after, target)
     if effect is Quantisation:  # what rounding adds to the noise is an error to a model that does not know it
-        held[0] = held[0] * added.target.sigma / added.target.sensor_sigma
-    return [
-        (signal, *(rms(residual, added.target, np.arange(4) == k) for residual in held))
-        for k, signal in enumerate(SIGNALS)
-    ]
+        before = before * target.sigma / target.sensor_sigma
+    one = np.eye(4, dtype=bool)
+    return [(s, rms(before, target, one[k]), rms(after, target, one[k])) for k, s in enumerate(SIGNALS)]
 
 
 def add_answer(added: Added, effect: type[Effect]) -> str:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import jinja2
 import matplotlib as mpl
+from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from forcegrasp import __version__
@@ -79,7 +80,7 @@ def write_report(path: Path, title: str, lead: str, sections: Sequence[Section],
 _drawn = 0
 
 
-def _svg(figure: Figure) -> jinja2.utils.markupsafe.Markup:
+def _svg(figure: Figure) -> Markup:
     """A figure as inline SVG; text stays text, so that it can be searched."""
     global _drawn
     _drawn += 1
@@ -88,4 +89,4 @@ def _svg(figure: Figure) -> jinja2.utils.markupsafe.Markup:
     with mpl.rc_context({"svg.fonttype": "none", "svg.hashsalt": f"figure {_drawn}"}):
         figure.savefig(buffer, format="svg", bbox_inches="tight", metadata={"Date": None})
     svg = buffer.getvalue()
-    return jinja2.utils.markupsafe.Markup(svg[svg.index("<svg") :])
+    return Markup(svg[svg.index("<svg") :])

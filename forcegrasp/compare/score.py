@@ -16,6 +16,10 @@ from forcegrasp.effects import Effect
 _REACH = 3.0
 
 
+# Parameters, gain and signature, as in a Score; None where there is no trace.
+_Found = tuple[np.ndarray, float, np.ndarray] | None
+
+
 @dataclass(frozen=True)
 class Score:
     """The best signature of one effect and variant."""
@@ -96,8 +100,10 @@ def _is_linear(effect: type[Effect]) -> bool:
     return len(trials) > 1 and all(p.low < 0 < p.high for p in effect.parameters)
 
 
-def _single(clean: np.ndarray, change: np.ndarray, residual: np.ndarray, effect: type[Effect], values: np.ndarray):
-    size = np.linalg.norm(clean)
+def _single(
+    clean: np.ndarray, change: np.ndarray, residual: np.ndarray, effect: type[Effect], values: np.ndarray
+) -> _Found:
+    size = float(np.linalg.norm(clean))
     if size < 1e-3 * max(np.linalg.norm(change), 1e-9) or size < 1e-2:
         return None
     unit = clean / size
@@ -112,7 +118,7 @@ def _single(clean: np.ndarray, change: np.ndarray, residual: np.ndarray, effect:
     return values, gain, unit
 
 
-def _joint(clean: np.ndarray, residual: np.ndarray, trials: list[np.ndarray]):
+def _joint(clean: np.ndarray, residual: np.ndarray, trials: list[np.ndarray]) -> _Found:
     if np.linalg.norm(clean, axis=0).min() < 1e-2:
         return None
     factors, *_ = np.linalg.lstsq(clean, residual, rcond=None)

@@ -109,7 +109,7 @@ def estimate_noise(grasps: tuple[MeasuredGrasp, ...]) -> np.ndarray:
 def find_phases(grasp: MeasuredGrasp, force_std_n: np.ndarray) -> np.ndarray:
     """Phase of each sample, as an index into :data:`PHASES`, ``(T,)``, from the measured data alone."""
     touching = contacts(grasp, force_std_n)
-    time, any_touch, both = grasp.time_s, touching.any(axis=1), touching.all(axis=1)
+    time, any_touch, both = grasp.time_s, np.any(touching, axis=1), np.all(touching, axis=1)
     held = _held_for(grasp) >= _HELD_S
     opening = np.zeros(len(time), bool)
     change = np.diff(grasp.command_m.mean(axis=1), prepend=grasp.command_m[0].mean())

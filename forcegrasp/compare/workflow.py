@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Generic, TypeVar
 
 import numpy as np
 
@@ -31,16 +32,19 @@ LEAST_GRASPS = 6
 Progress = Callable[[str], None]
 
 
+Measured = TypeVar("Measured", bound=MeasurementSet | FinalForceTable, covariant=True)
+
+
 @dataclass(frozen=True)
-class Loaded:
+class Loaded(Generic[Measured]):
     """A measurement set that was read and checked."""
 
-    measured: MeasurementSet | FinalForceTable
+    measured: Measured
     gripper: Gripper
     warnings: list[str]
 
 
-def load(path: Path) -> Loaded:
+def load(path: Path) -> Loaded[MeasurementSet] | Loaded[FinalForceTable]:
     """Reads and checks a set.
 
     Raises:
@@ -49,11 +53,12 @@ def load(path: Path) -> Loaded:
     """
     measured = read_set(path)
     gripper = load_gripper(measured.gripper, measured.path)
-    check = check_table if isinstance(measured, FinalForceTable) else check_set
-    return Loaded(measured, gripper, check(measured, gripper.open_m))
+    if isinstance(measured, FinalForceTable):
+        return Loaded(measured, gripper, check_table(measured, gripper.open_m))
+    return Loaded(measured, gripper, check_set(measured, gripper.open_m))
 
 
-def fit_model(loaded: Loaded, seed: int, progress: Progress) -> tuple[Target, Simulators, BaseFit]:
+def fit_model(loaded: Loaded[MeasurementSet], seed: int, progress: Progress) -> tuple[Target, Simulators, BaseFit]:
     """Fits the base model to a set, from several starts."""
     target = make_target(loaded.measured)
     problem = Problem(loaded.gripper, target.grasps)
@@ -61,7 +66,9 @@ def fit_model(loaded: Loaded, seed: int, progress: Progress) -> tuple[Target, Si
     return target, simulators, fit_base(target, problem, simulators, np.random.default_rng(seed), progress)
 
 
-def apply_model(loaded: Loaded, model: Model, progress: Progress, refit: bool) -> tuple[Target, Simulators, BaseFit]:
+def apply_model(
+    loaded: Loaded[MeasurementSet], model: Model, progress: Progress, refit: bool
+) -> tuple[Target, Simulators, BaseFit]:
     """Puts a model beside a set: as it is but for objects and grasps it does not know, or fitted again from there.
 
     Raises:
@@ -82,7 +89,9 @@ def apply_model(loaded: Loaded, model: Model, progress: Progress, refit: bool) -
     return target, simulators, check_gradient(fit_once(target, problem, simulators, vector, free=free), target)
 
 
-def compare(loaded: Loaded, model: Model | None, seed: int, progress: Progress) -> tuple[Comparison, Model, list[str]]:
+def compare(
+    loaded: Loaded[MeasurementSet], model: Model | None, seed: int, progress: Progress
+) -> tuple[Comparison, Model, list[str]]:
     """Where a model fails; without one, where the base model fails after fitting it."""
     if model is None:
         target, _, base = fit_model(loaded, seed, progress)
@@ -100,7 +109,7 @@ def compare(loaded: Loaded, model: Model | None, seed: int, progress: Progress) 
 
 
 def diagnose_set(
-    loaded: Loaded, model: Model | None, names: list[str], seed: int, progress: Progress
+    loaded: Loaded[MeasurementSet], model: Model | None, names: list[str], seed: int, progress: Progress
 ) -> tuple[Diagnosis, Simulators]:
     """Which effects are missing.
 
@@ -134,7 +143,7 @@ class Added:
     model: Model
 
 
-def add_effect(loaded: Loaded, model: Model, effect: type[Effect], progress: Progress) -> Added:
+def add_effect(loaded: Loaded[MeasurementSet], model: Model, effect: type[Effect], progress: Progress) -> Added:
     """Fits a model again, without and with one more effect.
 
     Raises:
@@ -149,8 +158,9 @@ def add_effect(loaded: Loaded, model: Model, effect: type[Effect], progress: Pro
     )
     if effect is Quantisation and target.quantum.any():  # it is in the noise already
         coarse = target.sigma / target.sensor_sigma
-        errors = [rms(heldout_residual(before, target, folds) * factor, target) for factor in (coarse, 1.0)]
-        return Added(target, before, before, *errors, model_of(before, target, loaded, numerical_error(before, target)))
+        held = heldout_residual(before, target, folds)
+        same = model_of(before, target, loaded, numerical_error(before, target))
+        return Added(target, before, before, rms(held * coarse, target), rms(held, target), same)
     groups = score_effects(before, target, simulators, Background(before, []), [effect])
     if not groups:
         raise ConfigError(
@@ -159,8 +169,9 @@ def add_effect(loaded: Loaded, model: Model, effect: type[Effect], progress: Pro
     fits = [refine(group, target, before, simulators) for group in groups]
     nearest = min(fits, key=lambda f: f.cost)
     after = fit_exactly(target, nearest.problem, simulators, nearest.vector)
-    errors = [rms(heldout_residual(f, target, folds), target) for f in (before, after)]
-    return Added(target, before, after, *errors, model_of(after, target, loaded, numerical_error(after, target)))
+    error_before, error_after = (rms(heldout_residual(f, target, folds), target) for f in (before, after))
+    better = model_of(after, target, loaded, numerical_error(after, target))
+    return Added(target, before, after, error_before, error_after, better)
 
 
 def model_of(fit: Fit, target: Target, loaded: Loaded, numerical: Sequence[np.ndarray]) -> Model:

@@ -38,7 +38,8 @@ class ForcePI(TensorDictModuleBase):
     ) -> None:
         super().__init__()
         self.in_keys = ["had_contact", "force_error", "force_integral"]
-        self.out_keys = ["action", ("next", "force_integral")]
+        # tensordict's own annotation knows no nested keys
+        self.out_keys = ["action", ("next", "force_integral")]  # pyright: ignore[reportAttributeAccessIssue]
         self.max_delta_m, self.stiffness, self.kp, self.ki, self.closing_m = max_delta_m, stiffness, kp, ki, closing_m
 
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
@@ -55,4 +56,4 @@ class ForcePI(TensorDictModuleBase):
 
     def make_tensordict_primer(self) -> TensorDictPrimer:
         """The transform that starts the integral at 0 and carries it from step to step."""
-        return TensorDictPrimer(force_integral=Unbounded(shape=(1,), dtype=torch.float32), expand_specs=True)
+        return TensorDictPrimer(force_integral=Unbounded(shape=torch.Size([1]), dtype=torch.float32), expand_specs=True)

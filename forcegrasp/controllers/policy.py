@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import cast
+
 import torch
 from tensordict.nn import AddStateIndependentNormalScale, TensorDictModule
 from torch import Tensor, nn
@@ -46,8 +48,9 @@ def make_policy(observation_size: int, config: PPOConfig) -> ProbabilisticActor:
     net = MLP(
         in_features=observation_size, out_features=FINGERS, num_cells=list(config.hidden), activation_class=nn.Tanh
     )
-    nn.init.orthogonal_(net[-1].weight, gain=0.01)
-    nn.init.constant_(net[-1].bias, config.initial_action)
+    last = cast(nn.Linear, net[-1])
+    nn.init.orthogonal_(last.weight, gain=0.01)
+    nn.init.constant_(last.bias, config.initial_action)
     mean = Mirrored(net) if config.mirrored else net
     scale = AddStateIndependentNormalScale(FINGERS, init_value=config.log_std)
     return ProbabilisticActor(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from torchrl.envs import EnvBase
 
 from forcegrasp.curriculum.schedule import CurriculumValues, LinearSchedule
@@ -17,7 +19,7 @@ class CurriculumHook:
 
     def __init__(self, schedule: LinearSchedule, env: EnvBase) -> None:
         self.schedule = schedule
-        self._grasps = getattr(env, "base_env", env)
+        self._grasps: Any = getattr(env, "base_env", env)
 
     def apply(self, frames: int) -> CurriculumValues:
         """Applies and returns the values that hold after ``frames`` frames."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 from forcegrasp.config import CurriculumConfig, GraspConfig, RewardConfig
 
@@ -28,7 +29,7 @@ class CurriculumValues:
         }
 
 
-def _mix(start, end, share: float):
+def _mix(start: Any, end: Any, share: float) -> Any:
     """Linear interpolation of numbers and of ranges, exact at both ends."""
     if isinstance(start, (list, tuple)):
         return tuple(_mix(a, b, share) for a, b in zip(start, end, strict=True))

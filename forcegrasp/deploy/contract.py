@@ -3,6 +3,8 @@
 JSON, because Python reads it without a package, other languages read it too, and its numbers come back to the last bit.
 """
 
+# pyright: standard
+
 from __future__ import annotations
 
 import dataclasses

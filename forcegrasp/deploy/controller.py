@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import logging
 import math
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -112,6 +113,8 @@ class GraspController:
         fault = self._doubt(position, force, t)
         if fault:
             return self._hold(position, fault)
+        assert position is not None  # or it would be in doubt
+        assert force is not None
         parts = self._observe(position, force)
         raw = np.asarray(self.policy.act(parts), np.float32)
         if not np.isfinite(raw).all():
@@ -171,7 +174,7 @@ class GraspController:
             "had_contact": self._had_contact,
         }
 
-    def _bias(self, parts: dict[str, np.ndarray]) -> np.ndarray | float:
+    def _bias(self, parts: dict[str, np.ndarray]) -> np.ndarray | np.float32:
         """φ of each finger (paper, eq. 7), in [0, 1]."""
         contract, touched = self.contract, parts["had_contact"] > 0.5
         if not contract.inductive_bias:
@@ -214,5 +217,5 @@ def _pair(reading: Any) -> np.ndarray | None:
     return pair if pair.shape == (FINGERS,) else None
 
 
-def _show(values: ArrayLike) -> str:
+def _show(values: Iterable[float]) -> str:
     return "[" + ", ".join(f"{v:.4g}" for v in values) + "]"

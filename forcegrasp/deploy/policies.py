@@ -16,9 +16,11 @@ class Policy(Protocol):
 
     def reset(self) -> None:
         """Forgets: a new grasp begins."""
+        ...
 
     def act(self, parts: dict[str, np.ndarray]) -> np.ndarray:
         """The action (left, right), ``(2,)``, −1 closing at full speed; from every part of o(t), float32 ``(2,)``."""
+        ...
 
 
 class OnnxPolicy:

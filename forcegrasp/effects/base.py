@@ -61,6 +61,8 @@ class Effect:
     #: Position among the effects of the same stage; smaller acts first.
     order: ClassVar[int] = 0
 
+    plant: Plant  #: what it acts on, once attached
+
     def __init__(self, values: np.ndarray, dt: float, variant: str = "", largest: np.ndarray | None = None) -> None:
         self.values = np.asarray(values, float)
         if self.values.ndim != 2 or self.values.shape[1] != len(self.parameters):
@@ -70,7 +72,6 @@ class Effect:
             raise ValueError(f"{self.name} has no variant {variant!r}: {', '.join(self.variants)}")
         self.dt = dt
         self.largest = np.zeros(len(self.parameters)) if largest is None else np.asarray(largest, float)
-        self.plant: Plant | None = None
         self.rows = np.arange(len(self.values))
         #: Rows whose readings are new, ``(rows, 1)``; when others are reset, a row is read again where it stands.
         self.new_reading = np.ones((len(self.values), 1), bool)
@@ -178,7 +179,7 @@ class Effect:
         return cls.hooks() <= {"read_force", "read_position"}
 
 
-def first_order_weight(dt: float, time_constant: np.ndarray) -> np.ndarray:
+def first_order_weight(dt: float, time_constant: np.ndarray | float) -> np.ndarray:
     """Share of the gap that a first-order lag closes in one step, 1 − exp(−dt/τ); 1 where τ is 0."""
     with np.errstate(divide="ignore"):
         return -np.expm1(-dt / np.asarray(time_constant, float))

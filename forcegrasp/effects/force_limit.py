@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from forcegrasp.effects.base import Effect, Parameter
+from forcegrasp.physics.plant import Plant
 
 
 class ForceLimit(Effect):
@@ -32,7 +33,7 @@ class ForceLimit(Effect):
     )
     order = 2
 
-    def change_model(self, plant, which: np.ndarray) -> None:
+    def change_model(self, plant: Plant, which: np.ndarray) -> None:
         limit, rows, ranges = self["force_n"][which, 0], self.rows[which], plant.field("actuator_forcerange")
         for actuator in plant.actuators:
             ranges[rows, actuator, 0] = np.maximum(ranges[rows, actuator, 0], -limit)

@@ -1,5 +1,7 @@
 """A fitted model as a text file that a person can read and edit."""
 
+# pyright: standard
+
 from __future__ import annotations
 
 import math

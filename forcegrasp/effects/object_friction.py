@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from forcegrasp.effects.base import Effect, Parameter
+from forcegrasp.physics.plant import Plant
 
 
 class ObjectFriction(Effect):
@@ -19,7 +20,7 @@ class ObjectFriction(Effect):
     separates = "off-centre objects, where one finger touches first and pushes"
     parameters = (Parameter("force_n", "friction F_t", "N", 0.0, 5.0, 0.1, trials=(0.02, 0.06, 0.2)),)
 
-    def change_model(self, plant, which: np.ndarray) -> None:
+    def change_model(self, plant: Plant, which: np.ndarray) -> None:
         rows, dof = self.rows[which], plant.object_dof
         plant.field("dof_frictionloss")[rows, dof] += self["force_n"][which, 0]
         plant.stiffen_friction(dof, rows)

@@ -6,6 +6,7 @@ import numpy as np
 
 from forcegrasp.effects.base import Effect, Parameter
 from forcegrasp.effects.touch import Touch
+from forcegrasp.physics.plant import Plant
 
 #: Depth at which the cubic spring's force is given, metres.
 DEPTH_M = 0.001
@@ -36,7 +37,7 @@ class StiffeningContact(Effect):
         self._touch.reset(which)
         self._push[which] = 0.0
 
-    def change_model(self, plant, which: np.ndarray) -> None:
+    def change_model(self, plant: Plant, which: np.ndarray) -> None:
         solimp, rows = plant.field("geom_solimp"), self.rows[which]
         for geom in plant.object_geoms:
             solimp[rows, geom, 4] += self["extra_power"][which, 0]

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from forcegrasp.effects.base import Effect
 from forcegrasp.effects.model_file import Fitted, Model, read_model
 from forcegrasp.errors import ConfigError
 from forcegrasp.physics.plant import Plant
@@ -36,7 +37,7 @@ class ModelVariation:
     def attach(self, plant: Plant) -> None:
         """Puts the model's effects into a plant, on all of its rows."""
         rows = np.arange(plant.n)
-        self._effects = []
+        self._effects: list[Effect] = []
         for found in self.model.effects:
             largest = np.array([found.parameters[p.name].high for p in found.effect.parameters])
             self._effects.append(

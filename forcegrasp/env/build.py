@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 from torchrl.envs import TransformedEnv
-from torchrl.envs.transforms import CatFrames, CatTensors, Compose, ObservationNorm
+from torchrl.envs.transforms import CatFrames, CatTensors, Compose, ObservationNorm, Transform
 
 from forcegrasp.config import (
     ActionConfig,
@@ -67,7 +67,7 @@ def build_env(
     action, reward = action or ActionConfig(), reward or RewardConfig()
     for name, part in (("sensors", sensors), ("observation", observation), ("action", action)):
         validate(part, f"{name}.")
-    transforms = [
+    transforms: list[Transform] = [
         ObservationNoise(
             in_keys=["measured_position", "measured_force"],
             out_keys=["sensed_position", "sensed_force"],
@@ -85,14 +85,14 @@ def build_env(
     if action.inductive_bias:
         transforms.append(InductiveBias(action.bias_one_contact, action.bias_floor))
     transforms.append(ActionScale(action.max_delta_m))
-    env = TransformedEnv(GraspEnv(n, physics, grasp, reward, sampler, model=model), Compose(*transforms))
+    env = TransformedEnv(GraspEnv(n, physics, grasp, reward, sampler, model=model), Compose(transforms))
     seed_env(env, seed)
     return env
 
 
 def seed_env(env: TransformedEnv, seed: int) -> None:
     """Seeds the grasps and every noise transform, each with a stream of its own."""
-    noises = [t for t in env.transform if isinstance(t, ObservationNoise)]
+    noises = [t for t in env.transform.modules() if isinstance(t, ObservationNoise)]
     grasp_seed, *noise_seeds = (int(s) for s in np.random.SeedSequence(seed).generate_state(1 + len(noises)))
     env.base_env.set_seed(grasp_seed)
     for noise, noise_seed in zip(noises, noise_seeds, strict=True):

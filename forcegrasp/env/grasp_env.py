@@ -80,14 +80,14 @@ class GraspEnv(EnvBase):
 
     def _make_specs(self, n: int) -> None:
         self.action_spec = Composite(
-            joint_delta=Bounded(-OPEN_M, OPEN_M, shape=(n, 2), dtype=torch.float32), shape=(n,)
+            joint_delta=Bounded(-OPEN_M, OPEN_M, shape=torch.Size([n, 2]), dtype=torch.float32), shape=(n,)
         )
         self.observation_spec = Composite(shape=(n,))
         for key, (size, _) in OBSERVATIONS.items():
-            self.observation_spec[key] = Unbounded(shape=(n, size), dtype=torch.float32)
-        self.observation_spec["reward_terms"].shape = (n,)
-        self.reward_spec = Unbounded(shape=(n, 1), dtype=torch.float32)
-        flag = Categorical(2, shape=(n, 1), dtype=torch.bool)
+            self.observation_spec[key] = Unbounded(shape=torch.Size([n, size]), dtype=torch.float32)
+        self.observation_spec["reward_terms"].shape = torch.Size([n])
+        self.reward_spec = Unbounded(shape=torch.Size([n, 1]), dtype=torch.float32)
+        flag = Categorical(2, shape=torch.Size([n, 1]), dtype=torch.bool)
         self.full_done_spec = Composite(done=flag.clone(), terminated=flag.clone(), truncated=flag.clone(), shape=(n,))
 
     def _set_seed(self, seed: int | None) -> None:

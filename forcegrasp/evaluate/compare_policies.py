@@ -98,8 +98,8 @@ def _spread(episodes: TensorDictBase, count: int = 6) -> TensorDictBase:
 
 
 def _describe(figures: dict[str, dict[str, np.ndarray]], baseline: str, seed: int) -> dict[str, dict]:
-    some = next(iter(next(iter(figures.values())).values()))
-    bootstrap = Bootstrap(*some.shape, seed)
+    cells, trials = next(iter(next(iter(figures.values())).values())).shape
+    bootstrap = Bootstrap(cells, trials, seed)
     described = {}
     for name, values in figures.items():
         described[name] = {figure: bootstrap.describe(v) for figure, v in values.items()}

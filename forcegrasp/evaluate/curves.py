@@ -165,7 +165,7 @@ def _summary(group: Group, frames: np.ndarray) -> dict[str, Any]:
         parts = zip(("mean", "low", "high"), group.mean(column, frames), strict=True)
         summary["curves"][column] = {name: [_json(value) for value in values] for name, values in parts}
         parts = zip(("mean", "low", "high"), interval(group.last(column)), strict=True)
-        summary["end"][column] = {name: _json(value) for name, value in parts}
+        summary["end"][column] = {name: _json(float(value)) for name, value in parts}
     return summary
 
 

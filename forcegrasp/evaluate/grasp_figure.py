@@ -52,7 +52,7 @@ def describe(episode: TensorDictBase) -> str:
 
 def from_the_start(episode: TensorDictBase, key: str) -> np.ndarray:
     """An entry before the first step and after every one, ``(T + 1, ...)``."""
-    return np.concatenate([episode[key][:1].numpy(), episode["next", key].numpy()])
+    return np.concatenate([episode.get(key)[:1].numpy(), episode.get(("next", key)).numpy()])
 
 
 def _draw_forces(axes: Axes, episode: TensorDictBase, sensors: SensorConfig) -> None:

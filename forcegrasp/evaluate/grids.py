@@ -47,7 +47,7 @@ class GraspedObject:
 def kappa_grid(grasp: GraspConfig, kappas: int, trials: int, seed: int) -> Grid:
     """Draws ``trials`` grasps for each of ``kappas`` evenly spaced softness values; all else random."""
     rng, parts = np.random.default_rng(seed), []
-    values = np.linspace(*grasp.kappa, kappas)
+    values = np.linspace(*grasp.kappa, num=kappas)
     for kappa in values:
         sampler = GraspSampler(dataclasses.replace(grasp, kappa=[float(kappa)] * 2))
         parts.append(sampler(rng, np.arange(trials)))
@@ -64,7 +64,7 @@ def object_grid(objects: list[GraspedObject], grasp: GraspConfig, trials: int, s
     for thing in objects:
         radius = np.full(trials, thing.diameter_m / 2)
         offset = offset_limit_m(radius, grasp.deformation_m) * rng.uniform(0.5, 1, trials) * rng.choice([-1, 1], trials)
-        b2, goal = rng.uniform(*grasp.b2, trials), rng.uniform(*thing.goal_force_n, trials)
+        b2, goal = rng.uniform(*grasp.b2, size=trials), rng.uniform(*thing.goal_force_n, trials)
         parts.append(GraspParameters(np.full(trials, thing.kappa), b2, radius, offset, goal))
     return Grid("object", [thing.name for thing in objects], GraspParameters.concatenate(parts))
 

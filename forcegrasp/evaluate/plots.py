@@ -17,7 +17,7 @@ PALETTE = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#9
 
 
 def _draw_forces(axes: Axes, episode: TensorDictBase) -> None:
-    after = episode["next"]
+    after = episode.get("next")
     time = np.arange(1, len(after["force"]) + 1) * CONTROL_PERIOD_S
     for finger, (colour, name) in enumerate(((LEFT, "left"), (RIGHT, "right"))):
         axes.plot(time, after["sensed_force"][:, finger], color=colour, lw=0.6, alpha=0.4)

@@ -44,7 +44,7 @@ class Bootstrap:
             "std": float(values.std(ddof=1)),
             "low": low,
             "high": high,
-            "iqm": float(trim_mean(values, 0.25, axis=None)),
+            "iqm": float(trim_mean(values.ravel(), 0.25)),
             "iqm_low": iqm_low,
             "iqm_high": iqm_high,
             "by_cell": cells,

@@ -65,7 +65,7 @@ def grasp_video(episodes: dict[str, TensorDictBase], sensors: SensorConfig, ever
         source, target = Path(folder) / "episodes.npz", Path(folder) / "grasp.gif"
         np.savez(
             source,
-            parameters=np.stack([e["grasp_parameters"][0].double().numpy() for e in episodes.values()]),
+            parameters=np.stack([e.get("grasp_parameters")[0].double().numpy() for e in episodes.values()]),
             fingers=np.stack([from_the_start(e, "joint_position") for e in episodes.values()]),
             objects=np.stack([from_the_start(e, "object_position")[:, 0] for e in episodes.values()]),
             charts=np.stack([figure_pixels(figure) for figure in draw_grasps(episodes, sensors)]),
@@ -108,7 +108,8 @@ def _palette(pictures: list[np.ndarray]) -> Image.Image:
     some = np.concatenate([pictures[0], pictures[len(pictures) // 2], pictures[-1]])
     colours = [255, 255, 255]
     for part in (some[:, :SCENE_WIDTH], some[:, SCENE_WIDTH:]):
-        colours += Image.fromarray(np.ascontiguousarray(part)).quantize(127).getpalette()[: 3 * 127]
+        quantized = Image.fromarray(np.ascontiguousarray(part)).quantize(127)
+        colours += (quantized.getpalette() or [])[: 3 * 127]
     palette = Image.new("P", (1, 1))
     palette.putpalette(colours)
     return palette

@@ -52,7 +52,7 @@ def check_liveness(measured: MeasurementSet, reach: float) -> list[str]:
     ]
     return warnings + [
         f"{place(measured.path, grasp)}: no contact"
-        for grasp, some in zip(grasps, felt.any(axis=1), strict=True)
+        for grasp, some in zip(grasps, np.any(felt, axis=1), strict=True)
         if not some
     ]
 

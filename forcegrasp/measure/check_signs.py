@@ -131,7 +131,7 @@ def _check_free_air(measured: MeasurementSet, grasp: MeasuredGrasp, reach: float
     if grasp.radius_m is None or grasp.offset_m is None:
         return
     surface = grasp.radius_m + np.array([-1.0, 1.0]) * grasp.offset_m
-    near = (grasp.position_m - surface < 0.15 * reach).any(axis=1)
+    near = np.any(grasp.position_m - surface < 0.15 * reach, axis=1)
     free = int(near.argmax()) if near.any() else len(near)
     if free < 10 or len(near) - free < 10:
         return

@@ -29,14 +29,15 @@ def read_csv(path: Path, columns: Columns) -> Table:
         rows = _count_rows(path) - 1
         header = _header(path, columns)
         schema = {name: pl.String if name in columns.text else pl.Float64 for name in header}
+        frame, problem = None, ""
         try:
             frame = pl.read_csv(path, schema=schema).head(rows)
             problem = "rows and line ends don't match" if frame.height != rows else ""
         except pl.exceptions.PolarsError as error:
             problem = str(error).split("\n")[0]
-        if problem or any(frame.null_count().row(0)):
+        if frame is None or problem or any(frame.null_count().row(0)):
             _inspect(path, header, columns)
-        if problem:
+        if frame is None or problem:
             raise MeasurementError(f"{show(path)}: not CSV that can be read: {show(problem, 100)}")
     except OSError as error:
         raise MeasurementError(f"{show(path)}: not readable ({error.strerror})") from error
@@ -49,6 +50,7 @@ def _count_rows(path: Path) -> int:
     """Returns the number of lines up to the last that is not empty, after checking the bytes."""
     decode = codecs.getincrementaldecoder("utf-8")().decode
     lines = breaks = length = 0
+    line = b""
     with open(path, "rb") as file:
         while chunk := file.read(_CHUNK):
             if not breaks and chunk.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -61,7 +61,7 @@ def _without_stderr() -> Iterator[None]:
         os.close(nowhere)
 
 
-def _check_types(path: Path, schema: pl.Schema, columns: Columns) -> None:
+def _check_types(path: Path, schema: Mapping[str, pl.DataType], columns: Columns) -> None:
     for name, kind in schema.items():
         if name in columns.text:
             fits, wanted = kind in _TEXT or kind.is_integer(), "text"

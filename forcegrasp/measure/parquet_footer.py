@@ -55,9 +55,10 @@ def read_footer(path: Path) -> Footer:
     if not isinstance(meta.get(3), int) or not isinstance(groups, list):
         raise broken
     sizes = [group.get(2) if isinstance(group, dict) else None for group in groups]
-    if meta[3] < 0 or not all(isinstance(size, int) and size >= 0 for size in sizes):
+    known = [size for size in sizes if isinstance(size, int) and size >= 0]
+    if meta[3] < 0 or len(known) < len(sizes):
         raise broken
-    return Footer(rows=meta[3], bytes=sum(sizes))
+    return Footer(rows=meta[3], bytes=sum(known))
 
 
 class _Thrift:

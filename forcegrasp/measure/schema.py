@@ -41,7 +41,7 @@ class MeasuredGrasp:
     def signals(self) -> dict[str, np.ndarray]:
         """Every measured signal by its column name, each ``(T,)``."""
         columns = [self.time_s, *self.command_m.T, *self.position_m.T, *self.force_n.T]
-        named = dict(zip(SIGNALS, columns, strict=True))
+        named: dict[str, np.ndarray] = dict(zip(SIGNALS, columns, strict=True))
         return named if self.object_m is None else named | {OBJECT: self.object_m}
 
 

@@ -71,7 +71,7 @@ def load_yaml(path: Path) -> dict[str, Any]:
     except OSError as error:
         raise MeasurementError(f"{show(path)}: not readable ({error.strerror})") from error
     except UnicodeDecodeError as error:
-        row = data.count(b"\n", 0, error.start) + 1
+        row = error.object.count(b"\n", 0, error.start) + 1
         raise MeasurementError(f"{show(path)}: row {row}: not UTF-8; save the file as UTF-8") from error
     except (_RefusedError, yaml.YAMLError, ValueError) as error:
         mark = getattr(error, "problem_mark", None)

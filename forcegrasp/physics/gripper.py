@@ -1,9 +1,12 @@
 """The description of a gripper: its MJCF, the names of what matters in it, and what a fit may change."""
 
+# pyright: standard
+
 from __future__ import annotations
 
 import math
 import re
+from collections.abc import Set
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
@@ -171,10 +174,7 @@ def _parse(path: Path, raw: Any) -> Gripper:
     fingers, thing = raw["fingers"], raw["object"]
     _demand(path, "fingers.", fingers, {"joints", "actuators", "force_sensors", "closed", "open"})
     _demand(path, "object.", thing, {"joint", "geom", "axis"})
-    for key in ("joints", "actuators", "force_sensors"):
-        names = fingers[key]
-        if not isinstance(names, list) or len(names) != 2 or names[0] == names[1]:
-            raise ConfigError(f"{path}: fingers.{key}: must be two names, [left, right]")
+    joints, actuators, force_sensors = (_pair(path, key, fingers) for key in ("joints", "actuators", "force_sensors"))
     if thing["axis"] not in ("x", "y", "z"):
         raise ConfigError(f"{path}: object.axis: must be x, y or z")
     if raw.get("fast", "none") not in ("none", "sphere"):
@@ -188,9 +188,9 @@ def _parse(path: Path, raw: Any) -> Gripper:
         path=path,
         model=path.parent / _text(path, "model", raw["model"]),
         fast=raw.get("fast", "none"),
-        joints=tuple(_text(path, "fingers.joints", name) for name in fingers["joints"]),
-        actuators=tuple(_text(path, "fingers.actuators", name) for name in fingers["actuators"]),
-        force_sensors=tuple(_text(path, "fingers.force_sensors", name) for name in fingers["force_sensors"]),
+        joints=joints,
+        actuators=actuators,
+        force_sensors=force_sensors,
         closed=_number(path, "fingers.closed", fingers["closed"]),
         open=_number(path, "fingers.open", fingers["open"]),
         object_joint=_text(path, "object.joint", thing["joint"]),
@@ -203,6 +203,14 @@ def _parse(path: Path, raw: Any) -> Gripper:
     if parameters["radius_m"].low <= 0:
         raise ConfigError(f"{path}: parameters.radius_m.low: must be positive")
     return gripper
+
+
+def _pair(path: Path, key: str, fingers: dict[str, Any]) -> tuple[str, str]:
+    names = fingers[key]
+    if not isinstance(names, list) or len(names) != 2 or names[0] == names[1]:
+        raise ConfigError(f"{path}: fingers.{key}: must be two names, [left, right]")
+    left, right = (_text(path, f"fingers.{key}", name) for name in names)
+    return left, right
 
 
 def _parameter(path: Path, name: str, entry: Any) -> BaseParameter:
@@ -320,13 +328,13 @@ def _check_write(where: str, model: mujoco.MjModel, write: FieldWrite) -> None:
         raise ConfigError(f"{where} needs {need}")
 
 
-def _mapping(path: Path, raw: dict, key: str) -> dict:
+def _mapping(path: Path, raw: dict[str, Any], key: str) -> dict[str, Any]:
     if not isinstance(raw[key], dict):
         raise ConfigError(f"{path}: {key}: must be a mapping")
     return raw[key]
 
 
-def _demand(path: Path, where: str, raw: Any, keys: set[str], optional: set[str] = frozenset()) -> None:
+def _demand(path: Path, where: str, raw: Any, keys: Set[str], optional: Set[str] = frozenset()) -> None:
     if not isinstance(raw, dict):
         raise ConfigError(f"{path}: {where.rstrip('.') or 'the file'}: must map {', '.join(sorted(keys))}")
     for key in raw:

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from typing import Any, TypeVar
 
 import numpy as np
+
+Numbers = TypeVar("Numbers", float, np.ndarray)
 
 #: Interval of the solver impedance width ρ, hard to soft (paper, Sec. 3). Metres.
 RHO_RANGE_M = (0.003, 0.010)
@@ -14,19 +17,19 @@ FORCE_SCALE_RANGE = (0.5, 5.0)
 MAX_FORCE_N = 0.30
 
 
-def rho_of_kappa(kappa: np.ndarray) -> np.ndarray:
+def rho_of_kappa(kappa: Numbers) -> Numbers:
     """Impedance width ρ in metres, growing linearly with softness κ (paper, Sec. 3)."""
     hard, soft = RHO_RANGE_M
     return hard + kappa * (soft - hard)
 
 
-def force_scale_of_kappa(kappa: np.ndarray) -> np.ndarray:
+def force_scale_of_kappa(kappa: Numbers) -> Numbers:
     """Force scale f_α, falling linearly with softness κ (paper, Sec. 3)."""
     soft, hard = FORCE_SCALE_RANGE
     return soft + (1 - kappa) * (hard - soft)
 
 
-def kappa_of_force_scale(force_scale: np.ndarray) -> np.ndarray:
+def kappa_of_force_scale(force_scale: np.ndarray | float) -> np.ndarray:
     """Softness κ whose f_α is nearest: the inverse of :func:`force_scale_of_kappa`, within [0, 1]."""
     soft, hard = FORCE_SCALE_RANGE
     return np.clip(1 - (force_scale - soft) / (hard - soft), 0.0, 1.0)
@@ -50,7 +53,7 @@ class GraspParameters:
     def __len__(self) -> int:
         return len(self.kappa)
 
-    def __getitem__(self, index) -> GraspParameters:
+    def __getitem__(self, index: Any) -> GraspParameters:
         return GraspParameters(*(np.atleast_1d(getattr(self, f.name)[index]) for f in fields(self)))
 
     @property

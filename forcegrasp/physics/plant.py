@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import mujoco
 import numpy as np
@@ -175,7 +175,7 @@ class Plant:
                 column = () if write.column is None else (write.column,)
                 self._write_base(write.field, (ids, row, *column), write.sign * values)
 
-    def _write_base(self, field: str, where: tuple, values: np.ndarray) -> None:
+    def _write_base(self, field: str, where: tuple[Any, ...], values: np.ndarray) -> None:
         self.field(field)[where] = self.base(field)[where] = values
 
     def write_radius(self, ids: np.ndarray, radius_m: np.ndarray) -> None:

@@ -13,7 +13,7 @@ from forcegrasp.physics.parameters import MAX_FORCE_N, GraspParameters, force_sc
 OPEN_M = 0.045
 
 
-def offset_limit_m(radius_m: np.ndarray, deformation_m: float) -> np.ndarray:
+def offset_limit_m(radius_m: np.ndarray | float, deformation_m: float) -> np.ndarray:
     """Largest \\|o_y\\| that paper eqs. 1 and 2 allow an object of this radius. Metres, shape ``(n,)``.
 
     Eq. 1 keeps the object inside the open gripper, \\|o_y\\| + r < q_max; eq. 2 lets both fingers reach it,
@@ -41,11 +41,12 @@ class GraspSampler:
     def __call__(self, rng: np.random.Generator, ids: np.ndarray) -> GraspParameters:
         """Draws one grasp for each of ``ids`` (which only give the number)."""
         config, n = self.config, len(ids)
-        kappa = rng.uniform(*config.kappa, n)
-        b2 = rng.uniform(*config.b2, n)
-        radius = rng.uniform(*config.radius_m, n)
+        kappa = rng.uniform(*config.kappa, size=n)
+        b2 = rng.uniform(*config.b2, size=n)
+        radius = rng.uniform(*config.radius_m, size=n)
         limit = offset_limit_m(radius, config.deformation_m)
-        offset = rng.uniform(np.clip(config.offset_m[0], -limit, limit), np.clip(config.offset_m[1], -limit, limit))
+        bounds: list[np.ndarray] = [np.clip(bound, -limit, limit) for bound in config.offset_m]
+        offset = rng.uniform(bounds[0], bounds[1])
         lowest = config.goal_force_min_n
         highest = config.goal_force_max * MAX_FORCE_N * force_scale_of_kappa(kappa)
         goal = rng.uniform(np.minimum(lowest, highest), highest)

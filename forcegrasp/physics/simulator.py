@@ -21,9 +21,11 @@ class Variation(Protocol):
 
     def attach(self, plant: Plant) -> None:
         """Prepares a plant, once."""
+        ...
 
     def draw(self, rng: np.random.Generator, ids: np.ndarray) -> dict[str, np.ndarray]:
         """Draws anew for these rows, before they are reset; returns base parameters, each ``(len(ids),)``."""
+        ...
 
 
 class GraspSimulator:

@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 import torch
@@ -64,7 +65,7 @@ def export_policy(name: Path | str, out: Path, ceiling_n: float) -> Exported:
         contract = contract_of(config, ceiling_n)
     except ValueError as error:
         raise DeployError(f"{name}: {error}") from error
-    mean = policy[0].module[0]  # of the Gaussian; its deviation is for training
+    mean = cast(nn.Sequential, policy[0].module)[0]  # of the Gaussian; its deviation is for training
     network, versions = to_onnx(mean, contract.observation_size)
     difference = largest_difference(mean, OnnxPolicy(network, contract), contract)
     if not difference <= TOLERANCE:
@@ -120,6 +121,7 @@ def to_onnx(network: nn.Module, size: int) -> tuple[bytes, dict[str, str]]:
             dynamo=True,
             verbose=False,
         )
+    assert program is not None  # with dynamo
     model = program.model_proto
     graph = model.graph
     for entry in (*graph.node, *graph.value_info, *graph.input, *graph.output, *graph.initializer, graph, model):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from importlib.resources import files
 from pathlib import Path
 
-from tensordict.nn import TensorDictModuleBase
+from torchrl.modules import ProbabilisticActor
 
 from forcegrasp.config import TrainConfig
 from forcegrasp.controllers.policy import make_policy
@@ -19,7 +19,7 @@ def shipped_policies() -> list[str]:
     return sorted(entry.name for entry in folder.iterdir() if (entry / "config.yaml").is_file())
 
 
-def load_policy(name: Path | str) -> tuple[TensorDictModuleBase, TrainConfig]:
+def load_policy(name: Path | str) -> tuple[ProbabilisticActor, TrainConfig]:
     """Returns a shipped policy by name, or the newest policy of a run; and the configuration it was trained with.
 
     A shipped policy is laid out like a run directory, so that both are read alike.

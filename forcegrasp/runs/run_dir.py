@@ -13,7 +13,7 @@ import subprocess
 import sys
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import yaml
 from omegaconf import OmegaConf
@@ -113,7 +113,8 @@ class RunDir:
         """
         try:
             loaded = OmegaConf.load(self.config_path)
-            config = OmegaConf.to_object(OmegaConf.merge(OmegaConf.structured(TrainConfig), loaded))
+            merged = OmegaConf.merge(OmegaConf.structured(TrainConfig), loaded)
+            config = cast(TrainConfig, OmegaConf.to_object(merged))
             validate(config)
         except (OSError, yaml.YAMLError, OmegaConfBaseException, ConfigError, ValueError) as error:
             first_line = str(error).strip().splitlines()[0]

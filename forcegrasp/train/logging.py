@@ -42,7 +42,7 @@ class TrainingLog:
             :func:`~forcegrasp.train.board.tag`.
           episodes: the batch itself, ``(n, T)``.
         """
-        row = {"frames": frames}
+        row: dict[str, float] = {"frames": frames}
         for group, scalars in groups.items():
             for name, value in scalars.items():
                 column = f"{group}/{name}"
@@ -51,8 +51,10 @@ class TrainingLog:
         self.run.log_metrics(row)
         every = self.config.log
         if every.histograms_every and number % every.histograms_every == 0:
-            self.writer.add_histogram("actions/policy", episodes["action"].clamp(-1, 1), frames, bins=64)
-            self.writer.add_histogram("forces/touching_n", _nonzero(episodes["next", "force"]), frames, bins=64)
+            actions, touching = episodes["action"].clamp(-1, 1), _nonzero(episodes["next", "force"])
+            for name, values in (("actions/policy", actions), ("forces/touching_n", touching)):
+                # not annotated: its type is guessed from its default, a string
+                self.writer.add_histogram(name, values, frames, bins=64)  # pyright: ignore[reportArgumentType]
         if every.figures_every and number % every.figures_every == 0:
             self.traces(episodes[:TRACES], frames)
         self.writer.flush()
@@ -89,7 +91,8 @@ def _nonzero(force: torch.Tensor) -> torch.Tensor:
 
 def _add_gif(writer: SummaryWriter, tag: str, data: bytes, step: int) -> None:
     # SummaryWriter.add_video needs moviepy to encode what is already encoded here.
-    from tensorboard.compat.proto.summary_pb2 import Summary
+    # Its messages are made on import.
+    from tensorboard.compat.proto.summary_pb2 import Summary  # pyright: ignore[reportAttributeAccessIssue]
 
     image = Summary.Image(encoded_image_string=data)
     writer._get_file_writer().add_summary(Summary(value=[Summary.Value(tag=tag, image=image)]), step)

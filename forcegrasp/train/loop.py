@@ -5,7 +5,7 @@ from __future__ import annotations
 import signal
 import time
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import torch
@@ -18,7 +18,7 @@ from forcegrasp.config import TrainConfig
 from forcegrasp.controllers.policy import make_policy
 from forcegrasp.curriculum import CurriculumHook, LinearSchedule
 from forcegrasp.effects.model_file import Model
-from forcegrasp.env import build_env
+from forcegrasp.env import GraspEnv, build_env
 from forcegrasp.env.episodes import summarise
 from forcegrasp.runs.run_dir import RunDir
 from forcegrasp.train.logging import TrainingLog
@@ -75,6 +75,11 @@ class Trainer:
             auto_register_policy_transforms=False,
         )
 
+    @property
+    def _rng(self) -> np.random.Generator:
+        """What grasps are drawn with."""
+        return cast(GraspEnv, self.env.base_env).rng
+
     def state(self) -> tuple[dict[str, Tensor], dict[str, Any]]:
         """All that changes while training, as tensors and as JSON."""
         tensors = {f"policy.{k}": v for k, v in self.policy.state_dict().items()}
@@ -85,7 +90,7 @@ class Trainer:
         tensors |= {"rng.torch": torch.get_rng_state(), "rng.shuffle": self.shuffle.get_state()}
         facts = {
             "batches": self.batches,
-            "rng_grasps": self.env.base_env.rng.bit_generator.state,
+            "rng_grasps": self._rng.bit_generator.state,
             "curriculum": self.curriculum.schedule(self.frames).scalars(),
         }
         return {k: v.detach().contiguous().clone() for k, v in tensors.items()}, facts
@@ -107,7 +112,7 @@ class Trainer:
             module = self.env.transform.get_submodule(key.removesuffix("_extra_state").rstrip("."))
             module.set_extra_state(value)
         self.frames, self.batches = facts["frames"], facts["batches"]
-        self.env.base_env.rng.bit_generator.state = facts["rng_grasps"]
+        self._rng.bit_generator.state = facts["rng_grasps"]
         self.shuffle.set_state(tensors["rng.shuffle"])
         torch.set_rng_state(tensors["rng.torch"])
 
@@ -126,7 +131,7 @@ def train(config: TrainConfig, run: RunDir, resume: bool = False) -> bool:
     if resume:
         trainer.restore(*run.load())
     log = TrainingLog(run, config, trainer.frames)
-    batches = iter(collector)
+    batches, batch = iter(collector), None
     with _stop_signals() as stop, _progress(total, trainer.frames, config.grasp.steps) as progress:
         while trainer.frames < total and not stop:
             started = time.perf_counter()
@@ -140,9 +145,9 @@ def train(config: TrainConfig, run: RunDir, resume: bool = False) -> bool:
 
             trainer.frames += batch.numel()
             trainer.batches += 1
-            terms = batch["next", "reward_terms"]
+            terms = batch.get(("next", "reward_terms"))
             groups = {
-                "episode": {"return": float(batch["next", "reward"].sum((1, 2)).mean()), **figures},
+                "episode": {"return": float(batch.get(("next", "reward")).sum((1, 2)).mean()), **figures},
                 "reward": {name: float(terms[name].mean()) for name in sorted(terms.keys())},
                 "ppo": {
                     **losses,
@@ -164,10 +169,11 @@ def train(config: TrainConfig, run: RunDir, resume: bool = False) -> bool:
             if trainer.batches % every.checkpoint_every == 0 or trainer.frames >= total or stop:
                 run.save(trainer.frames, *trainer.state(), keep=every.keep)
             progress(trainer.frames, figures)
-    if not stop and config.log.figures_every:
-        log.traces(batch[:6], trainer.frames)
-    if not stop and config.log.video_every:
-        log.video(batch[0], trainer.frames)
+    if batch is not None and not stop:
+        if config.log.figures_every:
+            log.traces(batch[:6], trainer.frames)
+        if config.log.video_every:
+            log.video(batch[0], trainer.frames)
     log.close()
     return trainer.frames >= total
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from typing import cast
 
 import torch
 from tensordict import TensorDictBase
-from tensordict.nn import TensorDictModule, TensorDictModuleBase
+from tensordict.nn import TensorDictModule
 from torch import Tensor, nn
-from torchrl.modules import MLP
+from torchrl.modules import MLP, ProbabilisticActor
 from torchrl.objectives import ClipPPOLoss
 from torchrl.objectives.value import GAE
 
@@ -22,6 +23,9 @@ _HALF = (0.5, 3.5, 0.010, 0.012, 0.5)
 class Value(nn.Module):
     """State value. Its output is scaled by the horizon 1 / (1 − γ), so that the network's own stays about 1."""
 
+    middle: Tensor
+    half_width: Tensor
+
     def __init__(self, observation_size: int, hidden: list[int], discount: float, privileged: bool) -> None:
         super().__init__()
         extra = len(_MIDDLE) + 5 if privileged else 0
@@ -32,15 +36,9 @@ class Value(nn.Module):
         self.register_buffer("middle", torch.tensor(_MIDDLE), persistent=False)
         self.register_buffer("half_width", torch.tensor(_HALF), persistent=False)
 
-    def forward(
-        self,
-        observation: Tensor,
-        parameters: Tensor | None = None,
-        force: Tensor | None = None,
-        position: Tensor | None = None,
-        object_position: Tensor | None = None,
-    ) -> Tensor:
-        if parameters is not None:
+    def forward(self, observation: Tensor, *state: Tensor) -> Tensor:
+        if state:
+            parameters, force, position, object_position = state
             # true gap between each finger and the object's surface, in centimetres
             side = torch.tensor([-1.0, 1.0])
             gap = (position - side * object_position - parameters[..., 2:3]) * 100
@@ -75,7 +73,7 @@ class PPO:
       config: every number of the algorithm.
     """
 
-    def __init__(self, policy: TensorDictModuleBase, value: TensorDictModule, config: PPOConfig) -> None:
+    def __init__(self, policy: ProbabilisticActor, value: TensorDictModule, config: PPOConfig) -> None:
         self.config, self.policy, self.value = config, policy, value
         self.advantage = GAE(gamma=config.discount, lmbda=config.gae_lambda, value_network=value)
         self.loss = ClipPPOLoss(
@@ -126,4 +124,4 @@ class PPO:
 
     @property
     def horizon(self) -> float:
-        return self.value.module.horizon
+        return cast(Value, self.value.module).horizon

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import torch
 from tensordict import TensorDictBase
 from tensordict.utils import NestedKey
 from torchrl.data import Composite, Unbounded
@@ -39,7 +40,7 @@ class ActionChangePenalty(Transform):
 
     def _reset(self, tensordict: TensorDictBase, tensordict_reset: TensorDictBase) -> TensorDictBase:
         like = tensordict_reset[self.last_action_key]
-        return tensordict_reset.set(self.term_key, like.new_zeros((*like.shape[:-1], 1)))
+        return tensordict_reset.set(self.term_key, torch.zeros_like(like[..., :1]))
 
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
         raise RuntimeError("ActionChangePenalty needs the step before: append it to an environment")
@@ -51,5 +52,7 @@ class ActionChangePenalty(Transform):
 
     def transform_observation_spec(self, observation_spec: Composite) -> Composite:
         like = observation_spec[self.last_action_key]
-        observation_spec[self.term_key] = Unbounded(shape=(*like.shape[:-1], 1), dtype=like.dtype, device=like.device)
+        observation_spec[self.term_key] = Unbounded(
+            shape=torch.Size([*like.shape[:-1], 1]), dtype=like.dtype, device=like.device
+        )
         return observation_spec

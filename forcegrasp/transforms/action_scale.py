@@ -23,8 +23,8 @@ class ActionScale(Transform):
         super().__init__(in_keys_inv=[delta_key], out_keys_inv=[action_key])
         self.max_delta = max_delta
 
-    def _inv_apply_transform(self, action: Tensor) -> Tensor:
-        return action.clamp(-1, 1) * self.max_delta
+    def _inv_apply_transform(self, state: Tensor) -> Tensor:
+        return state.clamp(-1, 1) * self.max_delta
 
     def transform_input_spec(self, input_spec: Composite) -> Composite:
         input_spec = input_spec.clone()

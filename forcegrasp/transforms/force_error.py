@@ -29,7 +29,8 @@ class ForceError(Transform):
         goal, force = (next_tensordict[key] for key in self.in_keys)
         return next_tensordict.set(self.out_keys[0], goal - force)
 
-    forward = _call
+    def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
+        return self._call(tensordict)
 
     def _reset(self, tensordict: TensorDictBase, tensordict_reset: TensorDictBase) -> TensorDictBase:
         return self._call(tensordict_reset)

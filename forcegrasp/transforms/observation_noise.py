@@ -45,7 +45,8 @@ class ObservationNoise(Transform):
             next_tensordict.set(out_key, value + std * noise.to(value.device))
         return next_tensordict
 
-    forward = _call
+    def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
+        return self._call(tensordict)
 
     def _reset(self, tensordict: TensorDictBase, tensordict_reset: TensorDictBase) -> TensorDictBase:
         return self._call(tensordict_reset)
