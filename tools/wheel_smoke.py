@@ -24,7 +24,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-LEFT_OUT = ("runs", "build", "dist", "multirun", "*.egg-info", "__pycache__", ".*")
+#: What is no source, at the top and anywhere.
+MADE_HERE, MADE = ("runs", "build", "dist", "multirun"), ("*.egg-info", "__pycache__", ".*")
 TINY = ["ppo.total_frames=24", "ppo.grasps=2", "grasp.steps=4", "ppo.hidden=[4]", "log.checkpoint_every=1"]
 SMALL = ["trials=2", "kappas=1", "grasp.steps=4", "physics=fast"]
 LIMIT_S = 900
@@ -136,7 +137,10 @@ def smoke(folder: Path) -> int:
 def build(folder: Path) -> Path:
     """Returns the wheel, made from the sdist, made from a copy of the checkout."""
     source, dist = folder / "source", folder / "dist"
-    shutil.copytree(ROOT, source, ignore=shutil.ignore_patterns(*LEFT_OUT))
+    anywhere = shutil.ignore_patterns(*MADE)
+    shutil.copytree(
+        ROOT, source, ignore=lambda at, names: anywhere(at, names) | (set(MADE_HERE) if Path(at) == ROOT else set())
+    )
     venv.create(folder / "builder", with_pip=True)
     python = folder / "builder" / "bin" / "python"
     dist.mkdir()
