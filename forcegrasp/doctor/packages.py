@@ -122,8 +122,10 @@ def check_requirements() -> Iterator[Finding]:
 def check_torch_family() -> Iterator[Finding]:
     """The torch packages: a wrong pair fails when it is imported, or worse, later."""
     needed = [r for r in requirements("forcegrasp") if r.name in TORCH_FAMILY]
-    wants = [*needed, *(r for name in TORCH_FAMILY for r in requirements(name) if r.name in TORCH_FAMILY)]
-    wrong = list(dict.fromkeys(text for r in wants if (text := trouble(r))))
+    wrong = [text for r in needed if (text := trouble(r))]
+    for name in TORCH_FAMILY:
+        wants = [str(r) for r in requirements(name) if r.name in TORCH_FAMILY and trouble(r)]
+        wrong += [f"{name} wants {', '.join(wants)}"] * bool(wants)
     versions = [f"{name} {found.version}" for name in TORCH_FAMILY if (found := installed(name))]
     if wrong:
         together = " ".join(f"'{r}'" for r in needed)
@@ -142,9 +144,11 @@ def check_mujoco() -> Iterator[Finding]:
     elif needed and (text := trouble(needed)):
         old = found.version.startswith(("2.", "3."))
         yield mend("MuJoCo", text, AFRESH if old else f"pip install '{needed}'")
-    elif core is None or core.version != found.version:
-        has = f"mujoco-core is {core.version}" if core else "its part mujoco-core is not installed"
-        yield mend("MuJoCo", f"mujoco is {found.version}, but {has}", AFRESH)
+    elif core is None:
+        yield mend("MuJoCo", f"mujoco is {found.version}, but its part mujoco-core is not installed", AFRESH)
+    elif core.version != found.version:
+        same = " ".join(f"'{part}=={found.version}'" for part in ("mujoco", "mujoco-core", "mujoco-studio"))
+        yield mend("MuJoCo", f"mujoco is {found.version}, but mujoco-core {core.version}", f"pip install {same}")
     elif lost := [file for file in core.files or [] if file.suffix != ".pyc" and not Path(file.locate()).exists()]:
         told = f"{len(lost)} files of mujoco-core are missing ({lost[0].name}, …), as after an upgrade from 3.x"
         yield mend("MuJoCo", told, AFRESH)
@@ -162,9 +166,9 @@ def check_imports() -> Iterator[Finding]:
     absent = [name for name, error in wrong if error.endswith(f"No module named '{name.partition('.')[0]}'")]
     if absent:
         yield mend("imports", f"not there: {', '.join(absent)}", "install what is missing, or make a new environment")
-    for name, error in wrong:
-        if name not in absent:
-            yield mend("imports", f"{name} can't be imported ({error})", "mend its version, or make a new environment")
+    for error in dict.fromkeys(error for name, error in wrong if name not in absent):
+        names = ", ".join(name for name, its_error in wrong if its_error == error)
+        yield mend("imports", f"{names} can't be imported ({error})", "mend its version, or make a new environment")
     if not wrong:
         yield fine("imports", f"all {len(MODULES)} modules can be imported")
 

@@ -64,7 +64,10 @@ def test_requirements_are_left_to_another_check_without_metadata(environment):
 @pytest.mark.parametrize(
     ("versions", "text"),
     [
-        ({"tensordict": "0.15.0"}, "tensordict 0.15.0 is installed, <0.15.0,>=0.14.3 is needed"),
+        (
+            {"tensordict": "0.15.0"},
+            "tensordict 0.15.0 is installed, ==0.14.3 is needed, torchrl wants tensordict<0.15.0",
+        ),
         ({"torchrl": "0.13.2"}, "torchrl 0.13.2 is installed, ==0.14.1 is needed"),
         ({"torch": "2.12.1"}, "torch 2.12.1 is installed, ~=2.13.0 is needed"),
         ({"torch": "2.14.0+cu130", "torchrl": "0.15.0", "tensordict": "0.15.0"}, "do not work together"),
@@ -97,14 +100,17 @@ def test_mujoco_5(environment, told):
     assert told(check_mujoco, "mend").endswith("pip install 'mujoco~=4.0.0'")
 
 
-@pytest.mark.parametrize("core", [None, "4.0.1"])
-def test_mujoco_in_unlike_parts(core, environment, told):
-    if core:
-        environment["mujoco-core"].version = core
-    else:
-        del environment["mujoco-core"]
+def test_mujoco_in_unlike_parts(environment, told):
+    environment["mujoco-core"].version = "4.0.1"
     line = told(check_mujoco, "mend")
-    assert core or "mujoco-core is not installed" in line
+    assert "mujoco is 4.0.0, but mujoco-core 4.0.1" in line
+    assert line.endswith("pip install 'mujoco==4.0.0' 'mujoco-core==4.0.0' 'mujoco-studio==4.0.0'")
+
+
+def test_mujoco_without_its_core(environment, told):
+    del environment["mujoco-core"]
+    line = told(check_mujoco, "mend")
+    assert "mujoco-core is not installed" in line
     assert "fresh environment" in line
 
 
@@ -154,6 +160,14 @@ def test_broken_module(program, text, told, monkeypatch, tmp_path):
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     monkeypatch.setattr(packages, "MODULES", ("json", "broken"))
     assert text in told(check_imports, "mend")
+
+
+def test_modules_that_break_alike_are_one_line(told, monkeypatch, tmp_path):
+    (tmp_path / "one.py").write_text("raise OSError('no library')")
+    (tmp_path / "two.py").write_text("import one")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    monkeypatch.setattr(packages, "MODULES", ("one", "two"))
+    assert "one, two can't be imported (OSError: no library)" in told(check_imports, "mend")
 
 
 def test_missing_modules(told, monkeypatch):
