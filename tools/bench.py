@@ -30,7 +30,7 @@ from forcegrasp.train.loop import Trainer  # noqa: E402
 STEPS = 150
 
 
-def raw_engine(n: int, physics: PhysicsConfig) -> Callable[[], None]:
+def raw_engine(n: int, physics: PhysicsConfig) -> Callable[[], object]:
     """MuJoCo's own rollout over a recorded sequence of commands: no Python between the physics steps."""
     simulator = _closed_simulator(n, physics)
     substeps = round(0.04 / simulator.model.opt.timestep)
@@ -52,7 +52,7 @@ def raw_engine(n: int, physics: PhysicsConfig) -> Callable[[], None]:
     return run
 
 
-def simulator_loop(n: int, physics: PhysicsConfig) -> Callable[[], None]:
+def simulator_loop(n: int, physics: PhysicsConfig) -> Callable[[], object]:
     simulator = _closed_simulator(n, physics)
     delta = np.full((n, 2), -0.003)
 
@@ -64,7 +64,7 @@ def simulator_loop(n: int, physics: PhysicsConfig) -> Callable[[], None]:
     return run
 
 
-def env_loop(n: int, physics: PhysicsConfig) -> Callable[[], None]:
+def env_loop(n: int, physics: PhysicsConfig) -> Callable[[], object]:
     env = GraspEnv(n, physics)
 
     def close(tensordict):
@@ -73,7 +73,7 @@ def env_loop(n: int, physics: PhysicsConfig) -> Callable[[], None]:
     return lambda: env.rollout(STEPS, close, break_when_any_done=False)
 
 
-def transformed_env_loop(n: int, physics: PhysicsConfig) -> Callable[[], None]:
+def transformed_env_loop(n: int, physics: PhysicsConfig) -> Callable[[], object]:
     env, close = build_env(n, physics=physics), Constant(-1.0)
     return lambda: env.rollout(STEPS, close, break_when_any_done=False)
 
@@ -89,12 +89,12 @@ def _closing_trainer(n: int, physics: PhysicsConfig) -> Trainer:
     return trainer
 
 
-def collection(n: int, physics: PhysicsConfig) -> Callable[[], None]:
+def collection(n: int, physics: PhysicsConfig) -> Callable[[], object]:
     batches = iter(_closing_trainer(n, physics).collector())
     return lambda: next(batches)
 
 
-def training(n: int, physics: PhysicsConfig) -> Callable[[], None]:
+def training(n: int, physics: PhysicsConfig) -> Callable[[], object]:
     trainer = _closing_trainer(n, physics)
     batches = iter(trainer.collector())
     return lambda: trainer.ppo.update(next(batches), trainer.shuffle)
@@ -117,7 +117,7 @@ def _closed_simulator(n: int, physics: PhysicsConfig) -> GraspSimulator:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--grasps", type=int, default=256)
     parser.add_argument("--tier", choices=("fast", "reference"), default="fast")
     parser.add_argument("--threads", type=int, default=0)

@@ -30,11 +30,11 @@ TOLERANCES = {
     "fast": {"steps": 0, "free positions": 1e-9, "positions": 1e-9, "forces": 1e-6, "mean forces": 1e-7},
 }
 GRASPS = GraspParameters(
-    kappa=[0.0, 0.2, 0.4, 0.6, 0.8, 1.0],
-    b2=[-9.0, -13.0, -11.0, -9.0, -7.5, -6.0],
-    radius_m=[0.020, 0.035, 0.031, 0.026, 0.030, 0.033],
-    offset_m=[0.0, 0.004, -0.008, 0.012, 0.0, -0.005],
-    goal_force_n=[0.1] * 6,
+    kappa=np.array([0.0, 0.2, 0.4, 0.6, 0.8, 1.0]),
+    b2=np.array([-9.0, -13.0, -11.0, -9.0, -7.5, -6.0]),
+    radius_m=np.array([0.020, 0.035, 0.031, 0.026, 0.030, 0.033]),
+    offset_m=np.array([0.0, 0.004, -0.008, 0.012, 0.0, -0.005]),
+    goal_force_n=np.full(6, 0.1),
 )
 
 

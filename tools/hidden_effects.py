@@ -75,6 +75,7 @@ def right_names(job: Job) -> set[str]:
 
 def run_job(job: Job) -> dict:
     """Records and diagnoses one set."""
+    from forcegrasp.cli.measuring import refuse_table
     from forcegrasp.compare import workflow
     from forcegrasp.measure import replay
     from tests.independent.rig import record
@@ -84,7 +85,7 @@ def run_job(job: Job) -> dict:
     try:
         truth = record(folder / "set", dict.fromkeys(job.hidden, job.size), job.seed, job.grasps, contact=job.contact)
         started = time.perf_counter()
-        loaded = workflow.load(folder / "set")
+        loaded = refuse_table(workflow.load(folder / "set"), "fit")
         diagnosis, _ = workflow.diagnose_set(loaded, None, [], 0, lambda text: None)
         seconds = time.perf_counter() - started
         numerical = workflow.numerical_error(diagnosis.fit, diagnosis.target)

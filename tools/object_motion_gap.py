@@ -119,7 +119,7 @@ def simulate(which: Sequence[Case]) -> tuple[np.ndarray, np.ndarray]:
     for _ in range(round(SECONDS / PERIOD_S)):
         force = plant.measured_force + noise[:, None] * rng.standard_normal((n, 2))
         touched |= np.abs(force) >= touch[:, None]
-        both = touched.all(axis=1)
+        both = np.all(touched, axis=1)
         first = both & np.isnan(at_touch)
         at_touch[first] = np.abs(plant.object_position - start)[first]
         error = (goal[:, None] - force) / STIFFNESS_N_M
@@ -183,7 +183,7 @@ def draw(which: Sequence[Case], mean: np.ndarray) -> Figure:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--figure", type=Path, default=Path("docs/figures/object_motion_gap.png"))
     parser.add_argument("--table", type=Path, help="also writes all cases, as Markdown")
     options = parser.parse_args()

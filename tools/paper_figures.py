@@ -293,7 +293,7 @@ def render() -> None:
     from forcegrasp.physics import GraspParameters, GraspSimulator
 
     simulator = GraspSimulator(1, threads=1)
-    simulator.reset(GraspParameters(0.5, -9.0, 0.025, 0.006, 0.5))
+    simulator.reset(GraspParameters.from_array(np.array([[0.5, -9.0, 0.025, 0.006, 0.5]])))
     renderer = mujoco.Renderer(simulator.scene(0)[0], *PICTURES[1:3])
     camera = mujoco.MjvCamera()
     camera.lookat, camera.distance, camera.azimuth, camera.elevation = (0, 0, 0.045), 0.27, 190, -24
@@ -334,7 +334,7 @@ def main() -> None:
     names = options.only or list(FIGURES)
     for count, name in enumerate(names, 1):
         began = time.monotonic()
-        print(f"[{count}/{len(names)}] {FIGURES[name].__doc__.splitlines()[0]}", flush=True)
+        print(f"[{count}/{len(names)}] {(FIGURES[name].__doc__ or name).splitlines()[0]}", flush=True)
         figure, text = FIGURES[name]()
         if figure is not None:
             path = options.out / f"paper_{name}.png"

@@ -7,6 +7,7 @@ import time
 from collections import defaultdict
 from pathlib import Path
 
+from forcegrasp.cli.measuring import refuse_table
 from forcegrasp.compare import fit, floor, predict, score, workflow
 
 PARTS = {fit: "fits", score: "signatures of all effects", floor: "numerical floor"}
@@ -28,8 +29,8 @@ def main() -> None:
         return run
 
     for module, part in PARTS.items():
-        module.predict = timed(part)
-    loaded = workflow.load(Path(sys.argv[1]))
+        vars(module)["predict"] = timed(part)
+    loaded = refuse_table(workflow.load(Path(sys.argv[1])), "fit")
     wall, processor = time.perf_counter(), time.process_time()
     diagnosis, _ = workflow.diagnose_set(loaded, None, [], 0, lambda text: None)
     wall, processor = time.perf_counter() - wall, time.process_time() - processor

@@ -47,7 +47,7 @@ def real_table() -> FinalForceTable:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--figure", type=Path, default=Path("docs/figures/real_table.png"))
     parser.add_argument("--report", type=Path, help="also writes the HTML report")
     options = parser.parse_args()

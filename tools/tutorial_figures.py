@@ -76,7 +76,7 @@ def make(folder: Path) -> None:
         return write(path, title, lead, sections, facts)
 
     def filled(match: re.Match) -> str:
-        wanted = commands(match[1])
+        wanted, printed = commands(match[1]), ""
         if any(arguments[1] in ("train", "evaluate") for arguments in wanted):
             return match[0]
         for arguments in wanted:
