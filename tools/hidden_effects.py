@@ -128,7 +128,7 @@ def run(only: str, workers: int) -> None:
     todo = [job for job in jobs() if job.name not in done and re.search(only, job.name)]
     RESULTS.parent.mkdir(exist_ok=True)
     print(f"{len(todo)} sets to diagnose, {len(done)} done")
-    with ProcessPoolExecutor(workers, max_tasks_per_child=8) as pool:
+    with ProcessPoolExecutor(workers) as pool:
         running = {pool.submit(run_job, job): job for job in todo}
         for number, future in enumerate(as_completed(running), 1):
             try:

@@ -16,8 +16,10 @@ from forcegrasp.compare.target import Target
 STARTS = 3
 # The further starts see this many grasps of each object: enough to tell whether there is another optimum.
 _GRASPS_PER_OBJECT = 2
-# Starts agree if their costs do to this share, or to this much per residual.
+# Starts end in the same place if their costs agree to this share, or to this much per residual.
 _SAME_SHARE, _SAME_COST = 0.01, 0.002
+# Where an effect is missing the ground is rough: starts agree if their costs beyond the noise do to this share.
+_SAME_BEYOND = 0.2
 # Largest slope at an optimum, in standard errors of the parameter; those of a noisy simulator never vanish.
 _FLAT = 5.0
 
@@ -54,7 +56,7 @@ def fit_base(
     tolerance = max(_SAME_SHARE * best.cost, _SAME_COST * count)
     if ends[0].cost - best.cost > tolerance:  # another start found a better place
         first = fit_once(target, problem, simulators, small.enlarge(best))
-    if sum(f.cost - best.cost <= tolerance for f in ends) < 2:
+    if sum(f.cost - best.cost <= max(tolerance, _SAME_BEYOND * (best.cost - count)) for f in ends) < 2:
         spread = ", ".join(f"{error:.2f}" for error in errors)
         return BaseFit(first, errors, False, f"the starts end in different places (errors of {spread} × noise)")
     checked = check_gradient(first, target, errors)
