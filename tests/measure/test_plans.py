@@ -61,7 +61,7 @@ def test_objects_in_turn(name):
         radius = RADII[p.object]
         assert abs(p.offset_m) + radius < OPEN_M  # inside the open gripper
         assert abs(p.offset_m) < radius / 3
-        assert radius - OPEN_M / 15 - 1e-12 <= p.command_m.min() < radius
+        assert radius - OPEN_M / 9 - 1e-12 <= p.command_m.min() < radius
         assert p.kind in MENU
 
 
@@ -84,7 +84,7 @@ def test_close_and_hold_is_always_the_same_but_for_the_object():
     planned = plan("close_and_hold")
     for p in planned:
         assert p.offset_m == 0
-        assert np.array_equal(p.command_m, make_command("close and hold", RADII[p.object], OPEN_M, OPEN_M / 15))
+        assert np.array_equal(p.command_m, make_command("close and hold", RADII[p.object], OPEN_M, OPEN_M / 9))
 
 
 def test_seed_decides():
