@@ -122,6 +122,11 @@ class RewardConfig:
         source="paper, eq. 8",
         choices=("paper", "goal_normalised"),
     )
+    forces: str = option(
+        "true",
+        "forces that r_force judges: the true ones, or what the sensors say before noise; they differ with a model only",
+        choices=("true", "measured"),
+    )
     force_weight: float = option(1.0, "α₁", source="authors' code", low=0, high=1000)
     object_weight: float = option(1.0, "α₂ once the curriculum has ended", source="paper, Table 2", low=0, high=1000)
     action_weight: float = option(0.2, "α₃", source="authors' code", low=0, high=1000)

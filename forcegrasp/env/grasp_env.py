@@ -102,9 +102,10 @@ class GraspEnv(EnvBase):
     def _step(self, tensordict: TensorDictBase) -> TensorDictBase:
         self.simulator.step(tensordict.get("joint_delta").numpy().astype(np.float64))
         state, config = self._state(), self.reward_config
-        terms = state.get("reward_terms")
-        force = terms.get("force_paper" if config.form == "paper" else "force_normalised")
-        reward = config.force_weight * force + config.object_weight * terms.get("object")
+        goal = state.get("goal_force")
+        error = goal - state.get("force" if config.forces == "true" else "measured_force")
+        force = force_reward(error) if config.form == "paper" else normalised_force_reward(error, goal)
+        reward = config.force_weight * force + config.object_weight * state["reward_terms", "object"]
         return state.set("reward", reward).update(self._done())
 
     def _state(self) -> TensorDict:

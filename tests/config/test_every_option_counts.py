@@ -87,6 +87,7 @@ TRAIN_CASES: dict[str, Any] = {
     "action.bias_one_contact": 0.5,
     "action.bias_floor": 0.5,
     "reward.form": "goal_normalised",
+    "reward.forces": "measured",
     "reward.force_weight": 2.0,
     "reward.object_weight": 2.0,
     "reward.action_weight": 1.0,
@@ -273,10 +274,16 @@ def test_the_same_evaluation_finds_the_same(tmp_path, plain_evaluation, learned)
     assert evaluated(tmp_path, **learned) == plain_evaluation
 
 
-@pytest.mark.parametrize("name", TRAIN_CASES)
+@pytest.mark.parametrize("name", [name for name in TRAIN_CASES if name != "reward.forces"])
 def test_option_of_train(name, tmp_path, plain_training):
     different = trained(tmp_path, **{name: TRAIN_CASES[name]})
     assert different != plain_training
+
+
+def test_forces_that_the_reward_judges_differ_with_a_model(tmp_path):
+    model = TRAIN_CASES["model"]
+    one, other = (trained(tmp_path / f, **{"model": model, "reward.forces": f}) for f in ("true", "measured"))
+    assert one["weights"] != other["weights"]
 
 
 @pytest.mark.parametrize("name", [name for name in EVALUATE_CASES if name not in ("out", "physics.threads")])
