@@ -123,9 +123,9 @@ class RewardConfig:
         choices=("paper", "goal_normalised"),
     )
     forces: str = option(
-        "true",
-        "forces that r_force judges: the true ones, or what the sensors say before noise; they differ with a model only",
-        choices=("true", "measured"),
+        "actual",
+        "forces that r_force judges: actual ones, or those measured, before noise; they differ only with a model",
+        choices=("actual", "measured"),
     )
     force_weight: float = option(1.0, "α₁", source="authors' code", low=0, high=1000)
     object_weight: float = option(1.0, "α₂ once the curriculum has ended", source="paper, Table 2", low=0, high=1000)

@@ -103,7 +103,7 @@ class GraspEnv(EnvBase):
         self.simulator.step(tensordict.get("joint_delta").numpy().astype(np.float64))
         state, config = self._state(), self.reward_config
         goal = state.get("goal_force")
-        error = goal - state.get("force" if config.forces == "true" else "measured_force")
+        error = goal - state.get("measured_force" if config.forces == "measured" else "force")
         force = force_reward(error) if config.form == "paper" else normalised_force_reward(error, goal)
         reward = config.force_weight * force + config.object_weight * state["reward_terms", "object"]
         return state.set("reward", reward).update(self._done())

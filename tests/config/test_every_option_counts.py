@@ -282,7 +282,7 @@ def test_option_of_train(name, tmp_path, plain_training):
 
 def test_forces_that_the_reward_judges_differ_with_a_model(tmp_path):
     model = TRAIN_CASES["model"]
-    one, other = (trained(tmp_path / f, **{"model": model, "reward.forces": f}) for f in ("true", "measured"))
+    one, other = (trained(tmp_path / f, **{"model": model, "reward.forces": f}) for f in ("actual", "measured"))
     assert one["weights"] != other["weights"]
 
 
