@@ -58,7 +58,7 @@ GYMNASIUM = "import gymnasium, forcegrasp; print(gymnasium.make('forcegrasp/Gras
 TYPED = "from importlib.resources import files; print((files('forcegrasp') / 'py.typed').read_text())"
 SHIPPED = f"""
 from forcegrasp.cli.main import main
-from forcegrasp.runs.policy import shipped_policies
+from forcegrasp.policies import shipped_policies
 names = ",".join([*shipped_policies(), "force_pi"])
 raise SystemExit(main(["evaluate", f"policies=[{{names}}]", *{SMALL}, "out=shipped"]))
 """

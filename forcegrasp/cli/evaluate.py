@@ -10,16 +10,21 @@ from forcegrasp.errors import ConfigError
 
 PURPOSE = "compare policies and controllers on the same simulated grasps"
 NOTES = """
-  policies=[A,B]   run directories of forcegrasp train, or controllers: force_pi (Lach et al. 2022), informed (knows the
-                   object's force scale: the mark to reach), close, nothing
-  out=DIR          where to write figures, trials.csv and evaluation.json; runs/evaluate_TIME by default
+  policies=[A,B]   run directories of forcegrasp train; policies that come with the package: {shipped};
+                   or controllers: force_pi (Lach et al. 2022), informed (knows the object's force scale: the mark to
+                   reach), close, nothing
+  plan=paper       the paper's simulation experiment; objects: its six objects in the training simulator;
+                   virtual_robot: the same on a gripper with effects that the training simulator does not have
+  out=DIR          where to write figures, tables.md, trials.csv and evaluation.json; runs/evaluate_TIME by default
 """
 
 
 def main(arguments: list[str]) -> int:
     """Runs the verb; returns the exit status."""
     if any(a in ("-h", "--help") for a in arguments):
-        print(help_text("evaluate", PURPOSE, NOTES), end="")
+        from forcegrasp.policies import shipped_policies
+
+        print(help_text("evaluate", PURPOSE, NOTES.format(shipped=", ".join(shipped_policies()) or "none")), end="")
         return 0
     config = compose("evaluate", arguments)
     out = Path(config.out or f"runs/evaluate_{time.strftime('%Y-%m-%d_%H-%M-%S')}")

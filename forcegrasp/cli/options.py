@@ -84,7 +84,8 @@ def _compose(verb: str, overrides: list[str]) -> tuple[Any, dict[str, Any]]:
     GlobalHydra.instance().clear()
     try:
         with initialize_config_module("forcegrasp.conf", version_base="1.3"):
-            composed = hydra_compose(verb, overrides=overrides, return_hydra_config=True)
+            full = [_full_name(verb, override) for override in overrides]
+            composed = hydra_compose(verb, overrides=full, return_hydra_config=True)
         HydraConfig.instance().set_config(composed)
         hydra = {"run": {"dir": str(composed.hydra.run.dir)}, "sweeper": composed.hydra.sweeper}
         hydra["sweep"] = {"dir": str(composed.hydra.sweep.dir)}
@@ -112,15 +113,22 @@ def register_schemas() -> None:
 
 
 def groups(verb: str) -> dict[str, list[str]]:
-    """Config groups of a verb and their choices, from conf/."""
-    text = (files("forcegrasp.conf") / f"{verb}.yaml").read_text()
-    found = {}
-    for folder in sorted(files("forcegrasp.conf").iterdir(), key=lambda f: f.name):
-        if folder.is_dir() and f"- {folder.name}:" in text:
-            found[folder.name] = sorted(
-                f.name.removesuffix(".yaml") for f in folder.iterdir() if f.name.endswith(".yaml")
-            )
-    return found
+    """Config groups of a verb and their choices, from conf/; a group of one verb alone lies in conf/VERB."""
+    conf = files("forcegrasp.conf")
+    text = (conf / f"{verb}.yaml").read_text()
+    own = conf / verb
+    folders = {f.name: f for f in conf.iterdir() if f.is_dir() and f"- {f.name}:" in text}
+    folders |= {f.name: f for f in own.iterdir()} if own.is_dir() else {}
+    return {
+        name: sorted(f.name.removesuffix(".yaml") for f in folder.iterdir() if f.name.endswith(".yaml"))
+        for name, folder in sorted(folders.items())
+    }
+
+
+def _full_name(verb: str, override: str) -> str:
+    """The override as Hydra wants it: groups of one verb are typed without its name."""
+    group = override.partition("=")[0]
+    return f"{verb}/{override}" if (files("forcegrasp.conf") / verb / group).is_dir() and group else override
 
 
 def leaves(schema: Any, prefix: str = "") -> Iterator[tuple[str, dataclasses.Field, Any]]:

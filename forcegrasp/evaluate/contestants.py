@@ -10,7 +10,8 @@ from tensordict.nn import TensorDictModuleBase
 from forcegrasp.config import ActionConfig, ObservationConfig, TrainConfig
 from forcegrasp.controllers import CONTROLLERS, make_controller
 from forcegrasp.errors import ConfigError, closest
-from forcegrasp.runs.policy import load_policy, shipped_policies
+from forcegrasp.policies import shipped_policies
+from forcegrasp.runs.policy import load_policy
 
 
 @dataclass

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from importlib.resources import files
 from pathlib import Path
 
 from torchrl.modules import ProbabilisticActor
@@ -11,12 +10,7 @@ from forcegrasp.config import TrainConfig
 from forcegrasp.controllers.policy import make_policy
 from forcegrasp.errors import CheckpointError
 from forcegrasp.runs.run_dir import RunDir
-
-
-def shipped_policies() -> list[str]:
-    """Names of the policies that come with the package; each has a card beside it."""
-    folder = files("forcegrasp.policies")
-    return sorted(entry.name for entry in folder.iterdir() if (entry / "config.yaml").is_file())
+from forcegrasp.policies import FOLDER, shipped_policies
 
 
 def load_policy(name: Path | str) -> tuple[ProbabilisticActor, TrainConfig]:
@@ -27,8 +21,7 @@ def load_policy(name: Path | str) -> tuple[ProbabilisticActor, TrainConfig]:
     Raises:
       CheckpointError: if there is no such policy or run, or its newest checkpoint is of another configuration.
     """
-    shipped = str(name) in shipped_policies()
-    run = RunDir.open(Path(str(files("forcegrasp.policies") / str(name))) if shipped else name)
+    run = RunDir.open(FOLDER / str(name) if str(name) in shipped_policies() else name)
     config = run.config()
     tensors, _ = run.load()
     size = 2 * len(config.observation.parts) * config.observation.frames

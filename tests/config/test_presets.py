@@ -12,7 +12,7 @@ from forcegrasp.config import EvaluateConfig, TrainConfig
 from forcegrasp.runs.started_with import DEFAULT_EXPERIMENT
 
 CONF = Path(__file__).parents[2] / "conf"
-FILES = sorted(path for path in CONF.glob("*/*.yaml"))
+FILES = sorted(CONF.glob("*/**/*.yaml"))
 EXPERIMENTS = sorted(path.stem for path in CONF.glob("experiment/*.yaml"))
 SWEEPS = sorted(path.stem for path in CONF.glob("sweep/*.yaml"))
 #: Presets that set options; those of ``sweep`` tell Hydra's sweeper what to combine.
@@ -22,6 +22,12 @@ CHOICES = [
     for path in FILES
     if path.parent.name in set(groups(verb)) - {"sweep"}
 ]
+
+
+def preset(verb: str, group: str, choice: str) -> Path:
+    """The file of a preset; those of one verb alone lie in a folder of its name."""
+    own = CONF / verb / group / f"{choice}.yaml"
+    return own if own.exists() else CONF / group / f"{choice}.yaml"
 
 
 def options(config) -> dict:
@@ -42,7 +48,7 @@ def default_choices(verb: str) -> dict[str, str]:
     entries = yaml.safe_load((CONF / f"{verb}.yaml").read_text())["defaults"]
     picked = {}
     for entry in entries:
-        picked |= entry if isinstance(entry, dict) else {}
+        picked |= {key.split("/")[-1]: choice for key, choice in entry.items()} if isinstance(entry, dict) else {}
     return {group: choice for group, choice in picked.items() if not group.startswith("override")}
 
 
@@ -76,7 +82,7 @@ def test_every_group_is_offered():
 @pytest.mark.parametrize(("verb", "group", "choice"), CHOICES)
 def test_preset_sets_what_its_file_says(verb, group, choice):
     composed = options(compose(verb, [f"{group}={choice}"]))
-    named = named_options(CONF / group / f"{choice}.yaml")
+    named = named_options(preset(verb, group, choice))
     assert {name: composed[name] for name in named} == named
 
 
@@ -92,9 +98,7 @@ def test_defaults_live_in_the_dataclasses(verb, group, choice):
     if choice == default_choices(verb)[group]:
         return
     default = options(SCHEMAS[verb]())
-    repeated = [
-        name for name, value in named_options(CONF / group / f"{choice}.yaml").items() if default[name] == value
-    ]
+    repeated = [name for name, value in named_options(preset(verb, group, choice)).items() if default[name] == value]
     assert not repeated
 
 
@@ -176,7 +180,7 @@ def test_experiments_mix_with_every_other_preset(experiment):
     mixed = options(train(f"experiment={experiment}", *(f"{group}={choice}" for group, choice in others.items())))
     for group, choice in others.items():
         # an ablation stays one: what it takes away, no other preset brings back
-        named = named_options(CONF / group / f"{choice}.yaml") | own
+        named = named_options(preset("train", group, choice)) | own
         assert {name: mixed[name] for name in named} == named
 
 

@@ -20,7 +20,8 @@ from forcegrasp.evaluate.compare_policies import evaluate
 from forcegrasp.evaluate.contestants import load_contestants
 from forcegrasp.evaluate.grids import kappa_grid
 from forcegrasp.evaluate.rollouts import roll_out
-from forcegrasp.runs.policy import load_policy, shipped_policies
+from forcegrasp.policies import shipped_policies
+from forcegrasp.runs.policy import load_policy
 from forcegrasp.runs.run_dir import RunDir
 from forcegrasp.train.loop import Trainer
 
