@@ -9,8 +9,8 @@ from torchrl.modules import ProbabilisticActor
 from forcegrasp.config import TrainConfig
 from forcegrasp.controllers.policy import make_policy
 from forcegrasp.errors import CheckpointError
-from forcegrasp.runs.run_dir import RunDir
 from forcegrasp.policies import FOLDER, shipped_policies
+from forcegrasp.runs.run_dir import RunDir
 
 
 def load_policy(name: Path | str) -> tuple[ProbabilisticActor, TrainConfig]:
