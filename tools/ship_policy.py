@@ -2,7 +2,7 @@
 
     python tools/ship_policy.py RUN_DIR NAME EVALUATION_DIR "what it is, in a sentence"
 
-The evaluation must be one of `forcegrasp evaluate plan=paper` in which the run took part under its folder's name.
+The evaluation must be one in which the run took part under its folder's name: `forcegrasp evaluate plan=paper ...`.
 """
 
 from __future__ import annotations
@@ -64,8 +64,9 @@ def _card(name: str, what: str, made: dict, frames: int, report: dict, figures: 
             "",
             f"    {command}",
             "",
-            f"Evaluated on {len(report['cells'])} softness values × {report['trials']} grasps, physics"
-            f" `{report['physics']}`, seed {report['seed']}:",
+            f"Evaluated on {len(report['cells'])} × {report['trials']} grasps (by {report['what']}), physics"
+            f" `{report['physics']}`, {'model `' + report['model'] + '`, ' if report['model'] else ''}seed"
+            f" {report['seed']}:",
             "",
             "| | mean ± standard deviation | interquartile mean |",
             "|---|---|---|",
