@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
@@ -12,7 +13,7 @@ from forcegrasp.compare.fit import Fit, Simulators, fit_exactly, fit_once
 from forcegrasp.compare.floor import beyond_fit, cells, excess, numerical_error, numerical_floor
 from forcegrasp.compare.heldout import heldout_residual, log_likelihood, make_folds, rms
 from forcegrasp.compare.problem import Problem
-from forcegrasp.compare.score import Background, Score, null_gains, score_effects
+from forcegrasp.compare.score import Background, Score, best_size, null_gains, score_effects
 from forcegrasp.compare.target import Target
 from forcegrasp.effects import Effect
 from forcegrasp.effects.quantisation import Quantisation
@@ -184,7 +185,7 @@ def _look_further(
     ranked = sorted((group[0] for group in groups), key=lambda s: -s.gain)
     null = null_gains(groups, rng)
     held = heldout_residual(fit, target, folds)
-    start = _Round(target, fit, simulators, folds, held)
+    start = _Round(target, fit, simulators, background, folds, held)
     error = rms(held, target)
     bar = float(np.quantile(null, 1 - ALARM))
     beyond = np.sum(fit.residual**2) - target.mask.sum() * 4
@@ -217,12 +218,15 @@ class _Round:
     target: Target
     fit: Fit
     simulators: Simulators
+    background: Background
     folds: Sequence[np.ndarray]
     held: np.ndarray  #: residuals of held-out grasps, ``(G, S, 4)``
 
     def refit(self, score: Score, null: np.ndarray) -> Candidate:
         """A rough fit with one more effect, from where its best signature puts it."""
         p_family = (1 + int(np.sum(null >= score.gain))) / (1 + len(null))
+        values = best_size(score, self.fit, self.target, self.simulators, self.background)
+        score = dataclasses.replace(score, values=values)
         refit = refine([score], self.target, self.fit, self.simulators)
         return self._judge(score.effect, score.variant, refit, p_family, score.signature)
 

@@ -18,6 +18,8 @@ _REACH = 3.0
 
 # Parameters, gain and signature, as in a Score; None where there is no trace.
 _Found = tuple[np.ndarray, float, np.ndarray] | None
+# Sizes around the promised one that are looked at before an effect is fitted.
+_SIZES = (0.4, 0.6, 0.8, 1.0, 1.3, 1.6, 2.0, 2.6)
 
 
 @dataclass(frozen=True)
@@ -71,6 +73,24 @@ def score_effects(
         if scores:
             found[effect, variant] = sorted(scores, key=lambda s: -s.gain)
     return list(found.values())
+
+
+def best_size(score: Score, fit: Fit, target: Target, simulators: Simulators, background: Background) -> np.ndarray:
+    """The effect's parameters with the first one at the size that leaves least, ``(parameters,)``.
+
+    A signature is straight, and thresholds are not: several sizes around the one it promises are simulated.
+    """
+    first = score.effect.parameters[0]
+    if _is_linear(score.effect) or first.logarithmic or score.values[0] == 0:
+        return score.values
+    start = fit.problem.case(fit.vector)
+    sizes = np.unique(np.clip(score.values[0] * np.array(_SIZES), first.low, first.high))
+    tried = [np.array([size, *score.values[1:]]) for size in sizes]
+    cases = [start, *(Case(start.base, (*start.effects, Applied(score.effect, score.variant, t))) for t in tried)]
+    signals = predict(simulators.cheap, cases)
+    change = np.where(target.mask[..., None], (signals[1:] - signals[0]) / target.sigma, 0.0).reshape(len(tried), -1).T
+    left = background.remove(fit.residual.reshape(-1, 1) - change)
+    return tried[int(np.argmin(np.sum(left**2, axis=0)))]
 
 
 def null_gains(scores: list[list[Score]], rng: np.random.Generator, draws: int = 400) -> np.ndarray:
