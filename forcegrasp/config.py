@@ -122,11 +122,6 @@ class RewardConfig:
         source="paper, eq. 8",
         choices=("paper", "goal_normalised"),
     )
-    forces: str = option(
-        "actual",
-        "forces that r_force judges: actual ones, or those measured, before noise; they differ only with a model",
-        choices=("actual", "measured"),
-    )
     force_weight: float = option(1.0, "α₁", source="authors' code", low=0, high=1000)
     object_weight: float = option(1.0, "α₂ once the curriculum has ended", source="paper, Table 2", low=0, high=1000)
     action_weight: float = option(0.2, "α₃", source="authors' code", low=0, high=1000)
@@ -137,6 +132,11 @@ class RewardConfig:
         source="paper, Table 2",
         low=0,
         high=1,
+    )
+    forces: str = option(
+        "actual",
+        "forces that r_force judges: actual ones, or those measured, before noise; they differ only with a model",
+        choices=("actual", "measured"),
     )
 
 

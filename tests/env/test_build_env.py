@@ -21,7 +21,9 @@ from forcegrasp.config import (
 )
 from forcegrasp.effects import get_effect
 from forcegrasp.effects.model_file import Fitted, FoundEffect, Model
+from forcegrasp.effects.variation import read_tiago_model
 from forcegrasp.env import build_env, seed_env
+from forcegrasp.env.reward import normalised_force_reward
 from forcegrasp.errors import ConfigError
 from forcegrasp.physics import FixedGrasps
 from forcegrasp.physics.gripper import load_gripper
@@ -282,7 +284,8 @@ BASE = {
 
 def test_every_option_has_another_value():
     for part, config in BASE.items():
-        assert {field.name for field in dataclasses.fields(config)} - {"threads"} == {*OTHER[part]}
+        # threads never change a result, and measured forces are the true ones without a model
+        assert {field.name for field in dataclasses.fields(config)} - {"threads", "forces"} == {*OTHER[part]}
 
 
 @pytest.mark.parametrize(("part", "option"), [(part, option) for part, values in OTHER.items() for option in values])
@@ -291,6 +294,16 @@ def test_every_option_changes_something(rollout, part, option):
     keys = [("next", key) for key in ("observation", "reward", "joint_position", "goal_force", "truncated")]
     same = [a.shape == b.shape and torch.equal(a, b) for a, b in ((other.get(key), rollout.get(key)) for key in keys)]
     assert not all(same)
+
+
+def test_reward_of_measured_forces_is_that_of_a_models_sensors():
+    model = read_tiago_model("virtual_robot")  # whose force sensors have a dead zone
+    for forces, key in (("actual", "force"), ("measured", "measured_force")):
+        reward = RewardConfig("goal_normalised", object_weight=0.0, action_weight=0.0, forces=forces)
+        after = play(build(reward=reward, model=model))["next"]
+        goal = after["goal_force"]
+        torch.testing.assert_close(after["reward"], normalised_force_reward(goal - after[key], goal))
+        assert not torch.allclose(after["force"], after["measured_force"])
 
 
 @pytest.mark.parametrize(
