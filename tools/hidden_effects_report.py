@@ -168,10 +168,18 @@ def _power(rows: list[dict]) -> None:
                 grid[y, x] = np.mean([r["judged"] in ("first", "in set") for r in chosen])
     figure = Figure(figsize=(6, 7), layout="constrained")
     axes = figure.subplots()
-    axes.imshow(grid, cmap="RdYlGn", vmin=0, vmax=1, aspect="auto")
+    axes.imshow(grid, cmap="viridis", vmin=0, vmax=1, aspect="auto")
     axes.set_xticks(range(len(SIZES)), SIZES)
     axes.set_yticks(range(len(names)), names)
     axes.set_title("found (first, or in the set)")
     for y, x in zip(*np.nonzero(np.isfinite(grid)), strict=True):
-        axes.text(x, y, f"{grid[y, x]:.0%}", ha="center", va="center", fontsize=8)
+        axes.text(
+            x,
+            y,
+            f"{grid[y, x]:.0%}",
+            ha="center",
+            va="center",
+            fontsize=8,
+            color="black" if grid[y, x] > 0.6 else "white",
+        )
     figure.savefig(DOCS / "figures" / "hidden_effects_power.png", dpi=90)
