@@ -56,11 +56,8 @@ def score_effects(
     Returns:
       For each effect and variant all its trials' scores, best first; effects that leave no trace are missing.
     """
-    start = fit.problem.case(fit.vector)
     tried = [(e, variant, values) for e in effects for variant in e.variants for values in e.trials()]
-    cases = [start, *(Case(start.base, (*start.effects, Applied(*t))) for t in tried)]
-    signals = predict(simulators.cheap, cases)
-    change = np.where(target.mask[..., None], (signals[1:] - signals[0]) / target.sigma, 0.0).reshape(len(tried), -1).T
+    change = _changes(tried, fit, target, simulators)
     clean = background.remove(change)
     residual = fit.residual.ravel()
     found: dict[tuple[type[Effect], str], list[Score]] = {}
@@ -83,14 +80,21 @@ def best_size(score: Score, fit: Fit, target: Target, simulators: Simulators, ba
     first = score.effect.parameters[0]
     if _is_linear(score.effect) or first.logarithmic or score.values[0] == 0:
         return score.values
-    start = fit.problem.case(fit.vector)
     sizes = np.unique(np.clip(score.values[0] * np.array(_SIZES), first.low, first.high))
     tried = [np.array([size, *score.values[1:]]) for size in sizes]
-    cases = [start, *(Case(start.base, (*start.effects, Applied(score.effect, score.variant, t))) for t in tried)]
-    signals = predict(simulators.cheap, cases)
-    change = np.where(target.mask[..., None], (signals[1:] - signals[0]) / target.sigma, 0.0).reshape(len(tried), -1).T
+    change = _changes([(score.effect, score.variant, values) for values in tried], fit, target, simulators)
     left = background.remove(fit.residual.reshape(-1, 1) - change)
     return tried[int(np.argmin(np.sum(left**2, axis=0)))]
+
+
+def _changes(
+    tried: Sequence[tuple[type[Effect], str, np.ndarray]], fit: Fit, target: Target, simulators: Simulators
+) -> np.ndarray:
+    """What each effect of that variant and size changes of the signals ÷ noise, ``(N, tried)``, in one simulation."""
+    start = fit.problem.case(fit.vector)
+    cases = [start, *(Case(start.base, (*start.effects, Applied(*t))) for t in tried)]
+    signals = predict(simulators.cheap, cases)
+    return np.where(target.mask[..., None], (signals[1:] - signals[0]) / target.sigma, 0.0).reshape(len(tried), -1).T
 
 
 def null_gains(scores: list[list[Score]], rng: np.random.Generator, draws: int = 400) -> np.ndarray:
