@@ -40,7 +40,7 @@ class PhysicsConfig:
 
     tier: str = option(
         "reference",
-        "reference: the paper's physics. fast: sphere for the pads' contact and 4 ms steps, within sensor noise of it",
+        "reference: the paper's physics. fast: sphere for the pads' contact and 8 ms steps, within sensor noise of it",
         choices=("reference", "fast"),
     )
     threads: int = option(0, "physics threads; 0 uses every core", low=0, high=4096)

@@ -18,6 +18,7 @@ import yaml
 from mujoco.batch import MODEL_FIELDS
 
 from forcegrasp.errors import ConfigError, closest
+from forcegrasp.physics.fast import compile_fast
 
 FORMAT = "forcegrasp-gripper/1"
 _WRITE = re.compile(r"(-?)((?:actuator|dof|geom)_\w+)(?: (\d+))?")
@@ -86,9 +87,8 @@ class Gripper:
         """Returns the scene's model.
 
         Args:
-          tier: ``"reference"`` is the scene as described. ``"fast"``, where the description has ``fast: sphere``, lets
-            the pads touch a sphere in the object's place, which spares the collision of cylinder and box that takes
-            half of the engine's time, and doubles the physics step.
+          tier: ``"reference"`` is the scene as described; ``"fast"``, where the description has ``fast: sphere``, is
+            :mod:`forcegrasp.physics.fast`.
 
         Raises:
           ConfigError: if there is no such tier, or MuJoCo refuses the scene.
@@ -98,33 +98,10 @@ class Gripper:
         try:
             spec = mujoco.MjSpec.from_file(str(self.model))
             if tier == "fast" and self.fast == "sphere":
-                _simplify(spec, self.object_geom, self.axis)
+                return compile_fast(spec, self)
             return spec.compile()
         except ValueError as error:
             raise ConfigError(f"{self.model}: MuJoCo refuses it: {_one_line(error)}") from error
-
-
-# Collision bits of the fast tier: 1 is the pads' contact, 2 that of the ground.
-_PADS, _GROUND = 1, 2
-
-
-def _simplify(spec: mujoco.MjSpec, geom: str, axis: int = 0) -> None:
-    spec.option.timestep *= 2
-    real = spec.geom(geom)
-    radius = real.size[axis if real.type == mujoco.mjtGeom.mjGEOM_BOX else 0]
-    for ground in (real, *spec.worldbody.geoms):
-        ground.contype, ground.conaffinity = _GROUND, _GROUND
-    sphere = real.parent.add_geom(
-        name=f"{geom}_pads",
-        type=mujoco.mjtGeom.mjGEOM_SPHERE,
-        size=[radius, 0, 0],
-        mass=0,
-        contype=_PADS,
-        conaffinity=_PADS,
-        rgba=[0, 0, 0, 0],
-    )
-    for name in ("condim", "priority", "friction", "solref", "solimp"):
-        setattr(sphere, name, getattr(real, name))
 
 
 def shipped_folder() -> Path:

@@ -10,6 +10,7 @@ import numpy as np
 from mujoco.batch import Batch
 
 from forcegrasp.physics import guard
+from forcegrasp.physics.fast import SPHERE
 from forcegrasp.physics.gripper import BaseParameter, Gripper
 
 if TYPE_CHECKING:
@@ -187,7 +188,7 @@ class Plant:
         model, geom = self.model, self.model.geom(self.gripper.object_geom)
         column = self.gripper.axis if geom.type[0] == mujoco.mjtGeom.mjGEOM_BOX else 0
         self._write_base("geom_size", (ids, geom.id, column), radius_m)
-        sphere = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, f"{geom.name}_pads")  # of the fast tier
+        sphere = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, SPHERE.format(geom.name))
         if sphere >= 0:
             self._write_base("geom_size", (ids, sphere, 0), radius_m)
         if np.allclose(self._inertia(geom.size[column : column + 1]), model.body_inertia[self._object_body], rtol=1e-9):

@@ -101,8 +101,8 @@ def test_command_deadband_comes_before_a_delay():
     uses = [(get_effect("command_delay"), [0.05], "", [0]), (get_effect("command_deadband"), [0.0003], "held", [0])]
     plant = make_plant(1, uses)
     start(plant, [0])
-    plant.advance(np.full((1, 2), START_M), 10)
-    plant.advance(np.full((1, 2), START_M - 0.001), 10)
+    for command in (START_M, START_M - 0.001):
+        plant.advance(np.full((1, 2), command), round(0.04 / plant.dt))
     assert plant.position[0, 0] == pytest.approx(START_M, abs=1e-7)
     plant.advance(np.full((1, 2), START_M - 0.001), 200, fresh=False)
     assert plant.position[0, 0] < START_M - 0.0009

@@ -1,0 +1,62 @@
+"""The fast tier's larger steps and its sphere, on TIAGo and on grippers that could not take them."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+import pytest
+
+from forcegrasp.physics import GraspParameters, GraspSimulator
+from forcegrasp.physics.fast import compile_fast
+from forcegrasp.physics.gripper import load_gripper
+
+TIAGO = load_gripper("tiago")
+
+
+def _spec(stiffness: float = 100.0, time_constant: float = 0.02) -> mujoco.MjSpec:
+    spec = mujoco.MjSpec.from_file(str(TIAGO.model))
+    for actuator in spec.actuators:
+        actuator.gainprm[0], actuator.biasprm[1] = stiffness, -stiffness
+    spec.geom("object").solref[0] = time_constant
+    return spec
+
+
+@pytest.mark.parametrize("b2", [-13.0, -9.0, -6.0])
+def test_free_fingers_move_as_with_small_steps(b2):
+    """What a larger step does to the servo is taken back: without that they would be 1 mm apart in the end."""
+    simulators = [GraspSimulator(1, tier, threads=1) for tier in ("reference", "fast")]
+    for simulator in simulators:
+        simulator.reset(GraspParameters(0.5, b2, 0.015, 0.0, 0.1))
+    for _ in range(25):
+        for simulator in simulators:
+            simulator.step(np.full((1, 2), -0.003))
+        slow, fast = (simulator.joint_position for simulator in simulators)
+        assert fast == pytest.approx(slow, abs=0.07e-3)
+
+
+@pytest.mark.parametrize(
+    ("stiffness", "time_constant", "step"),
+    [(100, 0.02, 0.008), (600, 0.02, 0.004), (5000, 0.02, 0.002), (100, 0.01, 0.004), (100, 0.005, 0.002)],
+)
+def test_steps_suit_servo_and_contact(stiffness, time_constant, step):
+    model = compile_fast(_spec(stiffness, time_constant), TIAGO)
+    assert model.opt.timestep == step
+    assert model.dof_damping[-2:] == pytest.approx(1 + stiffness * (step - 0.002) / 2)
+
+
+def test_the_sphere_stays_between_the_pads():
+    """The object sinks into the soft floor, and the sphere would sink with it."""
+    simulator = GraspSimulator(1, "fast", threads=1)
+    simulator.reset(GraspParameters(0.5, -9.0, 0.025, 0.0, 0.1))
+    for _ in range(50):
+        simulator.step(np.full((1, 2), -0.001))
+    model, data = simulator.scene(0)
+    assert data.geom("object").xpos[2] == pytest.approx(0.0468, abs=0.2e-3)
+    assert data.geom("object_pads").xpos[2] == pytest.approx(data.geom("pad_l1").xpos[2], abs=0.2e-3)
+    assert model.ngeom == TIAGO.compile().ngeom + 1
+
+
+def test_an_object_that_never_rests_keeps_the_sphere_in_its_middle():
+    spec = _spec()
+    spec.delete(spec.geom("floor"))
+    assert compile_fast(spec, TIAGO).geom("object_pads").pos == pytest.approx(0)
