@@ -1,0 +1,1 @@
+"""How fast it is, layer by layer and beside other stacks: ``python -m tools.bench``."""

@@ -1,0 +1,75 @@
+"""Trainings on the recommended experiment, each telling how its training episodes went, batch by batch.
+
+Both have the same problem, curriculum and number of frames to anneal it over; the reward is the normalised form,
+mean of the episodes of a batch, actions explored.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import TYPE_CHECKING
+
+from forcegrasp.config import TrainConfig
+from tools.bench.peers import sb3_envs, sb3_ppo
+from tools.bench.plain_grasp import PlainGrasp
+
+if TYPE_CHECKING:
+    import numpy as np
+
+#: Takes frames trained so far and the mean reward of the newest episodes.
+Report = Callable[[int, float], None]
+
+
+def recommended(tier: str) -> TrainConfig:
+    """What ``forcegrasp train experiment=recommended`` trains."""
+    from forcegrasp.cli.options import compose
+
+    return compose("train", ["experiment=recommended", f"physics={tier}"])
+
+
+def ours(tier: str, grasps: int, report: Report) -> None:
+    """This project's training; ``grasps`` is the experiment's own."""
+    from forcegrasp.env.episodes import summarise
+    from forcegrasp.train.loop import Trainer
+
+    trainer = Trainer(config := recommended(tier))
+    total, batches = config.ppo.total_frames, iter(trainer.collector())
+    while trainer.frames < total:
+        trainer.curriculum.apply(trainer.frames)
+        batch = next(batches)
+        reward = float(summarise(batch, config.sensors)["force_reward_normalised"].mean())
+        report(trainer.frames + batch.numel(), reward)
+        trainer.ppo.set_progress(trainer.frames / total)
+        trainer.ppo.update(batch, trainer.shuffle)
+        trainer.frames += batch.numel()
+
+
+def sb3(tier: str, grasps: int, report: Report) -> None:
+    """The authors' trainer, in ``grasps`` processes, on the plain environment."""
+    from stable_baselines3.common.callbacks import BaseCallback
+
+    from forcegrasp.curriculum.schedule import LinearSchedule
+
+    config = recommended(tier)
+    schedule = LinearSchedule(config.curriculum, config.grasp, config.reward, config.ppo.total_frames)
+    envs = sb3_envs([partial(PlainGrasp, config, seed) for seed in range(grasps)], PlainGrasp.__module__)
+
+    class Watch(BaseCallback):
+        def _on_rollout_start(self) -> None:
+            self.rewards: list[float] = []
+            envs.env_method("anneal", schedule(self.num_timesteps))
+
+        def _on_step(self) -> bool:
+            infos: list[dict[str, float | np.ndarray]] = self.locals["infos"]
+            self.rewards += [float(info["force_reward"]) for info in infos if "force_reward" in info]
+            return True
+
+        def _on_rollout_end(self) -> None:
+            report(self.num_timesteps, sum(self.rewards) / max(1, len(self.rewards)))
+
+    sb3_ppo(envs).learn(config.ppo.total_frames, callback=Watch())
+
+
+#: Name → training; names that begin with SB3 need it.
+TRAININGS: dict[str, Callable[[str, int, Report], None]] = {"forcegrasp": ours, "SB3": sb3}
