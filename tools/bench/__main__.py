@@ -21,7 +21,7 @@ from rich.console import Console
 
 from tools.bench.case import Case
 from tools.bench.figures import draw
-from tools.bench.learning import TRAININGS
+from tools.bench.learning import LEARNED
 from tools.bench.levels import LEVELS
 from tools.bench.peers import PEERS, missing
 from tools.bench.results import Results, cores, machine
@@ -88,7 +88,7 @@ class Benchmark:
                 results.by_threads += self._measure([Case(name, tier, options.grasps, threads) for name in levels])
                 self._save()
         if options.time_to_reward is not None:
-            for name, tier in zip(TRAININGS, TIERS, strict=True):
+            for name, tier in LEARNED:
                 if not self._left_out(name):
                     case = Case(name, tier, options.processes)
                     with self.console.status("") as status:

@@ -103,7 +103,7 @@ def _learning(results: Results) -> Figure:
     figure = Figure(figsize=(7.5, 4.2), layout="constrained")
     axes = figure.subplots()
     goal = results.learning[0].goal
-    for one, colour in zip(results.learning, (COLOURS["fast"], COLOURS["peer"]), strict=False):
+    for one, colour in zip(results.learning, COLOURS.values(), strict=False):
         reached = one.reached
         verdict = f"{reached[0]:,.0f} s" if reached else f"not in {one.limit_s:,.0f} s, best {one.best:.0f}"
         seconds, _, rewards = zip(*one.curve, strict=True) if one.curve else ((), (), ())

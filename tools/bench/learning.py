@@ -71,5 +71,6 @@ def sb3(tier: str, grasps: int, report: Report) -> None:
     sb3_ppo(envs).learn(config.ppo.total_frames, callback=Watch())
 
 
-#: Name → training; names that begin with SB3 need it.
 TRAININGS: dict[str, Callable[[str, int, Report], None]] = {"forcegrasp": ours, "SB3": sb3}
+#: What is watched, and at which tier. Ours at the other's tier, too: what is left is the stack.
+LEARNED = (("forcegrasp", "fast"), ("forcegrasp", "reference"), ("SB3", "reference"))

@@ -29,14 +29,14 @@ SB3_STEPS = 160
 SB3_MODULE = "stable_baselines3"
 
 
-def view(physics: PhysicsConfig, seed: int) -> gymnasium.Env:
+def view(physics: PhysicsConfig, seed: int, /) -> gymnasium.Env:
     """This project's environment behind gymnasium's interface."""
     from forcegrasp.env.gymnasium_view import GraspGymnasiumEnv
 
     return GraspGymnasiumEnv(seed, physics=physics)
 
 
-def plain(physics: PhysicsConfig, seed: int) -> gymnasium.Env:
+def plain(physics: PhysicsConfig, seed: int, /) -> gymnasium.Env:
     """The same problem in plain numpy."""
     from tools.bench.plain_grasp import PlainGrasp
 
@@ -100,8 +100,9 @@ def sb3_training(case: Case, make: MakeEnv) -> Run:
 
     # as in levels.training, the policy closes and goes on closing
     model = sb3_ppo(sb3_envs(_makers(case, make), MODULES[make]), learning_rate=3e-5, n_steps=SB3_STEPS)
-    torch.nn.init.constant_(model.policy.action_net.bias, -1.0)
-    torch.nn.init.constant_(model.policy.log_std, -0.5)
+    parameters = dict(model.policy.named_parameters())
+    torch.nn.init.constant_(parameters["action_net.bias"], -1.0)
+    torch.nn.init.constant_(parameters["log_std"], -0.5)
 
     def run() -> int:
         model.learn(case.grasps * SB3_STEPS, reset_num_timesteps=False)

@@ -70,7 +70,7 @@ class Worker:
 
     def memory_mb(self) -> float:
         """Peak memory of the group, in MB: each process's peak, with pages that several share counted once."""
-        members = [int(entry.name) for entry in Path("/proc").glob("[0-9]*") if _group(entry) == self._process.pid]
+        members = self._members()
         return sum(map(_peak_kb, members)) / 1024 if members else float("nan")
 
     def end(self, patience_s: float) -> None:
@@ -80,8 +80,9 @@ class Worker:
         with suppress(BrokenPipeError):
             self._process.stdin.close()
         for number in (None, signal.SIGTERM, signal.SIGKILL):
-            if number is not None:
-                self._signal(number)
+            if number is not None and self._alive():
+                with suppress(ProcessLookupError):
+                    os.killpg(self._process.pid, number)
             until = time.monotonic() + patience_s
             while self._alive() and time.monotonic() < until:
                 time.sleep(0.02)
@@ -90,16 +91,11 @@ class Worker:
         self._errors.close()
 
     def _alive(self) -> bool:
-        self._process.poll()
-        try:
-            os.killpg(self._process.pid, 0)
-        except ProcessLookupError:
-            return False
-        return True
+        return self._process.poll() is None or bool(self._members())
 
-    def _signal(self, number: signal.Signals) -> None:
-        with suppress(ProcessLookupError):
-            os.killpg(self._process.pid, number)
+    def _members(self) -> list[int]:
+        """Processes of the group that have not ended; none where there is no /proc."""
+        return [int(entry.name) for entry in Path("/proc").glob("[0-9]*") if _group(entry) == self._process.pid]
 
 
 @contextmanager
@@ -154,11 +150,12 @@ def learn(case: Case, goal: float, limit_s: float, say: Callable[[str], None]) -
 
 
 def _group(process: Path) -> int | None:
-    """Process group of an entry of /proc."""
+    """Process group of an entry of /proc; None if it has ended."""
     try:
-        return int((process / "stat").read_text().rpartition(")")[2].split()[2])
-    except (OSError, IndexError):  # it has ended meanwhile
+        state, _, group = (process / "stat").read_text().rpartition(")")[2].split()[:3]
+    except (OSError, ValueError):  # ended meanwhile
         return None
+    return None if state == "Z" else int(group)
 
 
 def _peak_kb(process: int) -> int:
