@@ -7,7 +7,7 @@ from pathlib import Path
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from matplotlib.ticker import FixedLocator, NullLocator
+from matplotlib.ticker import FixedLocator, NullLocator, StrMethodFormatter
 
 from tools.bench.case import Measured
 from tools.bench.peers import rival
@@ -15,6 +15,7 @@ from tools.bench.results import Results
 
 #: Okabe and Ito's, as in the project's other pictures.
 COLOURS = {"fast": "#0072b2", "reference": "#56b4e9", "peer": "#d55e00"}
+THOUSANDS = StrMethodFormatter("{x:,.0f}")
 LINES = ("#999999", "#000000", "#e69f00", "#009e73", "#56b4e9", "#0072b2")
 
 
@@ -58,7 +59,11 @@ def _bars(axes: Axes, results: Results) -> None:
     axes.set_yticks(range(len(bars)), [f"{found.case.name}, {found.case.tier}" for found in bars], fontsize=8)
     axes.invert_yaxis()
     axes.set_xscale("log")
-    axes.set_xlim(shortest / 2, longest * (longest / shortest) ** 0.75)
+    axes.set_xlim(shortest / 2, longest * (longest / shortest) ** 0.75)  # room for the remarks
+    powers = [10.0**power for power in range(10) if shortest / 2 < 10**power < longest]
+    axes.xaxis.set_major_locator(FixedLocator(powers))
+    axes.xaxis.set_minor_locator(NullLocator())
+    axes.xaxis.set_major_formatter(THOUSANDS)
     axes.set_xlabel("frames (control steps of a grasp) per second")
     axes.set_title(
         f"{results.levels[0].case.grasps if results.levels else 0} grasps at once; other stacks: {results.processes} "
@@ -72,24 +77,29 @@ def _remark(results: Results, found: Measured, is_peer: bool) -> str:
     case = found.case
     if not is_peer:
         engine = results.rate("raw engine", case.tier)
-        return f"  ({found.steps_per_second / engine:.0%} of the engine)" if engine else ""
+        above = case.name != "raw engine"
+        return f"  ({found.steps_per_second / engine:.0%} of the engine)" if engine and above else ""
     fast, same = results.rate(rival(case.name), "fast"), results.rate(rival(case.name), case.tier)
     if not fast or not same:
         return ""
     times = fast / found.steps_per_second
-    return f"  (ours {times:.1f} × = stack {same / found.steps_per_second:.1f} × tier {fast / same:.1f})"
+    return f"  (ours: {times:.1f} ×, of it stack {same / found.steps_per_second:.1f}, tier {fast / same:.1f})"
 
 
 def _growth(axes: Axes, measured: list[Measured], axis: str) -> None:
     counts = sorted({getattr(found.case, axis) for found in measured})
-    for name, colour in zip(dict.fromkeys(found.case.name for found in measured), LINES, strict=False):
+    names = dict.fromkeys(found.case.name for found in measured)
+    for number, (name, colour) in enumerate(zip(names, LINES, strict=False)):
         points = sorted((getattr(m.case, axis), m.steps_per_second) for m in measured if m.case.name == name)
-        axes.plot(*zip(*points, strict=True), "o-", color=colour, label=name, ms=3.5, lw=1.4)
+        axes.plot(
+            *zip(*points, strict=True), "o-", color=colour, label=name, ms=8 - number, lw=3 - 0.3 * number
+        )  # lines that lie on each other are all seen
     axes.set_xscale("log")
     axes.xaxis.set_major_locator(FixedLocator(counts))
     axes.xaxis.set_minor_locator(NullLocator())
     axes.set_xticklabels(list(map(str, counts)))
     axes.set_ylim(0)
+    axes.yaxis.set_major_formatter(THOUSANDS)
     axes.set_ylabel("frames per second")
     tier, grasps = measured[0].case.tier, measured[0].case.grasps
     detail = "grasps at once" if axis == "grasps" else f"threads of the physics, {grasps} grasps"
@@ -112,6 +122,7 @@ def _learning(results: Results) -> Figure:
             axes.plot(reached[0], reached[2], "o", color=colour)
     axes.axhline(goal, color="#444444", ls="--", lw=1)
     axes.set_xscale("log")
+    axes.xaxis.set_major_formatter(THOUSANDS)
     axes.set_xlabel("seconds of training")
     axes.set_ylabel("force reward of training episodes (of 150)")
     axes.grid(alpha=0.25)

@@ -38,7 +38,7 @@ def _ratio(above: float | None, below: float | None, form: str = ".2f") -> str:
 
 def _levels(results: Results) -> Table:
     title = f"What each layer costs, {results.levels[0].case.grasps} grasps at once"
-    table = _table(title, "level", "physics", "frames/s", "of the engine", "peak MB")
+    table = _table(title, "level", "physics", "frames/s", "of the engine", "MB")
     for found in results.levels:
         share = _ratio(found.steps_per_second, results.rate("raw engine", found.case.tier))
         row = (found.case.name, found.case.tier, f"{found.steps_per_second:,.0f}", share, f"{found.memory_mb:,.0f}")
@@ -48,14 +48,14 @@ def _levels(results: Results) -> Table:
 
 def _peers(results: Results) -> Table:
     title = f"Other stacks, {results.processes} processes, {results.peers[0].case.tier} physics"
-    table = _table(title, "peer", "frames/s", "peak MB", "ours, fast", "= stack", "× tier")
+    table = _table(title, "peer", "frames/s", "MB", "ours, fast", "= stack", "× tier")
     for found in results.peers:
         level = rival(found.case.name)
         fast, same = results.rate(level, "fast"), results.rate(level, found.case.tier)
         ratios = (_ratio(fast, found.steps_per_second, ".1f"), _ratio(same, found.steps_per_second, ".1f"))
         row = (f"{found.steps_per_second:,.0f}", f"{found.memory_mb:,.0f}", *ratios, _ratio(fast, same, ".1f"))
         table.add_row(found.case.name, *row)
-    table.caption = "how many times as fast ours is: transformed env to stepping, training to training"
+    table.caption = "how many times as fast our transformed env or training is; MB: peak memory"
     return table
 
 
