@@ -27,11 +27,11 @@ class Case:
 
 @dataclass(frozen=True)
 class Measured:
-    """Control steps per second, at best of the repeats, and peak memory of all its processes (nan if unknown)."""
+    """Control steps per second, at best of the repeats, and peak memory of all its processes (None if unknown)."""
 
     case: Case
     steps_per_second: float
-    memory_mb: float
+    memory_mb: float | None
 
 
 @dataclass(frozen=True)

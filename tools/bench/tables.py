@@ -36,12 +36,16 @@ def _ratio(above: float | None, below: float | None, form: str = ".2f") -> str:
     return f"{above / below:{form}}" if above and below else "–"
 
 
+def _memory(found: Measured) -> str:
+    return "–" if found.memory_mb is None else f"{found.memory_mb:,.0f}"
+
+
 def _levels(results: Results) -> Table:
     title = f"What each layer costs, {results.levels[0].case.grasps} grasps at once"
     table = _table(title, "level", "physics", "frames/s", "of the engine", "MB")
     for found in results.levels:
         share = _ratio(found.steps_per_second, results.rate("raw engine", found.case.tier))
-        row = (found.case.name, found.case.tier, f"{found.steps_per_second:,.0f}", share, f"{found.memory_mb:,.0f}")
+        row = (found.case.name, found.case.tier, f"{found.steps_per_second:,.0f}", share, _memory(found))
         table.add_row(*row)
     return table
 
@@ -53,7 +57,7 @@ def _peers(results: Results) -> Table:
         level = rival(found.case.name)
         fast, same = results.rate(level, "fast"), results.rate(level, found.case.tier)
         ratios = (_ratio(fast, found.steps_per_second, ".1f"), _ratio(same, found.steps_per_second, ".1f"))
-        row = (f"{found.steps_per_second:,.0f}", f"{found.memory_mb:,.0f}", *ratios, _ratio(fast, same, ".1f"))
+        row = (f"{found.steps_per_second:,.0f}", _memory(found), *ratios, _ratio(fast, same, ".1f"))
         table.add_row(found.case.name, *row)
     table.caption = "how many times as fast our transformed env or training is; MB: peak memory"
     return table

@@ -68,10 +68,13 @@ class Worker:
         assert answer is not None
         return answer["steps_per_second"]
 
-    def memory_mb(self) -> float:
-        """Peak memory of the group, in MB: each process's peak, with pages that several share counted once."""
-        members = self._members()
-        return sum(map(_peak_kb, members)) / 1024 if members else float("nan")
+    def memory_mb(self) -> float | None:
+        """Peak memory of the group, in MB, with what its processes share counted once; None where no /proc tells."""
+        try:
+            parts = [_memory_kb(process) for process in self._members()]
+        except (OSError, KeyError):
+            return None
+        return (sum(own for own, _ in parts) + max(files for _, files in parts)) / 1024 if parts else None
 
     def end(self, patience_s: float) -> None:
         """Ends the whole group: by itself, then asked to, then without being asked."""
@@ -158,15 +161,11 @@ def _group(process: Path) -> int | None:
     return None if state == "Z" else int(group)
 
 
-def _peak_kb(process: int) -> int:
-    """A process's peak memory less its part in pages that it shares."""
+def _memory_kb(process: int) -> tuple[float, float]:
+    """A process's peak memory less files such as libraries, with its share of what forks have in common; and the files.
 
-    def read(name: str, *keys: str) -> dict[str, int]:
-        lines = Path(f"/proc/{process}/{name}").read_text().splitlines()
-        return {key: int(line.split()[1]) for line in lines for key in keys if line.startswith(f"{key}:")}
-
-    try:
-        peak, now = read("status", "VmHWM")["VmHWM"], read("smaps_rollup", "Rss", "Pss")
-    except (OSError, KeyError):
-        return 0
-    return peak - now["Rss"] + now["Pss"]
+    Of files there is no such share: other cases, which run beside this one, map the same.
+    """
+    lines = [Path(f"/proc/{process}/{name}").read_text().splitlines() for name in ("status", "smaps_rollup")]
+    kb = {line.partition(":")[0]: float(line.split()[1]) for part in lines for line in part if line.endswith(" kB")}
+    return kb["VmHWM"] - kb["VmRSS"] + kb["Pss_Anon"] + kb["Pss_Shmem"], kb["RssFile"]
