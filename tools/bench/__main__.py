@@ -15,11 +15,13 @@ from __future__ import annotations
 import argparse
 import signal
 import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from rich.console import Console
 
-from tools.bench.case import Case
+from tools.bench.case import Case, Measured
 from tools.bench.figures import draw
 from tools.bench.learning import LEARNED
 from tools.bench.levels import LEVELS
@@ -54,7 +56,10 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--json", type=Path, help="file to write, as soon as a part is measured")
     parser.add_argument("--figure", nargs="?", type=Path, const=FIGURE, help=f"to draw ({FIGURE.relative_to(ROOT)})")
     parser.add_argument("--from", type=Path, dest="source", help="JSON of an earlier run: measure nothing")
-    return parser.parse_args(arguments)
+    options = parser.parse_args(arguments)
+    if options.source and not options.source.is_file():
+        parser.error(f"--from {options.source}: no such file")
+    return options
 
 
 def _count(text: str) -> int:
@@ -91,13 +96,22 @@ class Benchmark:
             for name, tier in LEARNED:
                 if not self._left_out(name):
                     case = Case(name, tier, options.processes)
-                    with self.console.status("") as status:
-                        results.learning.append(learn(case, GOAL, options.time_to_reward, status.update))
+                    with self._progress() as say:
+                        results.learning.append(learn(case, GOAL, options.time_to_reward, say))
                     self._save()
 
-    def _measure(self, cases: list[Case]):
-        with self.console.status("") as status:
-            return measure(cases, self.options.repeats, self.options.seconds, status.update)
+    def _measure(self, cases: list[Case]) -> list[Measured]:
+        with self._progress() as say:
+            return measure(cases, self.options.repeats, self.options.seconds, say)
+
+    @contextmanager
+    def _progress(self) -> Iterator[Callable[[str], None]]:
+        """A function that tells what is going on: in a line that changes, or line by line where that can't be."""
+        if self.console.is_terminal:
+            with self.console.status("") as status:
+                yield status.update
+        else:
+            yield lambda text: print(text, file=sys.stderr, flush=True)
 
     def _save(self) -> None:
         if self.options.json:

@@ -59,4 +59,5 @@ class Learning:
 
     @property
     def best(self) -> float:
-        return max((reward for _, _, reward in self.curve), default=float("nan"))
+        """The best batch's mean; 0 if not even the first ended in time."""
+        return max((reward for _, _, reward in self.curve), default=0.0)

@@ -122,6 +122,7 @@ def _learning(results: Results) -> Figure:
             axes.plot(reached[0], reached[2], "o", color=colour)
     axes.axhline(goal, color="#444444", ls="--", lw=1)
     axes.set_xscale("log")
+    axes.set_xlim(1, 1.1 * max(one.reached[0] if one.reached else one.limit_s for one in results.learning))
     axes.xaxis.set_major_formatter(THOUSANDS)
     axes.set_xlabel("seconds of training")
     axes.set_ylabel("force reward of training episodes (of 150)")

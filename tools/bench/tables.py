@@ -77,7 +77,7 @@ def _learning(results: Results) -> Table:
     heading = ("stack", "physics", f"force reward {goal:g}", "after frames", "frames/s")
     table = _table("Time until a force reward, of training episodes, normalised form", *heading)
     for one in results.learning:
-        seconds, frames, _ = one.reached or (one.curve[-1] if one.curve else (float("nan"), 0, 0.0))
+        seconds, frames, _ = one.reached or (one.curve[-1] if one.curve else (0.0, 0, 0.0))
         best = f"not in {one.limit_s:,.0f} s, best {one.best:.1f}"
         verdict = f"in {seconds:,.0f} s" if one.reached else best
         table.add_row(one.name, one.tier, verdict, f"{frames:,}", _ratio(frames, seconds, ",.0f"))
