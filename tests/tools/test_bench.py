@@ -9,6 +9,7 @@ import pytest
 
 from forcegrasp.config import PhysicsConfig, SensorConfig, TrainConfig
 from forcegrasp.env.gymnasium_view import GraspGymnasiumEnv
+from tools.bench import learning
 from tools.bench.__main__ import main
 from tools.bench.case import STEPS, Case, Learning, Measured
 from tools.bench.levels import LEVELS
@@ -83,8 +84,20 @@ def test_what_was_learned_is_told_and_drawn(tmp_path, capsys):
     assert (tmp_path / "all_learning.png").exists()
 
 
-def test_peers_simulate_in_processes_that_end():
-    name = "gymnasium Async, plain"
+def test_our_training_tells_of_each_batch(monkeypatch):
+    config = learning.recommended("fast")
+    config.ppo.grasps, config.ppo.total_frames = 2, 3 * STEPS
+    monkeypatch.setattr(learning, "recommended", lambda tier: config)
+    told = []
+    learning.ours("fast", 1, lambda frames, reward: told.append((frames, reward)))
+    assert [frames for frames, _ in told] == [2 * STEPS, 4 * STEPS]
+    assert all(0 < reward < STEPS for _, reward in told)
+
+
+@pytest.mark.parametrize("name", ["gymnasium Async, plain", "SB3 training, plain"])
+def test_peers_simulate_in_processes_that_end(name):
+    if module := missing(name):
+        pytest.skip(f"needs {module}")
     (found,) = measure([Case(name, "fast", 2, 1)], repeats=1, seconds=0, say=lambda _: None)
     assert found.steps_per_second > 0
 

@@ -3,7 +3,7 @@
     python -m tools.bench                                    the layers at both tiers of the physics, and the peers
     python -m tools.bench --scale --json speed.json --figure  also how the layers grow with grasps and with threads
     python -m tools.bench --time-to-reward 3600              also how long training takes until a force reward of 100
-    python -m tools.bench --only simulator training          some layers or peers alone
+    python -m tools.bench --only simulator training          some layers, peers or trainings alone
     python -m tools.bench --from speed.json --figure         tables and pictures of what was measured before
 
 Each layer and peer runs in a process of its own. They take turns, and the best of their repeats counts, so that
@@ -23,7 +23,7 @@ from rich.console import Console
 
 from tools.bench.case import Case, Measured
 from tools.bench.figures import draw
-from tools.bench.learning import LEARNED
+from tools.bench.learning import LEARNED, TRAININGS
 from tools.bench.levels import LEVELS
 from tools.bench.peers import PEERS, missing
 from tools.bench.results import Results, cores, machine
@@ -41,7 +41,7 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         prog="python -m tools.bench", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    names = [*LEVELS, *PEERS]
+    names = [*LEVELS, *PEERS, *TRAININGS]
     parser.add_argument("--only", nargs="+", choices=names, default=names, metavar="NAME", help="; ".join(names))
     parser.add_argument("--grasps", type=_count, default=256, help="at once, in the layers (256)")
     parser.add_argument("--tiers", nargs="+", choices=TIERS, default=TIERS, help="of the layers' physics (both)")
@@ -74,7 +74,8 @@ class Benchmark:
     def __init__(self, options: argparse.Namespace, console: Console) -> None:
         self.options, self.console = options, console
         self.results = Results(options.processes, machine=machine())
-        self.names = [name for name in options.only if not self._left_out(name)]
+        asked = [name for name in options.only if options.time_to_reward is not None or name not in TRAININGS]
+        self.names = [name for name in asked if not self._left_out(name)]
 
     def run(self) -> None:
         options, results = self.options, self.results
@@ -94,9 +95,9 @@ class Benchmark:
                 self._save()
         if options.time_to_reward is not None:
             for name, tier in LEARNED:
-                if not self._left_out(name):
-                    case = Case(name, tier, options.processes)
+                if name in self.names:
                     with self._progress() as say:
+                        case = Case(name, tier, options.processes)
                         results.learning.append(learn(case, GOAL, options.time_to_reward, say))
                     self._save()
 

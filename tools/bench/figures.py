@@ -13,9 +13,10 @@ from tools.bench.case import Measured
 from tools.bench.peers import rival
 from tools.bench.results import Results
 
-#: Okabe and Ito's, as in the project's other pictures.
-COLOURS = {"fast": "#0072b2", "reference": "#56b4e9", "peer": "#d55e00"}
 THOUSANDS = StrMethodFormatter("{x:,.0f}")
+#: Okabe and Ito's, as in the project's other pictures: of bars, of trainings, of the levels as they grow.
+COLOURS = {"fast": "#0072b2", "reference": "#56b4e9", "peer": "#d55e00"}
+TRAININGS = (*COLOURS.values(), "#e69f00")
 LINES = ("#999999", "#000000", "#e69f00", "#009e73", "#56b4e9", "#0072b2")
 
 
@@ -113,7 +114,7 @@ def _learning(results: Results) -> Figure:
     figure = Figure(figsize=(7.5, 4.2), layout="constrained")
     axes = figure.subplots()
     goal = results.learning[0].goal
-    for one, colour in zip(results.learning, COLOURS.values(), strict=False):
+    for one, colour in zip(results.learning, TRAININGS, strict=False):
         reached = one.reached
         verdict = f"{reached[0]:,.0f} s" if reached else f"not in {one.limit_s:,.0f} s, best {one.best:.0f}"
         seconds, _, rewards = zip(*one.curve, strict=True) if one.curve else ((), (), ())

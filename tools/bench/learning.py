@@ -45,8 +45,13 @@ def ours(tier: str, grasps: int, report: Report) -> None:
         trainer.frames += batch.numel()
 
 
-def sb3(tier: str, grasps: int, report: Report) -> None:
-    """The authors' trainer, in ``grasps`` processes, on the plain environment."""
+def sb3(tier: str, grasps: int, report: Report, closing: bool) -> None:
+    """The authors' trainer, in ``grasps`` processes, on the plain environment.
+
+    Its defaults explore around no motion, and may not meet the object for long: ``closing`` starts with the mean
+    action and the deviation of this project's policies in their place.
+    """
+    import torch
     from stable_baselines3.common.callbacks import BaseCallback
 
     from forcegrasp.curriculum.schedule import LinearSchedule
@@ -68,9 +73,23 @@ def sb3(tier: str, grasps: int, report: Report) -> None:
         def _on_rollout_end(self) -> None:
             report(self.num_timesteps, sum(self.rewards) / max(1, len(self.rewards)))
 
-    sb3_ppo(envs).learn(config.ppo.total_frames, callback=Watch())
+    model = sb3_ppo(envs)
+    if closing:
+        parameters = dict(model.policy.named_parameters())
+        torch.nn.init.constant_(parameters["action_net.bias"], config.ppo.initial_action)
+        torch.nn.init.constant_(parameters["log_std"], config.ppo.log_std)
+    model.learn(config.ppo.total_frames, callback=Watch())
 
 
-TRAININGS: dict[str, Callable[[str, int, Report], None]] = {"forcegrasp": ours, "SB3": sb3}
+TRAININGS: dict[str, Callable[[str, int, Report], None]] = {
+    "forcegrasp": ours,
+    "SB3": partial(sb3, closing=False),
+    "SB3, closing first": partial(sb3, closing=True),
+}
 #: What is watched, and at which tier. Ours at the other's tier, too: what is left is the stack.
-LEARNED = (("forcegrasp", "fast"), ("forcegrasp", "reference"), ("SB3", "reference"))
+LEARNED = (
+    ("forcegrasp", "fast"),
+    ("forcegrasp", "reference"),
+    ("SB3, closing first", "reference"),
+    ("SB3", "reference"),
+)
