@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import re
 from dataclasses import dataclass, field
 from typing import Any, cast
 
@@ -200,6 +201,31 @@ class PPOConfig:
 
 
 @dataclass
+class CollectorConfig:
+    """Who simulates the grasps while training."""
+
+    kind: str = option(
+        "direct",
+        "direct: this process. ray: workers in processes of their own, on this machine or on a Ray cluster's",
+        choices=("direct", "ray"),
+    )
+    workers: int = option(
+        1, "processes, each with an equal share of ppo.grasps; physics.threads are each one's own", low=1, high=4096
+    )
+    address: str = option(
+        "", "Ray cluster to join: auto for the one that runs here, or HOST:PORT; this machine if empty"
+    )
+
+    def check(self, path: str) -> None:
+        """Refuses what only Ray has without it."""
+        if self.kind == "direct" and (self.workers > 1 or self.address):
+            name, value = ("workers", self.workers) if self.workers > 1 else ("address", self.address)
+            raise ConfigError(f"{path}{name}={value}: direct collection is this process alone; add collector=ray")
+        if not re.fullmatch(r"(auto|[^\s:/]+:\d+)?", self.address):
+            raise ConfigError(f"{path}address={self.address}: must be auto, HOST:PORT or empty")
+
+
+@dataclass
 class LogConfig:
     """What is written while training, and how often. Counted in batches; 0 switches a part off."""
 
@@ -224,11 +250,18 @@ class TrainConfig:
     reward: RewardConfig = field(default_factory=RewardConfig)
     curriculum: CurriculumConfig = field(default_factory=CurriculumConfig)
     ppo: PPOConfig = field(default_factory=PPOConfig)
+    collector: CollectorConfig = field(default_factory=CollectorConfig)
     log: LogConfig = field(default_factory=LogConfig)
 
     def check(self, path: str) -> None:
-        """Refuses a curriculum that starts with objects that could be squeezed flat."""
+        """Refuses a curriculum that starts with objects that could be squeezed flat, and unequal shares of grasps."""
         check_deformation(self.grasp.deformation_m, self.curriculum.radius_m, f"{path}curriculum.radius_m")
+        grasps, workers = self.ppo.grasps, self.collector.workers
+        if grasps % workers:
+            raise ConfigError(
+                f"{path}ppo.grasps={grasps} can't be shared equally among {path}collector.workers={workers}:"
+                f" make it {-(-grasps // workers) * workers}"
+            )
 
 
 @dataclass

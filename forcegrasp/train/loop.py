@@ -5,22 +5,21 @@ from __future__ import annotations
 import signal
 import time
 from contextlib import contextmanager
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import torch
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from torch import Tensor
-from torchrl.collectors import Collector
 from torchrl.envs import TransformedEnv
 
 from forcegrasp.config import TrainConfig
 from forcegrasp.controllers.policy import make_policy
-from forcegrasp.curriculum import CurriculumHook, LinearSchedule
+from forcegrasp.curriculum import CurriculumValues, LinearSchedule
 from forcegrasp.effects.model_file import Model
-from forcegrasp.env import GraspEnv, build_env
 from forcegrasp.env.episodes import summarise
 from forcegrasp.runs.run_dir import RunDir
+from forcegrasp.train.collector import collecting, make_collector, random_states, set_random_states, training_env
 from forcegrasp.train.logging import TrainingLog
 from forcegrasp.train.ppo import PPO, entropy, make_value
 
@@ -42,43 +41,18 @@ class Trainer:
         torch.set_num_threads(1)  # the physics needs the cores
         torch.manual_seed(config.seed)
         self.shuffle = torch.Generator().manual_seed(config.seed)
-        self.env: TransformedEnv = build_env(
-            config.ppo.grasps,
-            physics=config.physics,
-            grasp=config.grasp,
-            sensors=config.sensors,
-            observation=config.observation,
-            action=config.action,
-            reward=config.reward,
-            model=model,
-            seed=config.seed,
-        )
-        schedule = LinearSchedule(config.curriculum, config.grasp, config.reward, config.ppo.total_frames)
-        self.curriculum = CurriculumHook(schedule, self.env)
+        self.env: TransformedEnv = training_env(config, model)
+        self.schedule = LinearSchedule(config.curriculum, config.grasp, config.reward, config.ppo.total_frames)
         size = self.env.observation_spec["observation"].shape[-1]
         self.policy = make_policy(size, config.ppo)
         self.value = make_value(size, config.ppo)
         self.ppo = PPO(self.policy, self.value, config.ppo)
+        self.collector = make_collector(config, self.env, self.policy, self.schedule, model)
 
-    def collector(self) -> Collector:
-        """Endless batches of whole episodes from a fresh reset.
-
-        Batches don't share state, which is what makes a resumed run bit-identical.
-        """
-        return Collector(
-            self.env,
-            self.policy,
-            frames_per_batch=self.config.ppo.grasps * self.config.grasp.steps,
-            total_frames=-1,
-            reset_at_each_iter=True,
-            track_traj_ids=False,
-            auto_register_policy_transforms=False,
-        )
-
-    @property
-    def _rng(self) -> np.random.Generator:
-        """What grasps are drawn with."""
-        return cast(GraspEnv, self.env.base_env).rng
+    def prepare(self) -> CurriculumValues:
+        """Tells whoever collects the next batch its curriculum and its policy; returns the curriculum's values."""
+        told = (self.frames, self.policy.state_dict())
+        return self.collector.map_fn("prepare", [told] * self.config.collector.workers)[0]
 
     def state(self) -> tuple[dict[str, Tensor], dict[str, Any]]:
         """All that changes while training, as tensors and as JSON."""
@@ -86,13 +60,9 @@ class Trainer:
         tensors |= {f"value.{k}": v for k, v in self.value.state_dict().items()}
         for index, moments in self.ppo.optimizer.state_dict()["state"].items():
             tensors |= {f"optimizer.{index}.{k}": v for k, v in moments.items()}
-        tensors |= {f"env.{k}": v for k, v in self.env.transform.state_dict().items() if "_extra_state" in k}
-        tensors |= {"rng.torch": torch.get_rng_state(), "rng.shuffle": self.shuffle.get_state()}
-        facts = {
-            "batches": self.batches,
-            "rng_grasps": self._rng.bit_generator.state,
-            "curriculum": self.curriculum.schedule(self.frames).scalars(),
-        }
+        generators, facts = random_states(self.collector)
+        tensors |= generators | {"rng.shuffle": self.shuffle.get_state()}
+        facts |= {"batches": self.batches, "curriculum": self.schedule(self.frames).scalars()}
         return {k: v.detach().contiguous().clone() for k, v in tensors.items()}, facts
 
     def restore(self, tensors: dict[str, Tensor], facts: dict[str, Any]) -> None:
@@ -108,13 +78,9 @@ class Trainer:
             index, moment = key.split(".")
             optimizer["state"].setdefault(int(index), {})[moment] = value
         self.ppo.optimizer.load_state_dict(optimizer)
-        for key, value in part("env.").items():
-            module = self.env.transform.get_submodule(key.removesuffix("_extra_state").rstrip("."))
-            module.set_extra_state(value)
         self.frames, self.batches = facts["frames"], facts["batches"]
-        self._rng.bit_generator.state = facts["rng_grasps"]
         self.shuffle.set_state(tensors["rng.shuffle"])
-        torch.set_rng_state(tensors["rng.torch"])
+        set_random_states(self.collector, self.config.collector.workers, tensors, facts)
 
 
 def train(config: TrainConfig, run: RunDir, resume: bool = False) -> bool:
@@ -127,15 +93,15 @@ def train(config: TrainConfig, run: RunDir, resume: bool = False) -> bool:
     """
     trainer = Trainer(config, run.model(config))
     total = config.ppo.total_frames
-    collector = trainer.collector()
     if resume:
         trainer.restore(*run.load())
     log = TrainingLog(run, config, trainer.frames)
-    batches, batch = iter(collector), None
-    with _stop_signals() as stop, _progress(total, trainer.frames, config.grasp.steps) as progress:
+    batch = None
+    shown = _progress(total, trainer.frames, config.grasp.steps)
+    with collecting(trainer.collector) as batches, _stop_signals() as stop, shown as progress:
         while trainer.frames < total and not stop:
             started = time.perf_counter()
-            values = trainer.curriculum.apply(trainer.frames)
+            values = trainer.prepare()
             batch = next(batches)
             collected = time.perf_counter()
             figures = {name: float(value.mean()) for name, value in summarise(batch, config.sensors).items()}

@@ -258,7 +258,7 @@ def test_the_value_network_sees_the_true_gaps(tiny):
     trainer = Trainer(config)
     seen = []
     trainer.value.module.net.register_forward_pre_hook(lambda _, inputs: seen.append(inputs[0]))
-    trainer.curriculum.apply(0)
+    trainer.prepare()
     with torch.no_grad():
         episodes = trainer.env.rollout(60, lambda td: td.set("action", -torch.ones(2, 2)))
         trainer.value(episodes)

@@ -1,0 +1,203 @@
+"""Who simulates the grasps of a batch: this process, or workers of a Ray cluster. Both are told apart here alone."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import sys
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any, cast
+
+import numpy as np
+import torch
+from tensordict import TensorDictBase
+from torch import Tensor
+from torchrl.collectors import Collector
+from torchrl.collectors.distributed import RayCollector
+from torchrl.envs import TransformedEnv
+from torchrl.envs.transforms import Transform
+from torchrl.modules import ProbabilisticActor
+
+from forcegrasp.config import TrainConfig
+from forcegrasp.curriculum import CurriculumHook, CurriculumValues, LinearSchedule
+from forcegrasp.effects.model_file import Model
+from forcegrasp.env import GraspEnv, build_env
+from forcegrasp.train import cluster
+
+
+class GraspCollector(Collector):
+    """Endless batches of whole episodes, each from a fresh reset; between batches it can be told the next one's terms.
+
+    Batches don't share state, which is what makes a resumed run bit-identical.
+
+    Args:
+      create_env_fn: a training env, or what makes one.
+      policy: what acts in it.
+      schedule: the curriculum.
+      frames_per_batch: grasps times steps of an episode.
+      options: of the base class.
+    """
+
+    def __init__(self, create_env_fn: Any, policy: Any, *, schedule: LinearSchedule, **options: Any) -> None:
+        super().__init__(create_env_fn, policy, **options)
+        self.curriculum = CurriculumHook(schedule, self.env)
+
+    def prepare(self, frames: int, weights: dict[str, Tensor]) -> CurriculumValues:
+        """Applies the curriculum after so many frames, and the learner's weights."""
+        cast(ProbabilisticActor, self.policy).load_state_dict(weights)
+        return self.curriculum.apply(frames)
+
+    def random_state(self) -> tuple[dict[str, Tensor], dict[str, Any]]:
+        """Every generator that episodes depend on, as tensors and as JSON."""
+        noises = {f"env.{k}": v for k, v in self._transform.state_dict().items() if "_extra_state" in k}
+        return noises | {"rng.torch": torch.get_rng_state()}, {"rng_grasps": self._rng.bit_generator.state}
+
+    def set_random_state(self, tensors: dict[str, Tensor], facts: dict[str, Any]) -> None:
+        """The inverse of :meth:`random_state`; more entries do no harm."""
+        for key, value in tensors.items():
+            if key.startswith("env."):
+                name = key.removeprefix("env.").removesuffix("_extra_state").rstrip(".")
+                self._transform.get_submodule(name).set_extra_state(value)
+        self._rng.bit_generator.state = facts["rng_grasps"]
+        torch.set_rng_state(tensors["rng.torch"])
+
+    @property
+    def _transform(self) -> Transform:
+        return cast(TransformedEnv, self.env).transform
+
+    @property
+    def _rng(self) -> np.random.Generator:
+        """What grasps are drawn with."""
+        return cast(GraspEnv, cast(TransformedEnv, self.env).base_env).rng
+
+
+def worker_seed(seed: int, worker: int) -> int:
+    """Seed of a worker's streams; the first has the run's own, and trains as a direct collector does."""
+    return int(np.random.SeedSequence([seed, worker]).generate_state(1, np.uint64)[0] >> 1) if worker else seed
+
+
+def training_env(config: TrainConfig, model: Model | None = None, worker: int = 0) -> TransformedEnv:
+    """A worker's share of the grasps, with seeds of its own."""
+    return build_env(
+        config.ppo.grasps // config.collector.workers,
+        physics=dataclasses.replace(config.physics, threads=_cores(config)),
+        grasp=config.grasp,
+        sensors=config.sensors,
+        observation=config.observation,
+        action=config.action,
+        reward=config.reward,
+        model=model,
+        seed=worker_seed(config.seed, worker),
+    )
+
+
+def _cores(config: TrainConfig) -> int:
+    """Physics threads of each worker; 0, in this process alone, stands for all of the machine's."""
+    return config.physics.threads if config.collector.kind == "direct" else max(1, config.physics.threads)
+
+
+def make_collector(
+    config: TrainConfig,
+    env: TransformedEnv,
+    policy: ProbabilisticActor,
+    schedule: LinearSchedule,
+    model: Model | None = None,
+) -> GraspCollector | RayCollector:
+    """Returns what collects with this policy, and is spoken to by ``map_fn``.
+
+    Args:
+      config: says who collects.
+      env: the first worker's env, for collecting in this process.
+      policy: this process's own; workers have copies.
+      schedule: the curriculum.
+      model: what workers simulate.
+
+    Raises:
+      ConfigError: if Ray is not installed, does not answer or has no room.
+    """
+    options = {"track_traj_ids": False, "auto_register_policy_transforms": False}
+    frames = config.ppo.grasps * config.grasp.steps
+    if config.collector.kind == "direct":
+        return GraspCollector(
+            env, policy, schedule=schedule, frames_per_batch=frames, reset_at_each_iter=True, **options
+        )
+    cluster.join(config.collector, _cores(config))
+    # weights travel with the curriculum, by Ray: torch's own way needs host names that every machine resolves
+    warnings.filterwarnings("ignore", "RayCollector iteration started before weight synchronization")
+    # as a direct collector would draw actions; the others are seeded
+    states = [torch.get_rng_state()]
+    for worker in range(1, config.collector.workers):
+        states.append(torch.Generator().manual_seed(worker_seed(config.seed, worker)).get_state())
+    with cluster.told_plainly():
+        return RayCollector(
+            [functools.partial(_worker_env, config, model, worker, state) for worker, state in enumerate(states)],
+            policy,
+            collector_class=cast(Any, GraspCollector),  # annotated as a function of a batch, which it isn't
+            collector_kwargs={"schedule": schedule, **options},
+            frames_per_batch=frames,
+            total_frames=sys.maxsize,  # it ends at once with -1
+            reset_at_each_iter=True,
+            sync=True,
+            postproc=_as_one,
+            remote_configs=cluster.reserve(config.collector, _cores(config)),
+        )
+
+
+def _worker_env(config: TrainConfig, model: Model | None, worker: int, torch_state: Tensor) -> TransformedEnv:
+    """Called in the worker's process."""
+    torch.set_num_threads(1)
+    env = training_env(config, model, worker)
+    torch.set_rng_state(torch_state)
+    return env
+
+
+def _as_one(batch: TensorDictBase) -> TensorDictBase:
+    """Workers' episodes ``(workers, n, T)`` as ``(workers · n, T)``."""
+    return batch.flatten(0, 1)
+
+
+@contextmanager
+def collecting(collector: GraspCollector | RayCollector) -> Iterator[Iterator[TensorDictBase]]:
+    """Yields batches ``(grasps, T)`` without end; ends the collector afterwards, and Ray with it.
+
+    Raises:
+      ForcegraspError: of a worker as of this process; and if a worker is lost.
+    """
+    try:
+        if isinstance(collector, GraspCollector):
+            yield iter(collector)
+        else:
+            with cluster.told_plainly():
+                yield iter(collector)
+    finally:
+        collector.shutdown()
+        if not isinstance(collector, GraspCollector):
+            cluster.find_ray().shutdown()
+
+
+def _prefix(worker: int) -> str:
+    return f"worker_{worker}." if worker else ""
+
+
+def random_states(collector: GraspCollector | RayCollector) -> tuple[dict[str, Tensor], dict[str, Any]]:
+    """Every worker's generators, as tensors and as JSON; the first worker's are named as a direct collector's."""
+    tensors, facts = {}, {}
+    for worker, state in enumerate(collector.map_fn("random_state")):
+        for part, own in zip((tensors, facts), state, strict=True):
+            part |= {_prefix(worker) + key: value for key, value in own.items()}
+    return tensors, facts
+
+
+def set_random_states(
+    collector: GraspCollector | RayCollector, workers: int, tensors: dict[str, Tensor], facts: dict[str, Any]
+) -> None:
+    """The inverse of :func:`random_states`."""
+
+    def own(part: dict[str, Any], worker: int) -> dict[str, Any]:
+        names = tuple(_prefix(worker) + name for name in ("env.", "rng.torch", "rng_grasps"))
+        return {k.removeprefix(_prefix(worker)): v for k, v in part.items() if k.startswith(names)}
+
+    states = [(own(tensors, worker), own(facts, worker)) for worker in range(workers)]
+    collector.map_fn("set_random_state", states)
