@@ -50,26 +50,39 @@ def _run(overrides: list[str]) -> int:
     config, run_dir = compose_run("train", overrides)
     if preset := next((o for o in overrides if o.startswith("sweep=") and o != "sweep=none"), ""):
         raise ConfigError(f"{preset} is several runs: add -m to run one after another")
-    _check_model(config)
+    _check(config)
+    _join(config)
 
     from forcegrasp.runs.run_dir import RunDir
 
     return _train(config, RunDir.create(run_dir, config, overrides), resume=False)
 
 
-def _check_model(config) -> None:
-    """Refuses a model that can't be read before anything is written."""
+def _check(config) -> None:
+    """Refuses a model that can't be read, and Ray where it isn't installed, before anything is written."""
     if config.model:
         from forcegrasp.effects.variation import read_tiago_model
 
         read_tiago_model(config.model)
+    if config.collector.kind == "ray":
+        from forcegrasp.train.cluster import find_ray
+
+        find_ray()
+
+
+def _join(config) -> None:
+    """Refuses a Ray cluster that does not answer before anything is written."""
+    if config.collector.kind == "ray":
+        from forcegrasp.train.cluster import join
+
+        join(config)
 
 
 def _sweep(overrides: list[str]) -> int:
     if preset := next((o for o in overrides if o.startswith("sweep=") and "," in o), ""):
         raise ConfigError(f"{preset}: one preset at a time")
     for single in single_runs(overrides):
-        _check_model(compose("train", single))  # refuses bad input before anything is written
+        _check(compose("train", single))  # refuses bad input before anything is written
     _, folder = compose_sweep(_without_several_values(overrides))
     import hydra
     from hydra.core.global_hydra import GlobalHydra
@@ -111,6 +124,7 @@ def _sweep_job(composed) -> int:
     import_mujoco()  # a launcher may have started a process of its own
     hydra, config = HydraConfig.get(), cast("TrainConfig", OmegaConf.to_object(composed))
     overrides = [text for text in hydra.overrides.task if not text.startswith("sweep=")]  # this run is a single one
+    _join(config)
     run = RunDir.create(hydra.runtime.output_dir, config, overrides)
     status = _train(config, run, resume=False)
     if status == INTERRUPTED:

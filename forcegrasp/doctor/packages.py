@@ -22,7 +22,12 @@ if TYPE_CHECKING:
 #: Released together: each works with one or two versions of the others.
 TORCH_FAMILY = ("torch", "tensordict", "torchrl")
 #: What an extra is for.
-EXTRAS = {"onnx": "forcegrasp export, and exported policies", "rosbag": "measurement sets from ROS bags"}
+EXTRAS = {
+    "onnx": "forcegrasp export, and exported policies",
+    "rosbag": "measurement sets from ROS bags",
+    "ray": "training with the grasps simulated on several machines, collector=ray",
+    "cluster": "sweeps on SLURM, hydra/launcher=submitit_slurm",
+}
 #: Every module of another package that forcegrasp imports, but for those of extras.
 MODULES = (
     "numpy",

@@ -4,15 +4,23 @@ from __future__ import annotations
 
 import importlib
 import os
+import socket
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from forcegrasp.config import CollectorConfig
+from forcegrasp.config import TrainConfig
 from forcegrasp.errors import ConfigError, ForcegraspError
 
 #: How long to wait for cores that others hold, seconds.
 PATIENCE_S = 60.0
+
+#: No statistics sent, no warning of the next version's default, no reports of connections that are tried again.
+QUIET = {
+    "RAY_USAGE_STATS_ENABLED": "0",
+    "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0",
+    "RAY_BACKEND_LOG_LEVEL": "error",
+}
 
 
 def find_ray() -> Any:
@@ -27,12 +35,13 @@ def find_ray() -> Any:
         raise ConfigError("collector.kind=ray needs an extra: pip install 'forcegrasp[ray]'") from error
 
 
-def join(config: CollectorConfig, cores: int) -> None:
-    """Joins the cluster at ``config.address``, or starts one on this machine that ends with this process.
+def cores(config: TrainConfig) -> int:
+    """Physics threads of each worker, which Ray keeps as many cores for; 0, every core, is one here."""
+    return max(1, config.physics.threads)
 
-    Args:
-      config: where, and how many workers there will be.
-      cores: cores of each worker.
+
+def join(config: TrainConfig) -> None:
+    """Joins the cluster at ``collector.address``, or starts one on this machine that ends with this process.
 
     Raises:
       ConfigError: if Ray isn't installed, or no cluster answers.
@@ -40,38 +49,46 @@ def join(config: CollectorConfig, cores: int) -> None:
     ray = find_ray()
     if ray.is_initialized():
         return
-    os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")  # it would send statistics, and say so
-    os.environ.setdefault("RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO", "0")  # it would warn of its next version's default
+    for name, value in QUIET.items():
+        os.environ.setdefault(name, value)
     # workers render nothing, and may have no OpenGL to import
     options: dict[str, Any] = {"runtime_env": {"env_vars": {"MUJOCO_GL": "disable"}}}
-    if config.address:
-        options["address"] = config.address
+    address = config.collector.address
+    if address:
+        options["address"] = address
     else:
-        options |= {"address": "local", "num_cpus": config.workers * cores, "include_dashboard": False}
+        options |= {
+            "address": "local",
+            "num_cpus": config.collector.workers * cores(config),
+            "include_dashboard": False,
+        }
     try:
+        if ":" in address:
+            host, _, port = address.rpartition(":")
+            socket.create_connection((host, int(port)), PATIENCE_S).close()  # Ray itself takes minutes to give up
         ray.init(**options, log_to_driver=False, logging_level="ERROR")
-    except (OSError, RuntimeError, ValueError) as error:
-        where = f"no Ray cluster answers at collector.address={config.address}; start one: ray start --head"
+    except (OSError, OverflowError, RuntimeError, ValueError) as error:
+        where = f"no Ray cluster answers at collector.address={address}; start one: ray start --head"
         reason = " ".join(str(error).split())
-        raise ConfigError(where if config.address else f"Ray could not be started here ({reason})") from error
+        raise ConfigError(where if address else f"Ray could not be started here ({reason})") from error
 
 
-def reserve(config: CollectorConfig, cores: int) -> dict[str, Any]:
+def reserve(config: TrainConfig) -> dict[str, Any]:
     """Waits until the cluster has room for all workers; returns what each asks of Ray.
 
     Raises:
       ConfigError: if there is no room.
     """
-    ray = find_ray()
-    group = ray.util.placement_group([{"CPU": cores}] * config.workers)
+    ray, workers = find_ray(), config.collector.workers
+    group = ray.util.placement_group([{"CPU": cores(config)}] * workers)
     if not group.wait(PATIENCE_S):
         ray.util.remove_placement_group(group)
         raise ConfigError(
-            f"collector.workers={config.workers}: the Ray cluster has no room for workers of {cores} core(s) each, of"
-            f" its {ray.cluster_resources().get('CPU', 0):g} cores; ask for fewer, or wait until others have finished"
+            f"collector.workers={workers}: no room for so many of {cores(config)} core(s) each on the Ray cluster, which"
+            f" has {ray.cluster_resources().get('CPU', 0):g} cores; ask for fewer, or wait until others have finished"
         )
     strategy = ray.util.scheduling_strategies.PlacementGroupSchedulingStrategy(group)
-    return {"num_cpus": cores, "scheduling_strategy": strategy}
+    return {"num_cpus": cores(config), "scheduling_strategy": strategy}
 
 
 @contextmanager

@@ -41,7 +41,8 @@ class GraspCollector(Collector):
     """
 
     def __init__(self, create_env_fn: Any, policy: Any, *, schedule: LinearSchedule, **options: Any) -> None:
-        super().__init__(create_env_fn, policy, **options)
+        plain = {"reset_at_each_iter": True, "track_traj_ids": False, "auto_register_policy_transforms": False}
+        super().__init__(create_env_fn, policy, **plain | options)
         self.curriculum = CurriculumHook(schedule, self.env)
 
     def prepare(self, frames: int, weights: dict[str, Tensor]) -> CurriculumValues:
@@ -80,9 +81,10 @@ def worker_seed(seed: int, worker: int) -> int:
 
 def training_env(config: TrainConfig, model: Model | None = None, worker: int = 0) -> TransformedEnv:
     """A worker's share of the grasps, with seeds of its own."""
+    threads = config.physics.threads if config.collector.kind == "direct" else cluster.cores(config)
     return build_env(
         config.ppo.grasps // config.collector.workers,
-        physics=dataclasses.replace(config.physics, threads=_cores(config)),
+        physics=dataclasses.replace(config.physics, threads=threads),
         grasp=config.grasp,
         sensors=config.sensors,
         observation=config.observation,
@@ -91,11 +93,6 @@ def training_env(config: TrainConfig, model: Model | None = None, worker: int = 
         model=model,
         seed=worker_seed(config.seed, worker),
     )
-
-
-def _cores(config: TrainConfig) -> int:
-    """Physics threads of each worker; 0, in this process alone, stands for all of the machine's."""
-    return config.physics.threads if config.collector.kind == "direct" else max(1, config.physics.threads)
 
 
 def make_collector(
@@ -117,13 +114,10 @@ def make_collector(
     Raises:
       ConfigError: if Ray is not installed, does not answer or has no room.
     """
-    options = {"track_traj_ids": False, "auto_register_policy_transforms": False}
     frames = config.ppo.grasps * config.grasp.steps
     if config.collector.kind == "direct":
-        return GraspCollector(
-            env, policy, schedule=schedule, frames_per_batch=frames, reset_at_each_iter=True, **options
-        )
-    cluster.join(config.collector, _cores(config))
+        return GraspCollector(env, policy, schedule=schedule, frames_per_batch=frames)
+    cluster.join(config)
     # weights travel with the curriculum, by Ray: torch's own way needs host names that every machine resolves
     warnings.filterwarnings("ignore", "RayCollector iteration started before weight synchronization")
     # as a direct collector would draw actions; the others are seeded
@@ -135,13 +129,13 @@ def make_collector(
             [functools.partial(_worker_env, config, model, worker, state) for worker, state in enumerate(states)],
             policy,
             collector_class=cast(Any, GraspCollector),  # annotated as a function of a batch, which it isn't
-            collector_kwargs={"schedule": schedule, **options},
+            collector_kwargs={"schedule": schedule},
             frames_per_batch=frames,
             total_frames=sys.maxsize,  # it ends at once with -1
             reset_at_each_iter=True,
             sync=True,
             postproc=_as_one,
-            remote_configs=cluster.reserve(config.collector, _cores(config)),
+            remote_configs=cluster.reserve(config),
         )
 
 

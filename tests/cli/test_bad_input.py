@@ -74,6 +74,10 @@ MISTAKES = [
     (["train", "ppo.hidden=[]"], "must not be empty"),
     (["train", "ppo.hidden=[[8]]"], "ppo.hidden"),
     (["train", "ppo.critic=all"], "one of observation, privileged"),
+    (["train", "collector=rays"], "direct, ray"),
+    (["train", "collector.workers=2"], "add collector=ray"),
+    (["train", "collector=ray", "collector.workers=3"], "can't be shared equally"),
+    (["train", "collector=ray", "collector.address=ray://x:1"], "must be auto, HOST:PORT or empty"),
     (["train", "action.inductive_bias=perhaps"], "action.inductive_bias"),
     (["train", "grasp.kappa=[1,0]"], "low ≤ high"),
     (["train", "grasp.kappa=0.5"], "grasp.kappa"),
@@ -278,6 +282,15 @@ def test_mistake_in_a_process_of_its_own(arguments, told, tmp_path):
     assert told in done.stderr
     assert not done.stdout
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("sweep", [[], ["-m", "seed=0,1"]])
+def test_ray_is_not_installed(sweep, folder, tiny, capsys, monkeypatch):
+    monkeypatch.setitem(sys.modules, "ray", None)
+    before = contents(folder)
+    assert main(["train", *sweep, *tiny["train"], "collector=ray"]) == 2
+    assert capsys.readouterr() == ("", "forcegrasp: collector.kind=ray needs an extra: pip install 'forcegrasp[ray]'\n")
+    assert contents(folder) == before
 
 
 def test_full_disk_while_training(folder, tiny, capsys, monkeypatch):

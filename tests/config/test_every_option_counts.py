@@ -115,6 +115,9 @@ TRAIN_CASES: dict[str, Any] = {
     "ppo.initial_action": -0.8,
     "ppo.mirrored": False,
     "ppo.critic": "observation",
+    "collector.kind": "ray",
+    "collector.workers": 2,
+    "collector.address": "auto",
     "log.histograms_every": 1,
     "log.figures_every": 1,
     "log.video_every": 1,
@@ -274,10 +277,40 @@ def test_the_same_evaluation_finds_the_same(tmp_path, plain_evaluation, learned)
     assert evaluated(tmp_path, **learned) == plain_evaluation
 
 
-@pytest.mark.parametrize("name", [name for name in TRAIN_CASES if name != "reward.forces"])
+@pytest.mark.parametrize(
+    "name", [name for name in TRAIN_CASES if name != "reward.forces" and not name.startswith("collector.")]
+)
 def test_option_of_train(name, tmp_path, plain_training):
     different = trained(tmp_path, **{name: TRAIN_CASES[name]})
     assert different != plain_training
+
+
+class JoinedError(Exception):
+    """The training would begin now, on this cluster."""
+
+
+@pytest.mark.parametrize("name", [name for name in TRAIN_CASES if name.startswith("collector.")])
+def test_option_of_collecting(name, monkeypatch):
+    """What is asked of Ray; tests/train/test_collector.py has what comes of it."""
+
+    class Ray:
+        is_initialized = staticmethod(lambda: False)
+
+        @staticmethod
+        def init(**options):
+            raise JoinedError(options)
+
+    monkeypatch.setattr("forcegrasp.train.cluster.find_ray", lambda: Ray)
+
+    def asked(**values: Any) -> dict[str, Any] | None:
+        try:
+            Trainer(with_options(TrainConfig(), TINY_TRAINING | values))
+        except JoinedError as asked:
+            return asked.args[0]
+        return None
+
+    plain = {} if name == "collector.kind" else {"collector.kind": "ray"}
+    assert asked(**plain) == asked(**plain) != asked(**plain | {name: TRAIN_CASES[name]})
 
 
 def test_forces_that_the_reward_judges_differ_with_a_model(tmp_path):

@@ -23,6 +23,8 @@ SOUND = {
         "tensorboard==2.21.0",
         'rosbags>=0.10; extra == "rosbag"',
         'onnx>=1.19; extra == "onnx"',
+        'ray==2.60.0; extra == "ray"',
+        'hydra-submitit-launcher==1.2.0; extra == "cluster"',
         'pytest; extra == "dev"',
     ),
     "torch": ("2.13.0+cpu", "sympy>=1.13"),
@@ -35,6 +37,8 @@ SOUND = {
     "tensorboard": ("2.21.0", "numpy>=1.12"),
     "rosbags": ("0.11.9",),
     "onnx": ("1.23.2",),
+    "ray": ("2.60.0",),
+    "hydra-submitit-launcher": ("1.2.0",),
 }
 
 
