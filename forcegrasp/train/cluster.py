@@ -15,11 +15,10 @@ from forcegrasp.errors import ConfigError, ForcegraspError
 #: How long to wait for cores that others hold, seconds.
 PATIENCE_S = 60.0
 
-#: No statistics sent, no warning of the next version's default, no reports of connections that are tried again.
+#: No statistics sent, no warning of the next version's default.
 QUIET = {
     "RAY_USAGE_STATS_ENABLED": "0",
     "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0",
-    "RAY_BACKEND_LOG_LEVEL": "error",
 }
 
 
@@ -84,7 +83,7 @@ def reserve(config: TrainConfig) -> dict[str, Any]:
     if not group.wait(PATIENCE_S):
         ray.util.remove_placement_group(group)
         raise ConfigError(
-            f"collector.workers={workers}: no room for so many of {cores(config)} core(s) each on the Ray cluster, which"
+            f"collector.workers={workers}: no room for so many of {cores(config)} core(s) each on the cluster, which"
             f" has {ray.cluster_resources().get('CPU', 0):g} cores; ask for fewer, or wait until others have finished"
         )
     strategy = ray.util.scheduling_strategies.PlacementGroupSchedulingStrategy(group)
