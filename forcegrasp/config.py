@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import re
 from dataclasses import dataclass, field
 from typing import Any, cast
 
@@ -213,16 +212,16 @@ class CollectorConfig:
         1, "processes, each with an equal share of ppo.grasps; physics.threads are each one's own", low=1, high=4096
     )
     address: str = option(
-        "", "Ray cluster to join: auto for the one that runs here, or HOST:PORT; this machine if empty"
+        "local",
+        "Ray cluster to use. local: one of this machine, for this run alone. auto: the one that this machine is in",
+        choices=("local", "auto"),
     )
 
     def check(self, path: str) -> None:
         """Refuses what only Ray has without it."""
-        if self.kind == "direct" and (self.workers > 1 or self.address):
+        if self.kind == "direct" and (self.workers > 1 or self.address != "local"):
             name, value = ("workers", self.workers) if self.workers > 1 else ("address", self.address)
             raise ConfigError(f"{path}{name}={value}: direct collection is this process alone; add collector=ray")
-        if not re.fullmatch(r"(auto|[^\s:/]+:\d+)?", self.address):
-            raise ConfigError(f"{path}address={self.address}: must be auto, HOST:PORT or empty")
 
 
 @dataclass

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
@@ -20,6 +21,7 @@ NOTES = """
   -m / --multirun    run every combination of comma-separated values:
                      forcegrasp train -m experiment=ib,no_ib seed=0,1,2   (hydra/launcher=joblib: side by side)
                      forcegrasp train -m sweep=ablation                   the combinations of a preset
+                     the same sweep with hydra.sweep.dir=FOLDER goes on with what is in that folder
   resume=RUN_DIR     go on with an interrupted run, exactly as if it had not been interrupted
   hydra.run.dir=DIR  where to write the run; runs/TIME_EXPERIMENT_SEED by default
 
@@ -81,6 +83,9 @@ def _join(config) -> None:
 def _sweep(overrides: list[str]) -> int:
     if preset := next((o for o in overrides if o.startswith("sweep=") and "," in o), ""):
         raise ConfigError(f"{preset}: one preset at a time")
+    launcher = next((o for o in overrides if o.startswith("hydra/launcher=submitit_")), "")
+    if launcher and not find_spec("hydra_plugins.hydra_submitit_launcher"):
+        raise ConfigError(f"{launcher} needs an extra: pip install 'forcegrasp[cluster]'")
     for single in single_runs(overrides):
         _check(compose("train", single))  # refuses bad input before anything is written
     _, folder = compose_sweep(_without_several_values(overrides))
@@ -97,6 +102,8 @@ def _sweep(overrides: list[str]) -> int:
 
     quoted = folder.replace("\\", "\\\\").replace("'", "\\'")
     sys.argv = ["forcegrasp train", "-m", *overrides, f"hydra.sweep.dir='{quoted}'"]
+    if launcher:
+        print(f"the runs' jobs write to {folder}/.submitit")
     try:
         job()
     finally:  # a sweep that was cut short has something to show, too
@@ -125,11 +132,21 @@ def _sweep_job(composed) -> int:
     hydra, config = HydraConfig.get(), cast("TrainConfig", OmegaConf.to_object(composed))
     overrides = [text for text in hydra.overrides.task if not text.startswith("sweep=")]  # this run is a single one
     _join(config)
-    run = RunDir.create(hydra.runtime.output_dir, config, overrides)
-    status = _train(config, run, resume=False)
+    path = Path(hydra.runtime.output_dir)
+    if _is_begun(path, config):
+        status = _resume(path)
+    else:
+        status = _train(config, RunDir.create(path, config, overrides), resume=False)
     if status == INTERRUPTED:
         raise KeyboardInterrupt  # ends the sweep, not just this run
     return status
+
+
+def _is_begun(path: Path, config) -> bool:
+    """Whether this very run can be gone on with: a scheduler started its job anew, or the sweep was typed again."""
+    from forcegrasp.runs.run_dir import RunDir
+
+    return any(path.glob("checkpoints/*.safetensors")) and RunDir.open(path).config() == config
 
 
 def single_runs(overrides: list[str]) -> list[list[str]]:

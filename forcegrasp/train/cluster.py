@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib
 import os
-import socket
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -52,24 +51,18 @@ def join(config: TrainConfig) -> None:
         os.environ.setdefault(name, value)
     # workers render nothing, and may have no OpenGL to import
     options: dict[str, Any] = {"runtime_env": {"env_vars": {"MUJOCO_GL": "disable"}}}
-    address = config.collector.address
-    if address:
-        options["address"] = address
-    else:
-        options |= {
-            "address": "local",
-            "num_cpus": config.collector.workers * cores(config),
-            "include_dashboard": False,
-        }
+    local = config.collector.address == "local"
+    if local:
+        options |= {"num_cpus": config.collector.workers * cores(config), "include_dashboard": False}
     try:
-        if ":" in address:
-            host, _, port = address.rpartition(":")
-            socket.create_connection((host, int(port)), PATIENCE_S).close()  # Ray itself takes minutes to give up
-        ray.init(**options, log_to_driver=False, logging_level="ERROR")
-    except (OSError, OverflowError, RuntimeError, ValueError) as error:
-        where = f"no Ray cluster answers at collector.address={address}; start one: ray start --head"
-        reason = " ".join(str(error).split())
-        raise ConfigError(where if address else f"Ray could not be started here ({reason})") from error
+        ray.init(config.collector.address, **options, log_to_driver=False, logging_level="ERROR")
+    except (OSError, RuntimeError, ValueError) as error:
+        if local:
+            reason = " ".join(str(error).split())
+            raise ConfigError(f"Ray could not be started here ({reason}); without it: collector=direct") from error
+        raise ConfigError(
+            "collector.address=auto: this machine is not part of a running Ray cluster; start one: ray start --head"
+        ) from error
 
 
 def reserve(config: TrainConfig) -> dict[str, Any]:

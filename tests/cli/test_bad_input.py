@@ -74,10 +74,10 @@ MISTAKES = [
     (["train", "ppo.hidden=[]"], "must not be empty"),
     (["train", "ppo.hidden=[[8]]"], "ppo.hidden"),
     (["train", "ppo.critic=all"], "one of observation, privileged"),
-    (["train", "collector=rays"], "direct, ray"),
+    (["train", "collector=rays"], "did you mean ray"),
     (["train", "collector.workers=2"], "add collector=ray"),
     (["train", "collector=ray", "collector.workers=3"], "can't be shared equally"),
-    (["train", "collector=ray", "collector.address=ray://x:1"], "must be auto, HOST:PORT or empty"),
+    (["train", "collector=ray", "collector.address=head"], "must be one of local, auto"),
     (["train", "action.inductive_bias=perhaps"], "action.inductive_bias"),
     (["train", "grasp.kappa=[1,0]"], "low ≤ high"),
     (["train", "grasp.kappa=0.5"], "grasp.kappa"),
@@ -290,6 +290,16 @@ def test_ray_is_not_installed(sweep, folder, tiny, capsys, monkeypatch):
     before = contents(folder)
     assert main(["train", *sweep, *tiny["train"], "collector=ray"]) == 2
     assert capsys.readouterr() == ("", "forcegrasp: collector.kind=ray needs an extra: pip install 'forcegrasp[ray]'\n")
+    assert contents(folder) == before
+
+
+def test_launcher_is_not_installed(folder, capsys, monkeypatch):
+    monkeypatch.setattr("forcegrasp.cli.train.find_spec", lambda name: None)
+    before = contents(folder)
+    assert main(["train", "-m", "seed=0,1", "hydra/launcher=submitit_slurm"]) == 2
+    assert capsys.readouterr().err == (
+        "forcegrasp: hydra/launcher=submitit_slurm needs an extra: pip install 'forcegrasp[cluster]'\n"
+    )
     assert contents(folder) == before
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -13,6 +14,7 @@ import yaml
 
 from forcegrasp.cli.main import main
 from forcegrasp.runs.run_dir import RunDir
+from forcegrasp.train.logging import TrainingLog
 
 
 @pytest.fixture(autouse=True)
@@ -88,6 +90,57 @@ def test_ctrl_c_ends_the_sweep_and_not_just_one_run(tiny, monkeypatch, capsys):
     monkeypatch.setattr("forcegrasp.train.loop.train", lambda config, *_: started.append(config.seed))
     assert main(["train", "-m", "seed=0,1,2", *tiny["train"]]) == 130
     assert started == [0]
+
+
+def test_the_same_sweep_again_goes_on(tiny, tmp_path, monkeypatch, capsys):
+    """As after a job that a scheduler ended and started anew: finished runs stay, the others end bit for bit alike."""
+    log, interrupt = TrainingLog.batch, [False]
+
+    def batch(self, *args):
+        log(self, *args)
+        if interrupt[0] and self.config.seed == 1:
+            signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr(TrainingLog, "batch", batch)
+    monkeypatch.setattr("forcegrasp.cli.train._draw_curves", lambda folder: None)
+    sweep = ["train", "-m", "seed=0,1,2", *tiny["train"], "ppo.total_frames=24"]
+    assert main([*sweep, "hydra.sweep.dir=whole"]) == 0
+    interrupt[0] = True
+    assert main([*sweep, "hydra.sweep.dir=cut"]) == 130
+    interrupt[0] = False
+    assert len(runs_in(tmp_path / "cut")) == 2
+    capsys.readouterr()
+    assert main([*sweep, "hydra.sweep.dir=cut"]) == 0
+    assert capsys.readouterr().out.count("already trained to the end") == 1
+    whole, cut = runs_in(tmp_path / "whole"), runs_in(tmp_path / "cut")
+    assert [final(run) for run in whole.values()] == [final(run) for run in cut.values()]
+    assert main([*sweep, "ppo.epochs=3", "hydra.sweep.dir=cut"]) == 2
+    assert "already holds a run" in capsys.readouterr().err
+
+
+def test_submitit_runs_side_by_side_and_a_failing_run_takes_no_other_along(tiny, tmp_path):
+    pytest.importorskip("hydra_plugins.hydra_submitit_launcher")
+    (tmp_path / "sweep" / "ib_s0_0").mkdir(parents=True)
+    (tmp_path / "sweep" / "ib_s0_0" / "config.yaml").touch()  # in the way
+    command = ["train", "-m", "seed=0,1", *tiny["train"], "hydra/launcher=submitit_local", "hydra.sweep.dir=sweep"]
+    done = subprocess.run(
+        [sys.executable, "-m", "forcegrasp.cli.main", *command],
+        env={**os.environ, "OMP_NUM_THREADS": "1"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 2, done.stderr
+    first, last = done.stderr.splitlines()
+    assert "seed=0" in first
+    assert last.startswith("forcegrasp: ")
+    assert "ib_s0_0: already holds a run" in last
+    assert final(RunDir("sweep/ib_s1_1"))
+    assert "the runs' jobs write to sweep/.submitit" in done.stdout
+    assert "learning curves are in sweep/curves.png" in done.stdout
+    (told,) = [text for log in Path("sweep/.submitit").glob("*/*.out") if "trained." in (text := log.read_text())]
+    assert "sweep/ib_s1_1" in told
+    assert main(["curves", "sweep"]) == 0
 
 
 def test_a_failing_run_is_named_without_a_traceback(tiny, monkeypatch, capsys):

@@ -297,8 +297,8 @@ def test_option_of_collecting(name, monkeypatch):
         is_initialized = staticmethod(lambda: False)
 
         @staticmethod
-        def init(**options):
-            raise JoinedError(options)
+        def init(address, **options):
+            raise JoinedError({"address": address, **options})
 
     monkeypatch.setattr("forcegrasp.train.cluster.find_ray", lambda: Ray)
 
