@@ -106,6 +106,11 @@ def _sweep(overrides: list[str]) -> int:
         print(f"the runs' jobs write to {folder}/.submitit")
     try:
         job()
+    except Exception as error:
+        if type(error).__module__.startswith("submitit."):
+            reason = " ".join(str(error).splitlines()[:2])
+            raise ForcegraspError(f"{reason}; the same sweep typed again goes on") from error
+        raise
     finally:  # a sweep that was cut short has something to show, too
         _draw_curves(Path(folder))
     return 0
@@ -126,27 +131,26 @@ def _sweep_job(composed) -> int:
     from omegaconf import OmegaConf
 
     from forcegrasp.cli.main import import_mujoco
-    from forcegrasp.runs.run_dir import RunDir
 
     import_mujoco()  # a launcher may have started a process of its own
     hydra, config = HydraConfig.get(), cast("TrainConfig", OmegaConf.to_object(composed))
     overrides = [text for text in hydra.overrides.task if not text.startswith("sweep=")]  # this run is a single one
-    _join(config)
-    path = Path(hydra.runtime.output_dir)
-    if _is_begun(path, config):
-        status = _resume(path)
-    else:
-        status = _train(config, RunDir.create(path, config, overrides), resume=False)
+    status = _begin_or_resume(Path(hydra.runtime.output_dir), config, overrides)
     if status == INTERRUPTED:
+        if str(hydra.runtime.choices["hydra/launcher"]).startswith("submitit_"):  # a scheduler ended this job alone
+            raise ForcegraspError(f"{hydra.runtime.output_dir}: stopped and saved; the same sweep typed again goes on")
         raise KeyboardInterrupt  # ends the sweep, not just this run
     return status
 
 
-def _is_begun(path: Path, config) -> bool:
-    """Whether this very run can be gone on with: a scheduler started its job anew, or the sweep was typed again."""
+def _begin_or_resume(path: Path, config: TrainConfig, overrides: list[str]) -> int:
+    """Goes on with this very run if a scheduler started its job anew, or if the sweep was typed again."""
     from forcegrasp.runs.run_dir import RunDir
 
-    return any(path.glob("checkpoints/*.safetensors")) and RunDir.open(path).config() == config
+    _join(config)
+    if any(path.glob("checkpoints/*.safetensors")) and RunDir.open(path).config() == config:
+        return _resume(path)
+    return _train(config, RunDir.create(path, config, overrides), resume=False)
 
 
 def single_runs(overrides: list[str]) -> list[list[str]]:

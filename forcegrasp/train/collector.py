@@ -41,7 +41,11 @@ class GraspCollector(Collector):
     """
 
     def __init__(self, create_env_fn: Any, policy: Any, *, schedule: LinearSchedule, **options: Any) -> None:
-        plain = {"reset_at_each_iter": True, "track_traj_ids": False, "auto_register_policy_transforms": False}
+        plain: dict[str, Any] = {
+            "reset_at_each_iter": True,
+            "track_traj_ids": False,
+            "auto_register_policy_transforms": False,
+        }
         super().__init__(create_env_fn, policy, **plain | options)
         self.curriculum = CurriculumHook(schedule, self.env)
 

@@ -13,6 +13,9 @@ import pytest
 import yaml
 
 from forcegrasp.cli.main import main
+from forcegrasp.cli.options import compose
+from forcegrasp.cli.train import _begin_or_resume
+from forcegrasp.errors import CheckpointError
 from forcegrasp.runs.run_dir import RunDir
 from forcegrasp.train.logging import TrainingLog
 
@@ -103,19 +106,19 @@ def test_the_same_sweep_again_goes_on(tiny, tmp_path, monkeypatch, capsys):
 
     monkeypatch.setattr(TrainingLog, "batch", batch)
     monkeypatch.setattr("forcegrasp.cli.train._draw_curves", lambda folder: None)
-    sweep = ["train", "-m", "seed=0,1,2", *tiny["train"], "ppo.total_frames=24"]
-    assert main([*sweep, "hydra.sweep.dir=whole"]) == 0
+    options = [*tiny["train"], "ppo.total_frames=24"]
+    sweep = ["train", "-m", "seed=0,1", *options, "hydra.sweep.dir=cut"]
     interrupt[0] = True
-    assert main([*sweep, "hydra.sweep.dir=cut"]) == 130
+    assert main(sweep) == 130
+    assert RunDir("cut/ib_s1_1").load()[1]["frames"] == 8
     interrupt[0] = False
-    assert len(runs_in(tmp_path / "cut")) == 2
     capsys.readouterr()
-    assert main([*sweep, "hydra.sweep.dir=cut"]) == 0
+    assert main(sweep) == 0
     assert capsys.readouterr().out.count("already trained to the end") == 1
-    whole, cut = runs_in(tmp_path / "whole"), runs_in(tmp_path / "cut")
-    assert [final(run) for run in whole.values()] == [final(run) for run in cut.values()]
-    assert main([*sweep, "ppo.epochs=3", "hydra.sweep.dir=cut"]) == 2
-    assert "already holds a run" in capsys.readouterr().err
+    assert main(["train", "seed=1", *options, "hydra.run.dir=alone"]) == 0
+    assert final(RunDir("cut/ib_s1_1")) == final(RunDir("alone"))
+    with pytest.raises(CheckpointError, match="already holds a run"):  # not the same: left alone
+        _begin_or_resume(Path("alone"), compose("train", [*options, "seed=1", "ppo.epochs=3"]), [])
 
 
 def test_submitit_runs_side_by_side_and_a_failing_run_takes_no_other_along(tiny, tmp_path):
