@@ -175,6 +175,7 @@ def test_what_is_given_explicitly_wins(overrides, name, value):
 @pytest.mark.parametrize("experiment", EXPERIMENTS)
 def test_experiments_mix_with_every_other_preset(experiment):
     others = {"budget": "quick", "physics": "reference", "reward": "goal_normalised", "sensors": "authors"}
+    others["collector"] = "ray"
     assert {"experiment", "sweep", *others} == set(groups("train"))
     own = named_options(CONF / "experiment" / f"{experiment}.yaml")
     mixed = options(train(f"experiment={experiment}", *(f"{group}={choice}" for group, choice in others.items())))

@@ -50,6 +50,8 @@ def with_option(verb: str, name: str, value):
         for part in (config.grasp, getattr(config, "curriculum", None)):
             if part:
                 part.radius_m = [0.04, 0.04]
+    if name in ("collector.workers", "collector.address"):  # which direct collection has not, and grasps to share
+        config.collector.kind, config.ppo.grasps = "ray", 4096
     return config
 
 
