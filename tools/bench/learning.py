@@ -34,9 +34,9 @@ def ours(tier: str, grasps: int, report: Report) -> None:
     from forcegrasp.train.loop import Trainer
 
     trainer = Trainer(config := recommended(tier))
-    total, batches = config.ppo.total_frames, iter(trainer.collector())
+    total, batches = config.ppo.total_frames, iter(trainer.collector)
     while trainer.frames < total:
-        trainer.curriculum.apply(trainer.frames)
+        trainer.prepare()
         batch = next(batches)
         reward = float(summarise(batch, config.sensors)["force_reward_normalised"].mean())
         report(trainer.frames + batch.numel(), reward)

@@ -86,14 +86,14 @@ def transformed_env_loop(case: Case) -> Run:
 
 def collection(case: Case) -> Run:
     """A policy that closes, and its batches of episodes."""
-    batches = iter(_closing_trainer(case).collector())
+    batches = iter(_closing_trainer(case).collector)
     return lambda: next(batches).numel()
 
 
 def training(case: Case) -> Run:
     """Collection, and PPO's updates on each batch."""
     trainer = _closing_trainer(case)
-    batches = iter(trainer.collector())
+    batches = iter(trainer.collector)
 
     def run() -> int:
         batch = next(batches)
