@@ -1,11 +1,11 @@
 # make train: learn a grasp-force policy and compare it with the hand-written controller. make test: the tests.
-# make check: the tests and all else that must hold before a commit.
+# make check: the tests and all else that must hold before a commit. make docs: the documentation as a site, in build/docs.
 # They set themselves up in .venv; set PYTHON to use another interpreter (3.11 or newer).
 PYTHON ?= python3
 VENV := .venv
 RUN := runs/latest_$(shell date +%Y-%m-%d_%H-%M-%S)
 
-.PHONY: train test check setup clean
+.PHONY: train test check docs setup clean
 
 train: setup
 	$(VENV)/bin/forcegrasp train experiment=recommended budget=quick hydra.run.dir=$(RUN)
@@ -14,13 +14,21 @@ train: setup
 test: setup
 	$(VENV)/bin/python -m pytest -q -n auto --dist loadgroup
 
-check: setup
+check: $(VENV)/.docs
 	$(VENV)/bin/python tools/check.py
+
+docs: $(VENV)/.docs
+	$(VENV)/bin/python tools/check.py docs
 
 setup: $(VENV)/.ready
 
 $(VENV)/.ready: pyproject.toml constraints.txt tools/setup.sh
 	PYTHON=$(PYTHON) sh tools/setup.sh $(VENV)
+	touch $@
+
+# what makes the site is of no use to those who train or test
+$(VENV)/.docs: $(VENV)/.ready
+	$(VENV)/bin/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[docs]'
 	touch $@
 
 clean:

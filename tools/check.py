@@ -1,4 +1,4 @@
-"""Everything that must hold before a commit: style, import rules, types, tests.
+"""Everything that must hold before a commit: style, import rules, types, documentation, tests.
 
     python tools/check.py               all of it; make check does the same in its own environment
     python tools/check.py style types   these parts alone
@@ -22,6 +22,7 @@ PARTS = {
     "style": [["ruff", "check", "."], ["ruff", "format", "--check", "."]],
     "imports": [["lint-imports", "--no-logo"]],
     "types": [["pyright", "--pythonpath", sys.executable]],
+    "docs": [["sphinx-build", "--quiet", "--fail-on-warning", "--keep-going", "--fresh-env", "docs", "build/docs"]],
     "tests": [["python", "-m", "pytest", "-q", "-n", "auto", "--dist", "loadgroup"]],
 }
 
@@ -43,7 +44,7 @@ def examine(program: str, *arguments: str) -> tuple[str, float, str]:
     found = Path(sys.executable) if program == "python" else PROGRAMS / program
     print(f"\n== {name}", flush=True)
     if not found.exists():
-        return name, 0.0, "failed, not installed: make setup"
+        return name, 0.0, "failed, not installed: make setup" + (", make docs" if "sphinx" in program else "")
     started = time.monotonic()
     status = subprocess.run([found, *arguments], cwd=ROOT, check=False).returncode
     return name, time.monotonic() - started, "failed" if status else "ok"

@@ -3,51 +3,104 @@
 from __future__ import annotations
 
 import dataclasses
+import importlib
 import inspect
 import re
+import subprocess
+import sys
+import tomllib
 from pathlib import Path
+from xml.etree import ElementTree
 
 import matplotlib as mpl
 import pytest
+import yaml
+from doc_pages import PAGES, blocks, program, unpack
 
 from forcegrasp.deploy import Contract, controller
 from forcegrasp.errors import ConfigError
 from forcegrasp.physics.gripper import load_gripper
 
-#: Language, the file a block is said to be (the word after the language), its text.
-_BLOCK = re.compile(r"^```(\w+)(?: (\S+))?\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+#: Pages whose Python runs here as it stands; the others have tests of their own.
+RUN = [
+    "README.md",
+    "docs/calibration.md",
+    "docs/quickstart.md",
+    "docs/write-a-transform.md",
+    "docs/write-an-effect.md",
+    "docs/your-gripper.md",
+]
+ELSEWHERE = {"docs/compare-your-data.md", "docs/deploy.md", "docs/tutorial.md"}
 
 
 @pytest.fixture
-def page(root, tmp_path, monkeypatch):
+def page(tmp_path, monkeypatch):
     """``page(name)``: goes to a folder that holds a page's files; returns its Python blocks, as one program."""
 
-    def unpack(name: str) -> str:
-        text = (root / "docs" / name).read_text(encoding="utf-8")
-        program = ""
-        for block in _BLOCK.finditer(text):
-            language, file, code = block.groups()
-            if file:
-                Path(tmp_path, file).write_text(code, encoding="utf-8")
-            elif language == "python":
-                # the line numbers of a traceback are the page's
-                program += "\n" * (text[: block.start(3)].count("\n") - program.count("\n")) + code
-        return program
+    def read(name: str) -> str:
+        unpack(name, tmp_path)
+        return program(name)
 
+    before = set(sys.modules)
     monkeypatch.chdir(tmp_path)
-    return unpack
+    monkeypatch.syspath_prepend(tmp_path)
+    yield read
+    for name in set(sys.modules) - before:  # what the page's files defined
+        if (tmp_path / f"{name}.py").is_file():
+            del sys.modules[name]
 
 
-@pytest.mark.parametrize("name", ["calibration.md", "your-gripper.md"])
-def test_python_blocks_run(page, root, name):
+def run(name: str, code: str) -> None:
+    """Executes a page's program."""
+    exec(compile(code, name, "exec"), {"__name__": "__main__"})
+
+
+@pytest.mark.parametrize("name", RUN)
+def test_python_blocks_run(page, name):
     mpl.use("Agg")
-    program = page(name)
-    assert program.strip()
-    exec(compile(program, str(root / "docs" / name), "exec"), {"__name__": "__main__"})
+    code = page(name)
+    assert code.strip()
+    run(name, code)
+
+
+def test_no_python_is_left_out():
+    assert {name for name in PAGES if program(name).strip()} == {*RUN, *ELSEWHERE}
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_other_blocks_can_be_read(name):
+    readers = {"yaml": yaml.safe_load, "toml": tomllib.loads, "xml": ElementTree.fromstring, "text": str, "sh": str}
+    for block in blocks(name):
+        if block.language != "python":
+            assert readers[block.language](block.code), block
+
+
+def test_tests_of_the_transform_page_pass(page):
+    page("docs/write-a-transform.md")
+    module = importlib.import_module("test_filtered_force")
+    tests = [value for key, value in vars(module).items() if key.startswith("test_")]
+    assert len(tests) == 5
+    for test in tests:
+        test()
+
+
+def test_effect_of_the_page_is_found_once_it_is_installed(page, tmp_path):
+    page("docs/write-an-effect.md")
+    project = tomllib.loads(Path("pyproject.toml").read_text())
+    (name, value), *none = project["project"]["entry-points"]["forcegrasp.effects"].items()
+    assert not none
+    info = tmp_path / "my_effects-1.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: my-effects\nVersion: 1\n")
+    (info / "entry_points.txt").write_text(f"[forcegrasp.effects]\n{name} = {value}\n")
+    command = [sys.executable, "-m", "forcegrasp.cli.main", "effects", name]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert f"{name}: A force sensor whose sensitivity changes" in done.stdout
 
 
 def test_gripper_of_the_page_does_what_the_page_says(page):
-    page("your-gripper.md")
+    page("docs/your-gripper.md")
     gripper = load_gripper("my_gripper.yaml", Path())
     assert gripper.open_m == 0.04
 
@@ -68,27 +121,26 @@ def test_gripper_of_the_page_does_what_the_page_says(page):
         ("xml", "</mujoco>", ""),
     ],
 )
-def test_messages_are_as_quoted(page, root, file, old, new):
-    page("your-gripper.md")
+def test_messages_are_as_quoted(page, file, old, new):
+    page("docs/your-gripper.md")
     path = Path(f"my_gripper.{file}")
     text = path.read_text()
     assert old in text
     path.write_text(text.replace(old, new, 1))
     with pytest.raises(ConfigError) as caught:
         load_gripper("./my_gripper.yaml")
-    quoted = re.findall(r"^\| [^|]* \| `([^`]+)`", (root / "docs/your-gripper.md").read_text(), re.MULTILINE)
+    quoted = re.findall(r"^\| [^|]* \| `([^`]+)`", PAGES["docs/your-gripper.md"], re.MULTILINE)
     assert any(message in str(caught.value) for message in quoted), str(caught.value)
 
 
-def test_loop_of_the_deploy_page_reaches_its_goal(page, root, capsys):
-    code = compile(page("deploy.md"), str(root / "docs/deploy.md"), "exec")
-    exec(code, {"__name__": "__main__"})
+def test_loop_of_the_deploy_page_reaches_its_goal(page, capsys):
+    run("docs/deploy.md", page("docs/deploy.md"))
     printed = capsys.readouterr().out
     assert [float(number) for number in re.findall(r"\d\.\d+", printed)] == pytest.approx([0.5, 0.5], abs=0.05)
 
 
-def test_faults_and_entries_of_the_deploy_page_are_those_of_the_controller(root):
-    text = (root / "docs/deploy.md").read_text(encoding="utf-8")
+def test_faults_and_entries_of_the_deploy_page_are_those_of_the_controller():
+    text = PAGES["docs/deploy.md"]
     table_rows = [re.split(r"(?<!\\)\|", line)[1:-1] for line in text.splitlines() if line.startswith("| ")]
     rows = [row for row in table_rows if len(row) == 3]
     entries = {name for row in rows for name in re.findall(r"`(\w+)`", row[2])}

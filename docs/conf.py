@@ -1,0 +1,72 @@
+"""How Sphinx makes a site of these pages: ``make docs``. The pages are plain Markdown, and say nothing about Sphinx.
+
+What the lines of a contents page (index.md, README.md) link to first is its navigation, in the same order and under the
+same headings; pages that none of them names are listed at the end, so that none gets lost.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from forcegrasp import __version__
+
+HERE = Path(__file__).parent
+
+project = "forcegrasp"
+author = "the forcegrasp authors"
+version = release = __version__
+extensions = ["myst_parser"]
+html_theme = "furo"
+html_title = f"forcegrasp {__version__}"
+html_show_copyright = False
+html_copy_source = False
+highlight_language = "text"
+myst_heading_anchors = 4
+nitpicky = True
+
+CONTENTS = ("index", "README")
+LINK = re.compile(r"\]\(([^)#:]+\.md)\)")
+
+
+def setup(app) -> None:
+    app.connect("source-read", read)
+
+
+def read(_app, name: str, source: list[str]) -> None:
+    """Gives a contents page its navigation, and makes downloads of links to Markdown outside docs/."""
+    page = HERE / f"{name}.md"
+
+    def outside(link: re.Match) -> str:
+        inside = (page.parent / link[1]).resolve().is_relative_to(HERE)
+        return link[0] if inside else f"](path:{link[1]})"
+
+    if page.stem in CONTENTS:
+        source[0] += navigation(page, source[0])
+    source[0] = LINK.sub(outside, source[0])
+
+
+def navigation(page: Path, text: str) -> str:
+    """Hidden tables of contents, one for each heading with links, and one for what is not linked at all."""
+    parts, seen = [], set()
+    for section in re.split(r"^## ", text, flags=re.MULTILINE):
+        firsts = [found[1] for line in section.splitlines() if (found := LINK.search(line))]
+        new = [link for link in dict.fromkeys(firsts) if is_below(page, link) and link not in seen]
+        seen |= set(new)
+        if new:
+            parts.append((section.splitlines()[0], new))
+    if page.stem == "index":
+        rest = sorted(path.name for path in HERE.glob("*.md") if path != page and path.name not in seen)
+        parts += [("More", rest)] if rest else []
+    return "".join(
+        "\n```{toctree}\n:hidden:\n:caption: " + caption.strip("# ") + "\n\n" + "\n".join(links) + "\n```\n"
+        for caption, links in parts
+    )
+
+
+def is_below(page: Path, link: str) -> bool:
+    """Whether a contents page lists a link's page: one beside it, or the contents page of a folder below it."""
+    target = (page.parent / link).resolve()
+    if target.stem in CONTENTS:
+        return target.parent.parent == page.parent
+    return target.parent == page.parent
