@@ -80,7 +80,7 @@ class Run:
     """One variant and the grasps that it simulates."""
 
     def __init__(self, tier: str, change: Callable[[mujoco.MjModel], None], n: int) -> None:
-        gripper = Variant(*(getattr(TIAGO, field.name) for field in fields(TIAGO)), change)
+        gripper = Variant(**{field.name: getattr(TIAGO, field.name) for field in fields(TIAGO)}, change=change)
         self.plant = Plant(gripper, n, tier, threads=1)
         self.ids = np.arange(n)
         self.grasps = GraspSampler(GraspConfig())(np.random.default_rng(0), self.ids)
