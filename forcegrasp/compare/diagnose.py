@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from forcegrasp.compare.base_fit import BaseFit
-from forcegrasp.compare.fit import Fit, Simulators, fit_exactly, fit_once
+from forcegrasp.compare.fit import Fit, Simulators, fit_exactly
 from forcegrasp.compare.floor import beyond_fit, cells, excess, numerical_error, numerical_floor
 from forcegrasp.compare.heldout import heldout_residual, log_likelihood, make_folds, rms
-from forcegrasp.compare.problem import Problem
-from forcegrasp.compare.score import Background, Score, best_size, null_gains, score_effects
+from forcegrasp.compare.refine import refine
+from forcegrasp.compare.score import Background, Score, Signatures, null_gains
 from forcegrasp.compare.target import Target
 from forcegrasp.effects import Effect
 from forcegrasp.effects.quantisation import Quantisation
@@ -36,6 +35,8 @@ _SETTLED = 3
 _HOPELESS = 0.2
 # A refit gains at most about twice what a signature promises.
 _UNSEEN = 0.5
+# A signature of an earlier round is simulated anew if it gains this share of what makes its effect worth a fit.
+_STALE = 0.3
 # Effects whose signatures are that parallel can't be told apart, whatever the likelihood says.
 _PARALLEL = 0.995
 # An effect with fewer parameters that gains this share of what the best one gains can't be ruled out.
@@ -132,11 +133,12 @@ def diagnose(
         error = rms(heldout_residual(fit, target, folds), target)
         progress("found quantisation: readings are multiples of one step")
         steps.append(Step("effect", (Quantisation.name,), (), (), error_before, error))
+    signatures = Signatures(effects, target, simulators)
     for _ in range(MOST_EFFECTS):
-        known = {effect for effect, _ in fit.problem.effects}
-        step = _look_further(
-            target, fit, simulators, [e for e in effects if e not in known], folds, numerical, rng, progress
-        )
+        untried = [e for e in effects if e not in {known for known, _ in fit.problem.effects}]
+        if not untried:
+            break
+        step = _look_further(target, fit, simulators, signatures, untried, folds, numerical, rng, progress)
         steps.append(step)
         if step.verdict == "none":
             break
@@ -173,6 +175,7 @@ def _look_further(
     target: Target,
     fit: Fit,
     simulators: Simulators,
+    signatures: Signatures,
     effects: Sequence[type[Effect]],
     folds: Sequence[np.ndarray],
     numerical: Sequence[np.ndarray],
@@ -181,20 +184,21 @@ def _look_further(
 ) -> Step:
     background = Background(fit, numerical)
     progress(f"trying {len(effects)} effects")
-    groups = score_effects(fit, target, simulators, background, effects)
-    ranked = sorted((group[0] for group in groups), key=lambda s: -s.gain)
+    new = signatures.missing(effects)
+    signatures.simulate(fit, new)
+    groups = signatures.scores(fit, background, effects)
     null = null_gains(groups, rng)
+    stale = {g[0].effect for g in groups if g[0].gain > _STALE * _bar(groups, null, fit, target)} - set(new)
+    if stale:
+        signatures.simulate(fit, stale)
+        groups = signatures.scores(fit, background, effects)
+    ranked = sorted((group[0] for group in groups), key=lambda s: -s.gain)
     held = heldout_residual(fit, target, folds)
     start = _Round(target, fit, simulators, background, folds, held)
     error = rms(held, target)
-    bar = float(np.quantile(null, 1 - ALARM))
-    beyond = np.sum(fit.residual**2) - target.mask.sum() * 4
-    least = max(bar, _HOPELESS * ranked[0].gain, _UNSEEN * LEAST_SHARE * beyond) if ranked else np.inf
+    least = _bar(groups, null, fit, target)
     hopeful = [s for s in ranked if s.gain > least][:_REFITTED]
-    candidates = []
-    for number, score in enumerate(hopeful, 1):
-        progress(f"refitting with {score.effect.name} {score.variant} ({number} of {len(hopeful)})")
-        candidates.append(start.refit(score, null))
+    candidates = start.refit(hopeful, null, progress)
     best: dict[str, Candidate] = {}
     for candidate in sorted(candidates, key=lambda c: -c.heldout_gain):
         best.setdefault(candidate.effect.name, candidate)  # of several variants the best one
@@ -211,6 +215,15 @@ def _look_further(
     return Step(verdict, names, ordered, tuple(ranked), error, winner.error_after)
 
 
+def _bar(groups: Sequence[Sequence[Score]], null: np.ndarray, fit: Fit, target: Target) -> float:
+    """What a signature must gain for its effect to be worth a fit."""
+    if not groups:
+        return np.inf
+    beyond = float(np.sum(fit.residual**2) - target.mask.sum() * 4)
+    best = max(group[0].gain for group in groups)
+    return max(float(np.quantile(null, 1 - ALARM)), _HOPELESS * best, _UNSEEN * LEAST_SHARE * beyond)
+
+
 @dataclass(frozen=True, eq=False)
 class _Round:
     """What one round of the search starts from."""
@@ -222,13 +235,14 @@ class _Round:
     folds: Sequence[np.ndarray]
     held: np.ndarray  #: residuals of held-out grasps, ``(G, S, 4)``
 
-    def refit(self, score: Score, null: np.ndarray) -> Candidate:
-        """A rough fit with one more effect, from where its best signature puts it."""
-        p_family = (1 + int(np.sum(null >= score.gain))) / (1 + len(null))
-        values = best_size(score, self.fit, self.target, self.simulators, self.background)
-        score = dataclasses.replace(score, values=values)
-        refit = refine([score], self.target, self.fit, self.simulators)
-        return self._judge(score.effect, score.variant, refit, p_family, score.signature)
+    def refit(self, scores: Sequence[Score], null: np.ndarray, progress: Callable[[str], None]) -> list[Candidate]:
+        """Rough fits with one more effect, from where the best signatures put them."""
+        candidates = []
+        for one in refine(scores, self.target, self.fit, self.simulators, self.background, progress):
+            score = one.score
+            p_family = (1 + int(np.sum(null >= score.gain))) / (1 + len(null))
+            candidates.append(self._judge(score.effect, score.variant, one.fit, p_family, score.signature))
+        return candidates
 
     def settle(self, ordered: Sequence[Candidate], progress: Callable[[str], None]) -> tuple[Candidate, ...]:
         """Fits the best one, and what comes near it, with the model itself: rough fits may stop short of an optimum."""
@@ -251,15 +265,6 @@ class _Round:
         fall = max((1 - rms(after, target, w) / rms(held, target, w) for _, w in cells(target)), default=0.0)
         before, behind = rms(held, target), rms(after, target)
         return Candidate(effect, variant, refit, p_family, gains, behind, _share(before, behind), fall, signature)
-
-
-def refine(scores: Sequence[Score], target: Target, fit: Fit, simulators: Simulators) -> Fit:
-    """Fits everything again with one more effect, from where its best signature puts it."""
-    score, old = scores[0], fit.problem
-    problem = Problem(old.gripper, old.grasps, [*old.effects, (score.effect, score.variant)])
-    added = [e.coordinate(v) for e, v in zip(problem.entries[len(old) :], score.values, strict=True)]
-    start = np.r_[fit.vector, added]
-    return fit_once(target, problem, simulators, start, fit.correction, rounds=0, known_slopes=fit.jacobian)
 
 
 def _convincing(candidate: Candidate, least_gain: float) -> bool:

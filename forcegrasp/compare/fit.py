@@ -92,7 +92,7 @@ def fit_once(
     if correction is None:
         correction = 0.0 if one_model else _difference(problem, simulators, vector)
     total = 0
-    for turn in range(max(1, rounds) if free.any() else 0):
+    for _ in range(max(1, rounds) if free.any() else 0):
         vector, count = _descend(local, vector, correction, free, _TOLERANCE if rounds else _ROUGH)
         total += count
         if one_model or rounds == 0:
@@ -100,7 +100,7 @@ def fit_once(
         renewed = _difference(problem, simulators, vector)
         change = np.sqrt(np.mean(((renewed - correction) / target.sigma)[target.mask] ** 2))
         correction = renewed
-        if change < 0.02 and turn:
+        if change < 0.02:
             break
     return _finish(local, vector, local.value(vector) + correction, correction, free, total)
 

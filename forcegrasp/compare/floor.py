@@ -23,12 +23,13 @@ _LEAST_SAMPLES = 40
 def numerical_error(fit: Fit, target: Target) -> tuple[np.ndarray, ...]:
     """How far the prediction moves with half the physics step, and with the other collision code, ÷ noise.
 
-    Each ``(G, S, 4)``.
+    Each ``(G, S, 4)``. The fit must be one of the model itself, no rough one.
     """
     gripper, grasps, case = fit.problem.gripper, fit.problem.grasps, [fit.problem.case(fit.vector)]
-    exact = predict(Replay(gripper, grasps), case)[0]
     others = (Replay(gripper, grasps, step_factor=0.5), Replay(gripper, grasps, other_collisions=True))
-    return tuple(np.where(target.mask[..., None], (predict(o, case)[0] - exact) / target.sigma, 0.0) for o in others)
+    return tuple(
+        np.where(target.mask[..., None], (predict(o, case)[0] - fit.predicted) / target.sigma, 0.0) for o in others
+    )
 
 
 def beyond_fit(fit: Fit, numerical: Sequence[np.ndarray]) -> tuple[np.ndarray, ...]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from forcegrasp.effects import Effect
-from forcegrasp.measure.replay import EffectOn, Replay
+from forcegrasp.measure.replay import EffectOn, Motion, Replay, join
 
 
 @dataclass(frozen=True)
@@ -37,22 +37,33 @@ class Case:
 
 
 def predict(replay: Replay, cases: Sequence[Case]) -> np.ndarray:
-    """Predicted signals of all cases, ``(cases, G, S, 4)``; everything that must be simulated is simulated at once."""
-    keys = [case.simulation_key() for case in cases]
-    first = {key: index for index, key in reversed(list(enumerate(keys)))}
-    simulated = [cases[index] for index in sorted(first.values())]
-    place = {cases[index].simulation_key(): n for n, index in enumerate(sorted(first.values()))}
-    count = len(replay.grasps)
-    base = {
-        name: np.concatenate([c.base[name] for c in simulated]) for name in simulated[0].base if name != "force_scale"
-    }
-    grasp = np.tile(np.arange(count), len(simulated))
-    motion = replay.simulate(grasp, base, _spread(simulated, count, lambda e: not e.effect.reads_only(e.variant)))
-    rows = np.concatenate([np.arange(count) + place[key] * count for key in keys])
+    """Predicted signals of all cases, ``(cases, G, S, 4)``; everything that must be simulated is simulated at once.
+
+    The replay remembers how the first case of each call moved: the next call often asks for that one again.
+    """
+    keys, count = [case.simulation_key() for case in cases], len(replay.grasps)
+    first = dict(zip(reversed(keys), reversed(cases), strict=True))  # of cases that share a simulation
+    known = [key for key in first if key in replay.remembered]
+    fresh = [key for key in first if key not in replay.remembered]
+    motions = [replay.remembered[key] for key in known]
+    if fresh:
+        motions.append(_simulate(replay, [first[key] for key in fresh]))
+    motion = join(motions)
+    place = {key: np.arange(count) + n * count for n, key in enumerate([*known, *fresh])}
+    replay.remember(keys[0], motion, place[keys[0]])
+    rows = np.concatenate([place[key] for key in keys])
     scale = np.concatenate([case.base["force_scale"] for case in cases])
     readings = replay.read(motion, rows, scale, _spread(cases, count, lambda e: e.effect.reads()))
     signals = np.concatenate([readings.position, readings.force], axis=-1)
     return signals.reshape(len(cases), count, *signals.shape[1:])
+
+
+def _simulate(replay: Replay, cases: Sequence[Case]) -> Motion:
+    """All grasps of one case after those of the other."""
+    count = len(replay.grasps)
+    base = {name: np.concatenate([c.base[name] for c in cases]) for name in cases[0].base if name != "force_scale"}
+    effects = _spread(cases, count, lambda e: not e.effect.reads_only(e.variant))
+    return replay.simulate(np.tile(np.arange(count), len(cases)), base, effects)
 
 
 def _spread(cases: Sequence[Case], count: int, acts: Callable[[Applied], bool]) -> list[EffectOn]:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import dataclasses
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,7 +20,7 @@ _REACH = 3.0
 # Parameters, gain and signature, as in a Score; None where there is no trace.
 _Found = tuple[np.ndarray, float, np.ndarray] | None
 # Sizes around the promised one that are looked at before an effect is fitted.
-_SIZES = (0.4, 0.6, 0.8, 1.0, 1.3, 1.6, 2.0, 2.6)
+_SIZES = (0.45, 0.67, 1.0, 1.4, 1.9, 2.6)
 
 
 @dataclass(frozen=True)
@@ -48,43 +49,89 @@ class Background:
         return vectors - self._basis @ (self._basis.T @ vectors)
 
 
-def score_effects(
-    fit: Fit, target: Target, simulators: Simulators, background: Background, effects: Sequence[type[Effect]]
-) -> list[list[Score]]:
-    """Scores effects on top of a fit by their finite-size signatures.
+class Signatures:
+    """What every effect changes of the signals, for each of its variants and trials, as it was simulated last.
 
-    Returns:
-      For each effect and variant all its trials' scores, best first; effects that leave no trace are missing.
+    An effect that another one is added to changes its signature little. So a signature need not be simulated anew in
+    each round, only where it may count.
     """
-    tried = [(e, variant, values) for e in effects for variant in e.variants for values in e.trials()]
-    change = _changes(tried, fit, target, simulators)
-    clean = background.remove(change)
-    residual = fit.residual.ravel()
-    found: dict[tuple[type[Effect], str], list[Score]] = {}
-    for (effect, variant), columns in _kinds(tried).items():
-        if _is_linear(effect):
-            options = [_joint(clean[:, columns], residual, [tried[c][2] for c in columns])]
-        else:
-            options = [_single(clean[:, c], change[:, c], residual, effect, tried[c][2]) for c in columns]
-        scores = [Score(effect, variant, *option) for option in options if option is not None]
-        if scores:
-            found[effect, variant] = sorted(scores, key=lambda s: -s.gain)
-    return list(found.values())
+
+    def __init__(self, effects: Sequence[type[Effect]], target: Target, simulators: Simulators) -> None:
+        self._target, self._simulators = target, simulators
+        self._tried = [(e, variant, values) for e in effects for variant in e.variants for values in e.trials()]
+        self._changes: list[np.ndarray] = [np.empty(0)] * len(self._tried)  # each ``(N,)``; not simulated yet if empty
+
+    def _places(self, effects: Collection[type[Effect]]) -> list[int]:
+        return [index for index, trial in enumerate(self._tried) if trial[0] in effects]
+
+    def missing(self, effects: Sequence[type[Effect]]) -> list[type[Effect]]:
+        """Those of the effects that were never simulated."""
+        return [
+            e for e in effects if any(t[0] is e and not len(c) for t, c in zip(self._tried, self._changes, strict=True))
+        ]
+
+    def simulate(self, fit: Fit, effects: Collection[type[Effect]]) -> None:
+        """Simulates these effects on top of a fit, all at once."""
+        places = self._places(effects)
+        if places:
+            changes = _changes([self._tried[i] for i in places], fit, self._target, self._simulators)
+            for place, change in zip(places, changes.T, strict=True):
+                self._changes[place] = change
+
+    def scores(self, fit: Fit, background: Background, effects: Sequence[type[Effect]]) -> list[list[Score]]:
+        """How well these effects fit what a fit leaves.
+
+        Returns:
+          For each effect and variant all its trials' scores, best first; effects that leave no trace are missing.
+        """
+        residual = fit.residual.ravel()
+        places = self._places(effects)
+        tried = [self._tried[i] for i in places]
+        change = np.stack([self._changes[i] for i in places], axis=1)
+        clean = background.remove(change)
+        found: dict[tuple[type[Effect], str], list[Score]] = {}
+        for (effect, variant), columns in _kinds(tried).items():
+            if _is_linear(effect):
+                options = [_joint(clean[:, columns], residual, [tried[c][2] for c in columns])]
+            else:
+                options = [_single(clean[:, c], change[:, c], residual, effect, tried[c][2]) for c in columns]
+            scores = [Score(effect, variant, *option) for option in options if option is not None]
+            if scores:
+                found[effect, variant] = sorted(scores, key=lambda s: -s.gain)
+        return list(found.values())
 
 
-def best_size(score: Score, fit: Fit, target: Target, simulators: Simulators, background: Background) -> np.ndarray:
-    """The effect's parameters with the first one at the size that leaves least, ``(parameters,)``.
+def best_sizes(
+    scores: Sequence[Score], fit: Fit, target: Target, simulators: Simulators, background: Background
+) -> list[Score]:
+    """The same effects with their first parameters at the sizes that leave least, and what these gain.
 
-    A signature is straight, and thresholds are not: several sizes around the one it promises are simulated.
+    A signature is straight, and thresholds are not: several sizes around the one it promises are simulated, those of
+    all effects at once.
     """
+    options = [_sizes(score) for score in scores]
+    tried = [(s.effect, s.variant, values) for s, sizes in zip(scores, options, strict=True) for values in sizes]
+    if not tried:
+        return list(scores)
+    residual = fit.residual.reshape(-1, 1)
+    left = np.sum(background.remove(residual - _changes(tried, fit, target, simulators)) ** 2, axis=0)
+    gains, found, low = np.sum(background.remove(residual) ** 2) - left, [], 0
+    for score, sizes in zip(scores, options, strict=True):
+        if sizes:
+            best = int(np.argmax(gains[low : low + len(sizes)]))
+            score = dataclasses.replace(score, values=sizes[best], gain=float(gains[low + best]))
+        found.append(score)
+        low += len(sizes)
+    return found
+
+
+def _sizes(score: Score) -> list[np.ndarray]:
+    """Parameters of several sizes around a score's; none where signatures are straight."""
     first = score.effect.parameters[0]
     if _is_linear(score.effect) or first.logarithmic or score.values[0] == 0:
-        return score.values
+        return []
     sizes = np.unique(np.clip(score.values[0] * np.array(_SIZES), first.low, first.high))
-    tried = [np.array([size, *score.values[1:]]) for size in sizes]
-    change = _changes([(score.effect, score.variant, values) for values in tried], fit, target, simulators)
-    left = background.remove(fit.residual.reshape(-1, 1) - change)
-    return tried[int(np.argmin(np.sum(left**2, axis=0)))]
+    return [np.array([size, *score.values[1:]]) for size in sizes]
 
 
 def _changes(
@@ -102,6 +149,8 @@ def null_gains(scores: list[list[Score]], rng: np.random.Generator, draws: int =
 
     The base fit is simulated again with new noise; what it would absorb is already out of the signatures.
     """
+    if not scores:
+        return np.zeros(draws)
     signatures = np.stack([s.signature for group in scores for s in group], axis=1).astype(np.float32)
     gains = np.empty(draws)
     for low in range(0, draws, 50):

@@ -11,13 +11,14 @@ import numpy as np
 
 from forcegrasp.compare.base_fit import BaseFit, check_gradient, fit_base
 from forcegrasp.compare.comparison import Comparison
-from forcegrasp.compare.diagnose import Diagnosis, diagnose, refine
+from forcegrasp.compare.diagnose import Diagnosis, diagnose
 from forcegrasp.compare.fit import Fit, Simulators, fit_exactly, fit_once
 from forcegrasp.compare.floor import beyond_fit, numerical_error, numerical_floor
 from forcegrasp.compare.heldout import heldout_residual, make_folds, rms
 from forcegrasp.compare.intervals import intervals, standard_errors, warnings
 from forcegrasp.compare.problem import Problem
-from forcegrasp.compare.score import Background, score_effects
+from forcegrasp.compare.refine import refine
+from forcegrasp.compare.score import Background, Signatures
 from forcegrasp.compare.target import Target, make_target
 from forcegrasp.effects import Effect, catalogue
 from forcegrasp.effects.model_file import Fitted, FoundEffect, Model
@@ -161,13 +162,15 @@ def add_effect(loaded: Loaded[MeasurementSet], model: Model, effect: type[Effect
         held = heldout_residual(before, target, folds)
         same = model_of(before, target, loaded, numerical_error(before, target))
         return Added(target, before, before, rms(held * coarse, target), rms(held, target), same)
-    groups = score_effects(before, target, simulators, Background(before, []), [effect])
-    if not groups:
+    background, signatures = Background(before, []), Signatures([effect], target, simulators)
+    signatures.simulate(before, [effect])
+    scores = [group[0] for group in signatures.scores(before, background, [effect])]
+    if not scores:
         raise ConfigError(
             f"effect={effect.name}: leaves no trace in these data at any size; record grasps that show it"
         )
-    fits = [refine(group, target, before, simulators) for group in groups]
-    nearest = min(fits, key=lambda f: f.cost)
+    refined = refine(scores, target, before, simulators, background)
+    nearest = min((r.fit for r in refined), key=lambda f: f.cost)
     after = fit_exactly(target, nearest.problem, simulators, nearest.vector)
     error_before, error_after = (rms(heldout_residual(f, target, folds), target) for f in (before, after))
     better = model_of(after, target, loaded, numerical_error(after, target))

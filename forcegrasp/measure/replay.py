@@ -19,6 +19,8 @@ THREADS = 0
 _AT_REST_M = 1e-3
 #: Rows × physics steps that are kept in memory at once.
 _CHUNK = 8_000_000
+# Motions that are kept; those of 24 grasps of 6 s take 3 MB.
+_REMEMBERED = 6
 
 
 @dataclass(frozen=True)
@@ -94,7 +96,17 @@ class Replay:
         self._fresh = np.zeros(self._command.shape[:2], bool)
         for index, start in enumerate(starts):
             self._fresh[start, index] = True
+        #: Motions of all grasps that may be asked for again, by what was simulated; see :meth:`remember`.
+        self.remembered: dict[bytes, Motion] = {}
         self.start_m = np.stack([start_position(g, gripper.open_m) for g in self.grasps])
+
+    def remember(self, key: bytes, motion: Motion, rows: np.ndarray) -> None:
+        """Keeps these rows of a motion under a name; the ones kept longest ago are forgotten."""
+        names = ("grasp", "position", "pad_force", "object_position")
+        self.remembered.pop(key, None)  # it goes to the end
+        self.remembered[key] = Motion(*(getattr(motion, name)[rows] for name in names))
+        for oldest in list(self.remembered)[:-_REMEMBERED]:
+            del self.remembered[oldest]
 
     def _at_steps(self, values: np.ndarray, starts: np.ndarray) -> np.ndarray:
         """The sample in force at each physics step."""
@@ -118,8 +130,7 @@ class Replay:
                 part = slice(low, min(n, low + rows_at_once))
                 chunk = {name: value[part] for name, value in base.items()}
                 parts.append(self.simulate(grasp[part], chunk, [_cut(e, part) for e in effects]))
-            names = ("grasp", "position", "pad_force", "object_position")
-            return Motion(*(np.concatenate([getattr(p, name) for p in parts]) for name in names))
+            return join(parts)
         plant = Plant(self.gripper, n, self.tier, THREADS, self._step_factor, self._other_collisions)
         plant.attach([(e.effect(e.values, self.dt, e.variant), e.rows) for e in effects if len(e.rows)])
         ids = np.arange(n)
@@ -172,6 +183,14 @@ class Replay:
         if true_position is not None:
             position = true_position[count, steps]
         return Readings(position, force[count, steps], objects)
+
+
+def join(motions: Sequence[Motion]) -> Motion:
+    """The rows of several motions, one after the other."""
+    if len(motions) == 1:
+        return motions[0]
+    names = ("grasp", "position", "pad_force", "object_position")
+    return Motion(*(np.concatenate([getattr(m, name) for m in motions]) for name in names))
 
 
 def start_position(grasp: MeasuredGrasp, open_m: float) -> np.ndarray:

@@ -86,6 +86,7 @@ class Plant:
         self._origin = gripper.closed
         self._fields: dict[str, np.ndarray] = {}
         self._base: dict[str, np.ndarray] = {}
+        self._rubbing: np.ndarray | None = None  # which fingers' friction was stiffened, ``(n, 2)``
         self._effects: list[Effect] = []
         self._hooked: dict[str, list[Effect]] = {}
         self.force_scale = np.ones(n)  #: f_α, factor from the force sensors to the reading, ``(n,)``
@@ -93,6 +94,11 @@ class Plant:
         #: on the fingers (positive opens) and on the object; ``(n, 2)`` and ``(n,)``.
         self.friction_n, self.pad_shift_m, self.finger_push_n = (np.zeros((n, 2)) for _ in range(3))
         self.object_push_n = np.zeros(n)
+        self.position = np.zeros((n, 2))  #: finger positions (left, right), metres; 0 is closed
+        #: Sum of each finger's force sensor at the last physics step, before f_α, newtons, ``(n, 2)``.
+        self.pad_force = np.zeros((n, 2))
+        #: True fingertip forces (left, right): the interaction with the object times f_α, newtons, ``(n, 2)``.
+        self.force = np.zeros((n, 2))
         self.measured_force = np.zeros((n, 2))  #: what the force sensors say, newtons
         self.measured_position = np.zeros((n, 2))  #: what the encoders say, metres
         #: What the encoders said when a real gripper was recorded, metres, ``(n, 2)``; None if only simulated.
@@ -126,11 +132,6 @@ class Plant:
     # --- state ---------------------------------------------------------------------------------------------------
 
     @property
-    def position(self) -> np.ndarray:
-        """Finger positions (left, right), metres, ``(n, 2)``; 0 is closed."""
-        return (self._qpos[:, self._finger_qpos] - self._origin) * self._sign
-
-    @property
     def velocity(self) -> np.ndarray:
         """Finger velocities, m/s, ``(n, 2)``; positive opens."""
         return self._qvel[:, self.finger_dofs] * self._sign
@@ -139,20 +140,6 @@ class Plant:
     def object_position(self) -> np.ndarray:
         """Object position along the grasp axis from where the scene puts it, metres, ``(n,)``."""
         return self._qpos[:, self._object_qpos] - self._object_origin
-
-    @property
-    def pad_force(self) -> np.ndarray:
-        """Sum of each finger's force sensor at the last physics step, before f_α, newtons, ``(n, 2)``."""
-        # contiguous, lest the order of the sum depend on n
-        return np.stack([np.ascontiguousarray(self._sensors[:, part]).sum(axis=-1) for part in self._readings], axis=1)
-
-    @property
-    def force(self) -> np.ndarray:
-        """True fingertip forces (left, right): the interaction with the object times f_α, newtons, ``(n, 2)``."""
-        force = self.pad_force
-        for effect in self._hooked.get("interaction", ()):
-            force[effect.rows] = effect.interaction(force[effect.rows])
-        return force * self.force_scale[:, None]
 
     # --- parameters ----------------------------------------------------------------------------------------------
 
@@ -225,6 +212,7 @@ class Plant:
         """
         for name, field in self._fields.items():  # whatever effects made of it
             field[ids] = self._base[name][ids]
+        self._rubbing = None
         for effect in self._effects:
             which = np.flatnonzero(np.isin(effect.rows, ids))
             effect.reset(which)
@@ -301,10 +289,13 @@ class Plant:
     def _write_friction(self) -> None:
         if not self.friction_n.any() and "dof_frictionloss" not in self._fields:
             return
-        base, loss = self.base("dof_frictionloss"), self.field("dof_frictionloss")
-        for side, dof in enumerate(self.finger_dofs):
-            loss[:, dof] = base[:, dof] + self.friction_n[:, side]
-            self.stiffen_friction(dof)
+        base = self.base("dof_frictionloss")[:, self.finger_dofs]
+        loss = base + self.friction_n
+        self.field("dof_frictionloss")[:, self.finger_dofs] = loss
+        if not np.array_equal(loss > base, self._rubbing):
+            self._rubbing = loss > base
+            for dof in self.finger_dofs:
+                self.stiffen_friction(dof)
 
     def stiffen_friction(self, dof: int, rows: np.ndarray | slice = slice(None)) -> None:
         """Lets dry friction that an effect added hold instead of creep, as far as the step allows."""
@@ -323,7 +314,15 @@ class Plant:
                     self.field(field)[:, index] = getattr(self.model, field)[index] + shift
 
     def _read(self) -> None:
-        self.measured_force, self.measured_position = self.force, self.position
+        self.position = (self._qpos[:, self._finger_qpos] - self._origin) * self._sign
+        # contiguous, lest the order of the sum depend on n
+        sums = [np.ascontiguousarray(self._sensors[:, part]).sum(axis=-1) for part in self._readings]
+        self.pad_force = np.stack(sums, axis=1)
+        force = self.pad_force.copy()
+        for effect in self._hooked.get("interaction", ()):
+            force[effect.rows] = effect.interaction(force[effect.rows])
+        self.force = force * self.force_scale[:, None]
+        self.measured_force, self.measured_position = self.force.copy(), self.position.copy()
         for hook, reading in (("read_force", self.measured_force), ("read_position", self.measured_position)):
             for effect in self._hooked.get(hook, ()):
                 reading[effect.rows] = getattr(effect, hook)(reading[effect.rows])
