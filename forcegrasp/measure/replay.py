@@ -135,15 +135,19 @@ class Replay:
         plant.attach([(e.effect(e.values, self.dt, e.variant), e.rows) for e in effects if len(e.rows)])
         ids = np.arange(n)
         plant.reset(ids, write_base(plant, ids, base), self.start_m[grasp])
-        position, pad_force = np.empty((2, self._steps, n, 2))
-        object_position = np.empty((self._steps, n))
-        for step in range(self._steps):
-            position[step], pad_force[step] = plant.position, plant.force
-            object_position[step] = plant.object_position
-            if step < self._steps - 1:
+        position, pad_force = np.empty((2, n, self._steps, 2))
+        objects = np.empty((n, self._steps))
+        position[:, 0], pad_force[:, 0], objects[:, 0] = plant.position, plant.force, plant.object_position
+        if not plant.acts_in_steps:
+            commands = self._command[:-1, grasp].swapaxes(0, 1)
+            position[:, 1:], pad_force[:, 1:], objects[:, 1:] = plant.play(commands)
+        else:
+            for step in range(self._steps - 1):
                 if self._encoders_known:
                     plant.recorded_position = self._encoder[step, grasp]
                 plant.advance(self._command[step, grasp], 1, self._fresh[step, grasp])
+                position[:, step + 1], pad_force[:, step + 1] = plant.position, plant.force
+                objects[:, step + 1] = plant.object_position
         bad = plant.warnings().any(axis=1)
         if bad.any():
             row = int(np.flatnonzero(bad)[0])
@@ -151,7 +155,7 @@ class Replay:
             raise PhysicsError(
                 f"grasp {self.grasps[grasp[row]].name} diverged with {values}; narrow the gripper's bounds"
             )
-        return Motion(grasp, position.swapaxes(0, 1), pad_force.swapaxes(0, 1), object_position.T)
+        return Motion(grasp, position, pad_force, objects)
 
     def read(
         self, motion: Motion, rows: np.ndarray, force_scale: np.ndarray, effects: Sequence[EffectOn] = ()

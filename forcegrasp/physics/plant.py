@@ -57,10 +57,8 @@ class Plant:
         self.dt = float(model.opt.timestep)  #: physics step, seconds
         self._prepare(model)
         self.batch = batch = Batch(model, n, threads)
-        self._qpos, self._qvel = batch.bind("qpos"), batch.bind("qvel")
-        self._ctrl, self._sensors = batch.bind("ctrl"), batch.bind("sensordata")
+        self._qpos, self._ctrl, self._sensors = (batch.bind(name) for name in ("qpos", "ctrl", "sensordata"))
         joints = [model.joint(name) for name in gripper.joints]
-        self._finger_qpos = [joint.qposadr[0] for joint in joints]
         #: degrees of freedom of the fingers (left, right) and of the object along the grasp axis
         self.finger_dofs = [joint.dofadr[0] for joint in joints]
         thing = model.joint(gripper.object_joint)
@@ -69,6 +67,10 @@ class Plant:
         self._object_origin = model.qpos0[self._object_qpos]  # the middle of the grasp is where the scene puts it
         self.object_dof = thing.dofadr[0] + (gripper.axis if is_free else 0)
         self.actuators = [model.actuator(name).id for name in gripper.actuators]
+        # where fingers stand in the engine's arrays: slices, for they are read and written in every step
+        self._finger_q = _pair(*(joint.qposadr[0] for joint in joints))
+        self._finger_v, self._drives = _pair(*self.finger_dofs), _pair(*self.actuators)
+        self._finger_velocity = batch.bind("qvel")[:, self._finger_v]
         self._object_body = model.geom(gripper.object_geom).bodyid[0]
         #: geoms of the object
         self.object_geoms = np.flatnonzero(model.geom_bodyid == self._object_body)
@@ -134,7 +136,7 @@ class Plant:
     @property
     def velocity(self) -> np.ndarray:
         """Finger velocities, m/s, ``(n, 2)``; positive opens."""
-        return self._qvel[:, self.finger_dofs] * self._sign
+        return self._finger_velocity * self._sign
 
     @property
     def object_position(self) -> np.ndarray:
@@ -225,7 +227,7 @@ class Plant:
         self.batch.reset(ids, stage=mujoco.mjtStage.mjSTAGE_NONE.value, **keyframe)
         self._qpos[ids, self._object_qpos] = self._object_origin + offset_m
         if position_m is not None:
-            self._qpos[np.asarray(ids)[:, None], self._finger_qpos] = position_m * self._sign + self._origin
+            self._qpos[ids, self._finger_q] = position_m * self._sign + self._origin
         self.batch.forward(ids)
         for effect in self._effects:  # all rows are read, but only these anew
             effect.new_reading[:] = np.isin(effect.rows, ids)[:, None]
@@ -256,12 +258,47 @@ class Plant:
             self._read()
             fresh = np.zeros(self.n, bool)
 
+    def play(self, commands_m: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Holds each command for one physics step, as :meth:`advance` does, in one call of the engine.
+
+        Afterwards only a reset makes sense: what is read is not brought up to date.
+
+        Args:
+          commands_m: commanded positions, metres, ``(n, steps, 2)``.
+
+        Returns:
+          Finger positions and forces after each step, ``(n, steps, 2)``, and object positions, ``(n, steps)``.
+
+        Raises:
+          RuntimeError: if there are effects that act in every step; see :attr:`acts_in_steps`.
+        """
+        if self.acts_in_steps:
+            raise RuntimeError("effects act in every step: advance step by step")
+        control = np.repeat(self._ctrl[:, None], commands_m.shape[1], axis=1)
+        control[..., self._drives] = commands_m * self._sign + self._origin
+        record = self.batch.rollout(commands_m.shape[1], control, record=["qpos", "sensordata"])
+        force = self._pads_of(record["sensordata"]) * self.force_scale[:, None, None]
+        return self._fingers_of(record["qpos"]), force, record["qpos"][..., self._object_qpos] - self._object_origin
+
+    @property
+    def acts_in_steps(self) -> bool:
+        """Whether an effect acts in every step, and not only on the model when a grasp starts."""
+        return any(effects for hook, effects in self._hooked.items() if hook != "change_model")
+
     def warnings(self) -> np.ndarray:
         """MuJoCo's warning counters, ``(n, kinds)``; all 0 in a sound simulation."""
         return self.batch.warning[..., 1]
 
+    def _fingers_of(self, qpos: np.ndarray) -> np.ndarray:
+        return (qpos[..., self._finger_q] - self._origin) * self._sign
+
+    def _pads_of(self, sensors: np.ndarray) -> np.ndarray:
+        # contiguous, lest the order of the sum depend on n
+        sums = [np.ascontiguousarray(sensors[..., part]).sum(axis=-1) for part in self._readings]
+        return np.stack(sums, axis=-1)
+
     def _send(self, command_m: np.ndarray) -> None:
-        self._ctrl[:, self.actuators] = command_m * self._sign + self._origin
+        self._ctrl[:, self._drives] = command_m * self._sign + self._origin
 
     def _through_command(self, command_m: np.ndarray, fresh: np.ndarray) -> np.ndarray:
         effects = self._hooked["command"]
@@ -283,15 +320,14 @@ class Plant:
         self._write_friction()
         self._write_pad_shift()
         push = self.batch.bind("qfrc_applied")
-        push[:, self.finger_dofs] = self.finger_push_n * self._sign
+        push[:, self._finger_v] = self.finger_push_n * self._sign
         push[:, self.object_dof] = self.object_push_n
 
     def _write_friction(self) -> None:
         if not self.friction_n.any() and "dof_frictionloss" not in self._fields:
             return
-        base = self.base("dof_frictionloss")[:, self.finger_dofs]
-        loss = base + self.friction_n
-        self.field("dof_frictionloss")[:, self.finger_dofs] = loss
+        base = self.base("dof_frictionloss")[:, self._finger_v]
+        loss = self.field("dof_frictionloss")[:, self._finger_v] = base + self.friction_n
         if not np.array_equal(loss > base, self._rubbing):
             self._rubbing = loss > base
             for dof in self.finger_dofs:
@@ -314,10 +350,7 @@ class Plant:
                     self.field(field)[:, index] = getattr(self.model, field)[index] + shift
 
     def _read(self) -> None:
-        self.position = (self._qpos[:, self._finger_qpos] - self._origin) * self._sign
-        # contiguous, lest the order of the sum depend on n
-        sums = [np.ascontiguousarray(self._sensors[:, part]).sum(axis=-1) for part in self._readings]
-        self.pad_force = np.stack(sums, axis=1)
+        self.position, self.pad_force = self._fingers_of(self._qpos), self._pads_of(self._sensors)
         force = self.pad_force.copy()
         for effect in self._hooked.get("interaction", ()):
             force[effect.rows] = effect.interaction(force[effect.rows])
@@ -326,6 +359,13 @@ class Plant:
         for hook, reading in (("read_force", self.measured_force), ("read_position", self.measured_position)):
             for effect in self._hooked.get(hook, ()):
                 reading[effect.rows] = getattr(effect, hook)(reading[effect.rows])
+
+
+def _pair(one: int, other: int) -> slice:
+    """The slice that holds these two indices, in this order."""
+    step = int(other - one)
+    end = int(other) + (1 if step > 0 else -1)
+    return slice(int(one), None if end < 0 else end, step)
 
 
 def write_base(plant: Plant, ids: np.ndarray, values: Mapping[str, np.ndarray]) -> np.ndarray:
