@@ -1,43 +1,82 @@
-"""Where the time of a diagnosis goes: python tools/profile_diagnosis.py MEASUREMENT_SET"""
+"""Where the time of a diagnosis goes: python tools/profile_diagnosis.py MEASUREMENT_SET [--threads 1]"""
 
 from __future__ import annotations
 
+import argparse
 import sys
 import time
 from collections import defaultdict
 from pathlib import Path
 
-from forcegrasp.cli.measuring import refuse_table
-from forcegrasp.compare import fit, floor, predict, score, workflow
+from mujoco.batch import Batch
 
-PARTS = {fit: "fits", score: "signatures of all effects", floor: "numerical floor"}
+from forcegrasp.cli.measuring import refuse_table
+from forcegrasp.compare import workflow
+from forcegrasp.measure import replay
+from forcegrasp.measure.replay import Replay
+
+#: Function that simulates → what it does it for; the innermost one that is running counts.
+PARTS = {
+    "fit_base": "base model, from several starts",
+    "numerical_error": "numerical floor",
+    "simulate": "signatures of all effects",
+    "best_sizes": "sizes around the best signatures",
+    "refine": "rough fits with one more effect",
+    "settle": "fits of the best ones to the end",
+}
+
+
+def part_of(frame) -> str:
+    """Which part of a diagnosis is running, from the call stack below the simulator."""
+    while frame is not None:
+        if "compare" in frame.f_code.co_filename and frame.f_code.co_name in PARTS:
+            return PARTS[frame.f_code.co_name]
+        frame = frame.f_back
+    return "other"
+
+
+def watch(cls: type, name: str, told) -> None:
+    """Tells the processor seconds of each call of a method, with the object and its first argument."""
+    method = getattr(cls, name)
+
+    def timed(self, *args, **options):
+        started = time.process_time()
+        result = method(self, *args, **options)
+        told(time.process_time() - started, self, *args[:1])
+        return result
+
+    setattr(cls, name, timed)
 
 
 def main() -> None:
-    """Diagnoses the set and prints processor seconds and simulated grasps of each part."""
-    spent, simulated = defaultdict(float), defaultdict(int)
+    """Diagnoses the set; prints processor seconds, simulated grasps and their seconds, part by part."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("set", type=Path)
+    parser.add_argument("--threads", type=int, default=1, help="threads of the engine; 0 uses every core")
+    arguments = parser.parse_args()
+    replay.THREADS = arguments.threads
+    spent, grasps, engine = defaultdict(float), defaultdict(int), [0.0]
 
-    def timed(part: str):
-        def run(replay, cases):
-            started = time.process_time()
-            signals = predict.predict(replay, cases)
-            name = f"{part}, {replay.tier} physics"
-            spent[name] += time.process_time() - started
-            simulated[name] += len(cases) * len(replay.grasps)
-            return signals
+    def simulated(seconds: float, of: Replay, rows) -> None:
+        part = f"{part_of(sys._getframe(2))}, {of.tier} physics"
+        spent[part] += seconds
+        grasps[part] += len(rows)
 
-        return run
+    def stepped(seconds: float, *_) -> None:
+        engine[0] += seconds
 
-    for module, part in PARTS.items():
-        vars(module)["predict"] = timed(part)
-    loaded = refuse_table(workflow.load(Path(sys.argv[1])), "fit")
+    watch(Replay, "simulate", simulated)
+    for name in ("step", "rollout"):
+        watch(Batch, name, stepped)
+    loaded = refuse_table(workflow.load(arguments.set), "fit")
     wall, processor = time.perf_counter(), time.process_time()
     diagnosis, _ = workflow.diagnose_set(loaded, None, [], 0, lambda text: None)
     wall, processor = time.perf_counter() - wall, time.process_time() - processor
     print(f"{diagnosis.verdict} {', '.join(diagnosis.effects)}: {wall:.0f} s, {processor:.0f} s of processor time")
     for name, seconds in sorted(spent.items(), key=lambda item: -item[1]):
-        print(f"  {seconds / processor:4.0%}  {seconds:5.1f} s  {simulated[name]:6,} grasps  {name}")
-    print(f"  {1 - sum(spent.values()) / processor:4.0%}  the rest: linear algebra, held-out grasps, null distribution")
+        print(f"  {seconds / processor:4.0%}  {seconds:5.1f} s  {grasps[name]:6,} grasps  {name}")
+    print(f"  {1 - sum(spent.values()) / processor:4.0%}  the rest: sensors, linear algebra, held-out grasps")
+    print(f"{engine[0] / processor:.0%} of it in MuJoCo")
 
 
 if __name__ == "__main__":

@@ -328,8 +328,9 @@ class Plant:
             return
         base = self.base("dof_frictionloss")[:, self._finger_v]
         loss = self.field("dof_frictionloss")[:, self._finger_v] = base + self.friction_n
-        if not np.array_equal(loss > base, self._rubbing):
-            self._rubbing = loss > base
+        rubbing = loss > base
+        if self._rubbing is None or not np.array_equal(rubbing, self._rubbing):
+            self._rubbing = rubbing
             for dof in self.finger_dofs:
                 self.stiffen_friction(dof)
 

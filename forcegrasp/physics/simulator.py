@@ -60,7 +60,7 @@ class GraspSimulator:
     @property
     def joint_position(self) -> np.ndarray:
         """Finger positions (left, right), metres, ``(n, 2)``; 0 is closed, 0.045 open."""
-        return self.plant.position
+        return self.plant.position.copy()
 
     @property
     def object_position(self) -> np.ndarray:
@@ -74,7 +74,7 @@ class GraspSimulator:
         A finger's reading is the sum over its contacts of the normal and both signed tangential components at the last
         physics step, times f_α (authors' code).
         """
-        return self.plant.force
+        return self.plant.force.copy()
 
     @property
     def measured_position(self) -> np.ndarray:

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from forcegrasp.compare import fit as fit_module
+from forcegrasp.compare import score as score_module
 from forcegrasp.compare.base_fit import check_gradient, fit_base, rms_error
 from forcegrasp.compare.fit import Fit, Simulators, fit_exactly, fit_once
 from forcegrasp.compare.floor import beyond_fit, excess, numerical_error, numerical_floor
@@ -17,6 +18,8 @@ from forcegrasp.compare.heldout import heldout_residual, make_folds, rms
 from forcegrasp.compare.intervals import intervals, standard_errors, warnings
 from forcegrasp.compare.predict import Applied, Case, predict
 from forcegrasp.compare.problem import Problem
+from forcegrasp.compare.refine import refine
+from forcegrasp.compare.score import Background, Signatures, best_sizes
 from forcegrasp.compare.target import Target, make_target
 from forcegrasp.effects import get_effect
 from forcegrasp.measure import MeasuredGrasp, MeasurementSet
@@ -209,12 +212,30 @@ def test_cases_that_differ_in_sensors_share_a_simulation(fitted, monkeypatch):
     assert together[2][..., 2:] == pytest.approx(2 * together[0][..., 2:])
 
 
+def test_what_was_just_simulated_is_not_simulated_again(fitted, monkeypatch):
+    replay, base = Replay(TIAGO, fitted.target.grasps, tier="fast"), fitted.problem.case(fitted.fit.vector).base
+    bias, stronger = get_effect("force_bias"), base | {"position_gain": base["position_gain"] + 1}
+    simulated = []
+    simulate = Replay.simulate
+    monkeypatch.setattr(Replay, "simulate", lambda self, g, *a: simulated.append(len(g)) or simulate(self, g, *a))
+    (once,) = predict(replay, [Case(base)])
+    again, moved, read = predict(replay, [Case(base), Case(stronger), Case(base, (Applied(bias, "", BIAS),))])
+    assert simulated == [6, 6]
+    assert again.tobytes() == once.tobytes()
+    assert np.abs(moved - once).max() > 1e-5
+    assert read - once == pytest.approx(np.broadcast_to(np.r_[0, 0, BIAS], once.shape), abs=1e-12)
+    for gain in range(2, 12):  # until it is forgotten
+        predict(replay, [Case(base | {"position_gain": base["position_gain"] + gain})])
+    assert len(replay.remembered) < 10
+
+
 def test_several_starts_agree(fitted):
     told = []
     base = fit_base(fitted.target, fitted.problem, fitted.simulators, np.random.default_rng(0), told.append)
     assert base.converged, base.reason
     assert base.reason == ""
-    assert len(base.errors) == len(told) == 3
+    assert len(base.errors) == 3
+    assert len(told) == 4  # each start, and all grasps
     assert np.ptp(base.errors) < 0.02
     assert distance(base.fit, fitted.errors).max() < 2
 
@@ -225,6 +246,55 @@ def test_a_fit_that_ended_on_a_slope_is_not_believed(fitted):
     assert not gate.converged
     assert "slope of 20.0 standard errors" in gate.reason
     assert check_gradient(fitted.fit, fitted.target).converged
+
+
+# --- one more effect -----------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def threshold(fitted) -> SimpleNamespace:
+    """The base model fitted to readings with a large dead zone: a threshold, whose signatures are far from straight."""
+    zone = get_effect("force_deadzone")
+    model = fitted.problem.case(fitted.fit.vector)
+    case = Case(model.base, (Applied(zone, zone.variants[0], np.array([0.4])),))
+    signals = predict(fitted.simulators.exact, [case])[0]
+    target = dataclasses.replace(
+        fitted.target, signals=signals + SIGMA * np.random.default_rng(3).standard_normal(signals.shape)
+    )
+    fit = fit_once(target, fitted.problem, fitted.simulators, fitted.fit.vector)
+    return SimpleNamespace(target=target, fit=fit, zone=zone, background=Background(fit, []))
+
+
+def test_refining_finds_a_large_threshold(fitted, threshold):
+    target, fit, zone = threshold.target, threshold.fit, threshold.zone
+    signatures = Signatures([zone], target, fitted.simulators)
+    signatures.simulate(fit, [zone])
+    scores = [group[0] for group in signatures.scores(fit, threshold.background, [zone])]
+    assert {score.variant for score in scores} == set(zone.variants)
+    sized = best_sizes(scores, fit, target, fitted.simulators, threshold.background)
+    assert [s.variant for s in sized] == [s.variant for s in scores]
+    told = []
+    refined = refine(scores, target, fit, fitted.simulators, threshold.background, told.append)
+    assert 1 <= len(refined) == len(told) <= len(scores)
+    best = min(refined, key=lambda r: r.fit.cost)
+    assert best.score.variant == zone.variants[0]
+    settled = fit_exactly(target, best.fit.problem, fitted.simulators, best.fit.vector)
+    assert settled.values[-1] == pytest.approx(0.4, rel=0.05)
+    assert rms_error(settled, target) < 1.1 < rms_error(fit, target)
+    promised = max(s.gain for s in sized)
+    assert promised > 0.5 * (fit.cost - settled.cost)  # what `refine` goes by when it leaves effects out
+
+
+def test_signatures_are_simulated_when_asked_for_and_kept(fitted, threshold, monkeypatch):
+    zone, limit = threshold.zone, get_effect("force_limit")
+    signatures = Signatures([zone, limit], threshold.target, fitted.simulators)
+    assert signatures.missing([zone, limit]) == [zone, limit]
+    signatures.simulate(threshold.fit, [zone])
+    assert signatures.missing([zone, limit]) == [limit]
+    monkeypatch.setattr(score_module, "predict", lambda *a: pytest.fail("simulated again"))
+    signatures.simulate(threshold.fit, [])
+    one, other = (signatures.scores(f, threshold.background, [zone])[0][0].gain for f in (threshold.fit, fitted.fit))
+    assert one > 10 * other  # scored against what each fit leaves
 
 
 # --- what is left --------------------------------------------------------------------------------------------------
