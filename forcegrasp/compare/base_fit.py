@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from forcegrasp.compare.fit import Fit, Simulators, fit_once
+from forcegrasp.compare.fit import Fit, Simulators, fit_exactly, fit_once
 from forcegrasp.compare.geometry import guess
 from forcegrasp.compare.problem import Problem
 from forcegrasp.compare.target import Target
@@ -63,7 +63,8 @@ def fit_base(
     checked = check_gradient(first, target, errors)
     if checked.converged:
         return checked
-    further = fit_once(target, problem, simulators, first.vector, first.correction)  # it may just have been slow
+    # the cheap model's slopes may lead no further where the model itself still falls
+    further = fit_exactly(target, problem, simulators, first.vector)
     return check_gradient(further, target, errors)
 
 
