@@ -30,7 +30,7 @@ class Simulators:
     def __init__(self, problem: Problem) -> None:
         gripper, grasps = problem.gripper, problem.grasps
         self.exact = Replay(gripper, grasps)
-        self.cheap = self.exact if gripper.fast == "none" else Replay(gripper, grasps, tier="fast")
+        self.cheap = self.exact if gripper.fast == "none" else Replay(gripper, grasps, tier="fitting")
 
 
 @dataclass(frozen=True)

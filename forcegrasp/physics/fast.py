@@ -18,15 +18,20 @@ if TYPE_CHECKING:
 SPHERE = "{}_pads"
 # Collision bits: 1 is the pads' contact, 2 that of the ground.
 _PADS, _GROUND = 1, 2
-# The step grows by the first factor at which (step · servo's frequency)² stays below this, and contacts keep their
-# stiffness, for which MuJoCo wants two steps within their time constant.
-_FACTORS, _LARGEST_PHASE = (4, 2), 0.05
+# The step is doubled while (step · servo's frequency)² stays below this, and contacts keep their stiffness, for which
+# MuJoCo wants two steps within their time constant.
+_LARGEST_PHASE = 0.05
 # An object has come to rest if it is slower than this after so long. m/s and seconds.
 _AT_REST, _SETTLING_S = 1e-3, 0.5
 
 
-def compile_fast(spec: mujoco.MjSpec, gripper: Gripper) -> mujoco.MjModel:
+def compile_fast(spec: mujoco.MjSpec, gripper: Gripper, largest: int = 4) -> mujoco.MjModel:
     """Returns the fast model of a scene, whose spec is changed.
+
+    Args:
+      spec: the scene.
+      gripper: its description.
+      largest: how many times as large the step may be, a power of 2.
 
     Raises:
       ValueError: if MuJoCo refuses the scene.
@@ -37,7 +42,7 @@ def compile_fast(spec: mujoco.MjSpec, gripper: Gripper) -> mujoco.MjModel:
     fingers = [model.actuator(name).id for name in gripper.actuators]
     dofs = [model.joint(name).dofadr[0] for name in gripper.joints]
     stiffness = model.actuator_gainprm[fingers, 0]
-    factor = _step_factor(model, gripper, stiffness / reference.dof_M0[dofs])
+    factor = _step_factor(model, gripper, stiffness / reference.dof_M0[dofs], largest)
     larger = (factor - 1) * model.opt.timestep
     model.opt.timestep *= factor
     # A step applies a command to all of it, on average half a step early. What the servo gains by that, stiffness
@@ -46,13 +51,15 @@ def compile_fast(spec: mujoco.MjSpec, gripper: Gripper) -> mujoco.MjModel:
     return model
 
 
-def _step_factor(model: mujoco.MjModel, gripper: Gripper, frequency_squared: np.ndarray) -> int:
+def _step_factor(model: mujoco.MjModel, gripper: Gripper, frequency_squared: np.ndarray, largest: int) -> int:
     constant, _ = model.geom(gripper.object_geom).solref
-    for factor in _FACTORS:
+    factor = largest
+    while factor > 1:
         step = factor * model.opt.timestep
         if (step**2 * frequency_squared).max() <= _LARGEST_PHASE and (constant <= 0 or 2 * step <= constant):
-            return factor
-    return 1
+            break
+        factor //= 2
+    return factor
 
 
 def _touch_a_sphere(spec: mujoco.MjSpec, reference: mujoco.MjModel, gripper: Gripper) -> None:

@@ -24,6 +24,8 @@ FORMAT = "forcegrasp-gripper/1"
 _WRITE = re.compile(r"(-?)((?:actuator|dof|geom)_\w+)(?: (\d+))?")
 _NETFORCE = 3  #: index of reduce="netforce" among a contact sensor's ways to reduce
 _SCOPES = ("gripper", "object", "grasp")
+#: Physics tiers, and how much larger than the scene's own their steps may be.
+TIERS = {"reference": 1, "fitting": 2, "fast": 4}
 #: Parameters that the simulator itself understands; they need no `writes`.
 SPECIAL = ("force_scale", "radius_m", "offset_m")
 
@@ -88,18 +90,19 @@ class Gripper:
 
         Args:
           tier: ``"reference"`` is the scene as described; ``"fast"``, where the description has ``fast: sphere``, is
-            :mod:`forcegrasp.physics.fast`.
+            :mod:`forcegrasp.physics.fast`; ``"fitting"`` is that with at most twice the step, whose slopes are exact
+            enough for a fit.
 
         Raises:
           ConfigError: if there is no such tier, or MuJoCo refuses the scene.
         """
-        if tier not in ("reference", "fast"):
+        if tier not in TIERS:
             raise ConfigError(f"physics.tier={tier}: must be reference or fast")
         try:
             spec = mujoco.MjSpec.from_file(str(self.model))
-            if tier == "fast" and self.fast == "sphere":
-                return compile_fast(spec, self)
-            return spec.compile()
+            if TIERS[tier] == 1 or self.fast == "none":
+                return spec.compile()
+            return compile_fast(spec, self, TIERS[tier])
         except ValueError as error:
             raise ConfigError(f"{self.model}: MuJoCo refuses it: {_one_line(error)}") from error
 
