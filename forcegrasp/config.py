@@ -232,7 +232,7 @@ class LogConfig:
     figures_every: int = option(20, "batches between figures of force traces", low=0, high=10**9)
     video_every: int = option(40, "batches between videos; one is made at the end, too", low=0, high=10**9)
     checkpoint_every: int = option(10, "batches between checkpoints", low=1, high=10**9)
-    keep: int = option(3, "newest checkpoints kept", low=1, high=10**6)
+    keep: int = option(3, "newest checkpoints kept, beside the best by force reward", low=1, high=10**6)
 
 
 @dataclass

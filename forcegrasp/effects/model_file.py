@@ -15,6 +15,7 @@ import mujoco
 import numpy as np
 import yaml
 
+from forcegrasp import plain_yaml
 from forcegrasp.effects import Effect, get_effect
 from forcegrasp.errors import ConfigError, closest
 from forcegrasp.physics.gripper import Gripper, load_gripper
@@ -109,10 +110,8 @@ def read_model(path: Path) -> Model:
     if str(path) == SHIPPED:
         path = Path(str(files("forcegrasp.assets") / f"{SHIPPED}.yaml"))
     try:
-        raw = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except RecursionError as error:
-        raise _refuse(path, "", "could not read the model: nested too deeply") from error
-    except (OSError, ValueError, yaml.YAMLError) as error:
+        raw = plain_yaml.load(path)
+    except (OSError, plain_yaml.PlainYamlError) as error:
         why = getattr(error, "strerror", None) or str(error)
         raise _refuse(path, "", f"could not read the model: {why}") from error
     keys = ("format", "gripper", "mujoco", "data", "base", "objects", "grasps", "effects", "warnings")

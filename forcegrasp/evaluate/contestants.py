@@ -43,6 +43,8 @@ def load_contestants(names: list[str]) -> list[Contestant]:
         else:
             same = [other for other in set(paths.values()) if other.name == path.name]
             label = path.name if len(same) == 1 else f"{path.parent.name}_{path.name}"
+            if path.suffix == ".safetensors":  # RUN/checkpoints/best.safetensors
+                label = f"{path.parent.parent.name}_{path.stem}"
             policy, config = load_policy(name)
         if label in contestants:
             raise ConfigError(f"policies: {label} is named twice")

@@ -1,4 +1,4 @@
-"""YAML as plain text, lists and mappings: nothing is guessed, nothing is built, nothing can blow up."""
+"""YAML as plain text, lists and mappings, and typed values out of it."""
 
 from __future__ import annotations
 
@@ -8,50 +8,12 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-import yaml
-
+from forcegrasp import plain_yaml
 from forcegrasp.errors import MeasurementError, closest
 from forcegrasp.measure.folder import show
 
 _MAX_BYTES = 100_000
-_MAX_DEPTH = 20
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?", re.ASCII)
-
-
-class _RefusedError(Exception):
-    """Legal YAML that is not welcome here."""
-
-    def __init__(self, mark: yaml.Mark, problem: str) -> None:
-        self.problem_mark, self.problem = mark, problem
-
-
-class _Loader(yaml.BaseLoader):
-    """Every scalar stays text: `1e-5` is text to YAML anyway, `007` would be 7, and `no` would be False."""
-
-    _depth = 0
-
-    def compose_node(self, parent, index):
-        event = self.peek_event()
-        if isinstance(event, yaml.AliasEvent) or getattr(event, "anchor", None):
-            raise _RefusedError(event.start_mark, "anchors and aliases are not supported; write the value out")
-        if getattr(event, "tag", None):
-            raise _RefusedError(event.start_mark, f"the tag {show(event.tag)} is not supported; leave it out")
-        if self._depth == _MAX_DEPTH:
-            raise _RefusedError(event.start_mark, "nested too deeply; write it flat")
-        self._depth += 1
-        node = super().compose_node(parent, index)
-        self._depth -= 1
-        return node
-
-    def construct_mapping(self, node, deep=False):
-        seen = set()
-        for key, _ in node.value:
-            if not isinstance(key, yaml.ScalarNode):
-                raise _RefusedError(key.start_mark, "a key must be text")
-            if key.value in seen:
-                raise _RefusedError(key.start_mark, f"{show(key.value)} stands there twice; keep one")
-            seen.add(key.value)
-        return super().construct_mapping(node, deep)
 
 
 def load_yaml(path: Path) -> dict[str, Any]:
@@ -61,24 +23,12 @@ def load_yaml(path: Path) -> dict[str, Any]:
       MeasurementError: if the file is too large, not UTF-8, no YAML, no mapping, or uses tags, anchors or aliases.
     """
     try:
-        with open(path, "rb") as file:
-            data = file.read(_MAX_BYTES + 1)
-        if len(data) > _MAX_BYTES:
-            raise MeasurementError(
-                f"{show(path)}: larger than {_MAX_BYTES // 1000} kB; keep it to the few lines it needs"
-            )
-        content = yaml.load(data.decode("utf-8-sig"), Loader=_Loader)
+        content = plain_yaml.load(path, text_only=True, max_bytes=_MAX_BYTES)
     except OSError as error:
         raise MeasurementError(f"{show(path)}: not readable ({error.strerror})") from error
-    except UnicodeDecodeError as error:
-        row = error.object.count(b"\n", 0, error.start) + 1
-        raise MeasurementError(f"{show(path)}: row {row}: not UTF-8; save the file as UTF-8") from error
-    except (_RefusedError, yaml.YAMLError, ValueError) as error:
-        mark = getattr(error, "problem_mark", None)
-        row = f" row {mark.line + 1}:" if mark else ""
-        problem = getattr(error, "problem", None) or getattr(error, "reason", None) or "broken"
-        problem = " ".join(str(problem).split())
-        raise MeasurementError(f"{show(path)}:{row} not YAML that can be read: {problem}") from error
+    except plain_yaml.PlainYamlError as error:
+        row = f" row {error.row}:" if error.row else ""
+        raise MeasurementError(f"{show(path)}:{row} not YAML that can be read: {error.problem}") from error
     if not isinstance(content, dict):
         raise MeasurementError(f"{show(path)}: must hold lines of the form `key: value`")
     return content

@@ -14,9 +14,9 @@ from typing import Any
 
 import mujoco
 import numpy as np
-import yaml
 from mujoco.batch import MODEL_FIELDS
 
+from forcegrasp import plain_yaml
 from forcegrasp.errors import ConfigError, closest
 from forcegrasp.physics.fast import compile_fast
 
@@ -135,10 +135,8 @@ def load_gripper(name: str, folder: Path | None = None) -> Gripper:
 
 def _load(path: Path) -> Gripper:
     try:
-        raw = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except RecursionError as error:
-        raise ConfigError(f"{path}: could not read the gripper description: nested too deeply") from error
-    except (OSError, ValueError, yaml.YAMLError) as error:
+        raw = plain_yaml.load(path)
+    except (OSError, plain_yaml.PlainYamlError) as error:
         why = getattr(error, "strerror", None) or _one_line(error)
         raise ConfigError(f"{path}: could not read the gripper description: {why}") from error
     gripper = _parse(path, raw)

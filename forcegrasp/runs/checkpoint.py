@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 from pathlib import Path
 from typing import Any
 
@@ -14,10 +13,11 @@ from safetensors.torch import save
 from torch import Tensor
 
 from forcegrasp.errors import CheckpointError
+from forcegrasp.runs.whole_file import write_whole
 
 
 def write(path: Path, tensors: dict[str, Tensor], facts: dict[str, Any]) -> None:
-    """Writes a checkpoint under a temporary name, syncs it to disk, and renames it.
+    """Writes a checkpoint whole or not at all.
 
     Args:
       path: where to.
@@ -30,15 +30,9 @@ def write(path: Path, tensors: dict[str, Tensor], facts: dict[str, Any]) -> None
     text = json.dumps(facts, sort_keys=True)
     # One entry: safetensors writes several in random order, and equal checkpoints should be equal files.
     data = save(tensors, metadata={"forcegrasp": json.dumps({"facts": text, "sha256": _digest(tensors, text)})})
-    part = path.with_suffix(".part")
     try:
-        with open(part, "wb") as file:
-            file.write(data)
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(part, path)
+        write_whole(path, data)
     except OSError as error:
-        part.unlink(missing_ok=True)
         raise CheckpointError(
             f"{path}: could not save the checkpoint ({error.strerror}); free space or set hydra.run.dir"
         ) from error
@@ -51,11 +45,15 @@ def read(path: Path) -> tuple[dict[str, Tensor], dict[str, Any]]:
       CheckpointError: if the file is missing, truncated, changed, or no checkpoint.
     """
     try:
+        if path.exists() and not path.is_file():
+            raise ValueError("not an ordinary file")  # a pipe would be waited for
         with safe_open(path, framework="pt") as file:
             header = json.loads((file.metadata() or {})["forcegrasp"])
             tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
         facts, digest = json.loads(header["facts"]), header["sha256"]
-    except (OSError, SafetensorError, KeyError, TypeError, ValueError) as error:
+        if not isinstance(facts, dict):
+            raise ValueError("its facts are no mapping")
+    except (OSError, SafetensorError, KeyError, TypeError, ValueError, RecursionError) as error:
         raise CheckpointError(f"{path}: not a readable checkpoint ({error}); remove it to use an older one") from error
     if digest != _digest(tensors, header["facts"]):
         raise CheckpointError(

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 
+from forcegrasp import plain_yaml
 from forcegrasp.config import TrainConfig
 from forcegrasp.errors import CheckpointError
 from forcegrasp.runs.started_with import experiment
@@ -120,8 +120,8 @@ def _number(path: Path, row: int, line: list[str], index: int, column: str) -> f
 def _options(path: Path) -> dict[str, Any]:
     """A run's configuration, flat; options that are newer than the run have their defaults."""
     try:
-        loaded = yaml.safe_load(path.read_text())
-    except (OSError, ValueError, yaml.YAMLError) as error:
+        loaded = plain_yaml.load(path)
+    except (OSError, plain_yaml.PlainYamlError) as error:
         raise CheckpointError(f"{path}: not a valid configuration ({str(error).splitlines()[0]})") from error
     if not isinstance(loaded, dict):
         raise CheckpointError(f"{path}: not a valid configuration (no options in it)")

@@ -14,16 +14,20 @@ from forcegrasp.runs.run_dir import RunDir
 
 
 def load_policy(name: Path | str) -> tuple[ProbabilisticActor, TrainConfig]:
-    """Returns a shipped policy by name, or the newest policy of a run; and the configuration it was trained with.
+    """Returns a policy and the configuration it was trained with.
+
+    The name is that of a shipped policy, a run directory for its newest checkpoint, or the path of a run's checkpoint.
 
     A shipped policy is laid out like a run directory, so that both are read alike.
 
     Raises:
-      CheckpointError: if there is no such policy or run, or its newest checkpoint is of another configuration.
+      CheckpointError: if there is no such policy or run, or its checkpoint is of another configuration.
     """
-    run = RunDir.open(FOLDER / str(name) if str(name) in shipped_policies() else name)
+    path = FOLDER / str(name) if str(name) in shipped_policies() else Path(name)
+    one = path.suffix == ".safetensors"
+    run = RunDir.open(path.parent.parent if one else path)
     config = run.config()
-    tensors, _ = run.load()
+    tensors, _ = run.load_file(path) if one else run.load()
     size = 2 * len(config.observation.parts) * config.observation.frames
     policy = make_policy(size, config.ppo)
     weights = {key.removeprefix("policy."): t for key, t in tensors.items() if key.startswith("policy.")}

@@ -6,7 +6,9 @@ import csv
 import dataclasses
 import functools
 import hashlib
+import io
 import json
+import math
 import os
 import platform
 import subprocess
@@ -20,11 +22,13 @@ from omegaconf import OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 from torch import Tensor
 
+from forcegrasp import plain_yaml
 from forcegrasp.config import TrainConfig, validate
 from forcegrasp.effects.model_file import Model, write_model
 from forcegrasp.effects.variation import read_tiago_model
 from forcegrasp.errors import CheckpointError, ConfigError
 from forcegrasp.runs import checkpoint
+from forcegrasp.runs.whole_file import write_whole
 
 _PACKAGES = ("torch", "torchrl", "tensordict", "mujoco", "gymnasium", "hydra-core", "numpy")
 
@@ -45,6 +49,7 @@ class RunDir:
         self.config_path = self.path / "config.yaml"
         self.metrics_path = self.path / "metrics.csv"
         self.checkpoints = self.path / "checkpoints"
+        self.best = self.checkpoints / "best.safetensors"
         self.tensorboard = self.path / "tensorboard"
         self.figures = self.path / "figures"
 
@@ -63,8 +68,10 @@ class RunDir:
         try:
             for folder in (run.checkpoints, run.tensorboard, run.figures):
                 folder.mkdir(parents=True, exist_ok=True)
-            (run.path / "run.json").write_text(json.dumps(_provenance(config, overrides), indent=2) + "\n")
-            run.config_path.write_text(yaml.safe_dump(dataclasses.asdict(config), sort_keys=False))
+            facts = json.dumps(_provenance(config, overrides), indent=2) + "\n"
+            write_whole(run.path / "run.json", facts.encode())
+            text = yaml.safe_dump(dataclasses.asdict(config), sort_keys=False)
+            write_whole(run.config_path, text.encode())  # last: a folder without it is no run
         except OSError as error:
             raise CheckpointError(f"{run.path}: could not make the run directory ({error.strerror})") from error
         return run
@@ -80,7 +87,9 @@ class RunDir:
             return None
         copy = self.path / "model.yaml"
         if not copy.exists():
-            write_model(read_tiago_model(config.model), copy)
+            part = copy.with_suffix(".part")
+            write_model(read_tiago_model(config.model), part)
+            os.replace(part, copy)
         return read_tiago_model(copy)
 
     @classmethod
@@ -103,7 +112,7 @@ class RunDir:
     def fingerprint(self) -> str:
         """Of the configuration as it was when first asked for: editing the file must not spoil a run at work."""
         self.config()  # says what is wrong with the file, if anything
-        return fingerprint(yaml.safe_load(self.config_path.read_text()))
+        return fingerprint(plain_yaml.load(self.config_path))
 
     def config(self) -> TrainConfig:
         """The run's configuration.
@@ -112,26 +121,46 @@ class RunDir:
           CheckpointError: if config.yaml can't be read or holds unknown or invalid options.
         """
         try:
-            loaded = OmegaConf.load(self.config_path)
+            loaded = plain_yaml.load(self.config_path)
+            if not isinstance(loaded, dict):  # text would be taken for more YAML
+                raise ConfigError("no options in it")
             merged = OmegaConf.merge(OmegaConf.structured(TrainConfig), loaded)
             config = cast(TrainConfig, OmegaConf.to_object(merged))
             validate(config)
-        except (OSError, yaml.YAMLError, OmegaConfBaseException, ConfigError, ValueError) as error:
+        except (OSError, OmegaConfBaseException, ConfigError, ValueError) as error:
             first_line = str(error).strip().splitlines()[0]
             raise CheckpointError(f"{self.config_path}: not a valid configuration ({first_line})") from error
         return config
 
-    def save(self, frames: int, tensors: dict[str, Tensor], facts: dict[str, Any], keep: int) -> Path:
-        """Saves a checkpoint and removes all but the newest ``keep``.
+    def save(
+        self, frames: int, tensors: dict[str, Tensor], facts: dict[str, Any], keep: int, score: float | None = None
+    ) -> Path:
+        """Saves a checkpoint; keeps the newest ``keep``, and the best so far as ``best.safetensors``.
+
+        Args:
+          frames: trained so far.
+          tensors, facts: the state of the training.
+          keep: number of checkpoints.
+          score: how good the policy is, the larger the better; None if it can't be compared.
 
         Raises:
           CheckpointError: if it can't be written.
         """
         path = self.checkpoints / f"frames_{frames:012d}.safetensors"
-        checkpoint.write(path, tensors, {**facts, "frames": frames, "config": self.fingerprint})
-        for old in self._files()[:-keep]:
+        facts = {**facts, "frames": frames, "config": self.fingerprint, "score": score}
+        checkpoint.write(path, tensors, facts)
+        if score is not None and score > self._best_score():
+            checkpoint.write(self.best, tensors, facts)
+        for old in (*self._files()[:-keep], *self.checkpoints.glob("*.part")):  # a kill may leave a part
             old.unlink()
         return path
+
+    def _best_score(self) -> float:
+        try:
+            score = checkpoint.read(self.best)[1].get("score")
+        except CheckpointError:
+            score = None
+        return score if isinstance(score, float) else -math.inf
 
     def load(self) -> tuple[dict[str, Tensor], dict[str, Any]]:
         """Returns the newest checkpoint that can be read.
@@ -146,12 +175,26 @@ class RunDir:
             except CheckpointError as error:
                 first_error = first_error or error
                 continue
-            if facts.get("config") != self.fingerprint:
-                raise CheckpointError(
-                    f"{path}: was trained with another configuration than {self.config_path}; restore that file"
-                )
-            return tensors, facts
+            return tensors, self._own(path, facts)
         raise first_error or CheckpointError(f"{self.checkpoints}: no checkpoint yet; train longer or restart the run")
+
+    def load_file(self, path: Path) -> tuple[dict[str, Tensor], dict[str, Any]]:
+        """Returns one checkpoint of this run.
+
+        Raises:
+          CheckpointError: if it can't be read, or was made with another configuration.
+        """
+        tensors, facts = checkpoint.read(path)
+        return tensors, self._own(path, facts)
+
+    def _own(self, path: Path, facts: dict[str, Any]) -> dict[str, Any]:
+        if facts.get("config") != self.fingerprint:
+            raise CheckpointError(
+                f"{path}: was trained with another configuration than {self.config_path}; restore that file"
+            )
+        if not isinstance(facts.get("frames"), int):
+            raise CheckpointError(f"{path}: not a checkpoint of a training; remove it to use an older one")
+        return facts
 
     def _files(self) -> list[Path]:
         return sorted(self.checkpoints.glob("frames_*.safetensors"))
@@ -172,12 +215,12 @@ class RunDir:
         with open(self.metrics_path, newline="") as file:
             header, *lines = list(csv.reader(file.read().replace("\0", "").splitlines())) or [[]]
         kept = [line for line in lines if len(line) == len(header) and line[0].isdigit() and int(line[0]) <= frames]
-        part = self.metrics_path.with_suffix(".part")
-        with open(part, "w", newline="") as file:
-            csv.writer(file).writerows([header, *kept])
-        os.replace(part, self.metrics_path)
         if not kept:  # the header may be torn, too; the next row writes it anew
             self.metrics_path.unlink()
+            return
+        text = io.StringIO(newline="")
+        csv.writer(text).writerows([header, *kept])
+        write_whole(self.metrics_path, text.getvalue().encode())
 
 
 def _provenance(config: TrainConfig, overrides: list[str]) -> dict[str, Any]:

@@ -18,6 +18,7 @@ from forcegrasp.controllers.policy import make_policy
 from forcegrasp.curriculum import CurriculumValues, LinearSchedule
 from forcegrasp.effects.model_file import Model
 from forcegrasp.env.episodes import summarise
+from forcegrasp.errors import CheckpointError
 from forcegrasp.runs.run_dir import RunDir
 from forcegrasp.train.collector import collecting, make_collector, random_states, set_random_states, training_env
 from forcegrasp.train.logging import TrainingLog
@@ -66,8 +67,17 @@ class Trainer:
         return {k: v.detach().contiguous().clone() for k, v in tensors.items()}, facts
 
     def restore(self, tensors: dict[str, Tensor], facts: dict[str, Any]) -> None:
-        """The inverse of :meth:`state`."""
+        """The inverse of :meth:`state`.
 
+        Raises:
+          CheckpointError: if this is not the state of such a training.
+        """
+        try:
+            self._restore(tensors, facts)
+        except (AttributeError, KeyError, IndexError, RuntimeError, TypeError, ValueError) as error:
+            raise CheckpointError("the checkpoint does not hold the state of such a training; start anew") from error
+
+    def _restore(self, tensors: dict[str, Tensor], facts: dict[str, Any]) -> None:
         def part(name: str) -> dict[str, Tensor]:
             return {k.removeprefix(name): v for k, v in tensors.items() if k.startswith(name)}
 
@@ -133,7 +143,9 @@ def train(config: TrainConfig, run: RunDir, resume: bool = False) -> bool:
             if every.video_every and trainer.batches % every.video_every == 0:
                 log.video(batch[0], trainer.frames)
             if trainer.batches % every.checkpoint_every == 0 or trainer.frames >= total or stop:
-                run.save(trainer.frames, *trainer.state(), keep=every.keep)
+                whole_task = trainer.frames >= trainer.curriculum.schedule.end_frames  # before, it was easier
+                score = figures["force_reward_normalised"] if whole_task else None
+                run.save(trainer.frames, *trainer.state(), keep=every.keep, score=score)
             progress(trainer.frames, figures)
     if batch is not None and not stop:
         if config.log.figures_every:

@@ -13,7 +13,7 @@ import torch
 from safetensors.torch import save_file
 
 from forcegrasp.errors import CheckpointError
-from forcegrasp.runs import checkpoint
+from forcegrasp.runs import checkpoint, whole_file
 
 FACTS = {"frames": 3, "name": "κ → 1", "nested": {"big": 2**100, "list": [1, None, 0.1]}}
 
@@ -178,11 +178,11 @@ class FullDisk:
 
 
 def fails_at_open(patch: pytest.MonkeyPatch) -> None:
-    patch.setattr(checkpoint, "open", no_space, raising=False)
+    patch.setattr(whole_file, "open", no_space, raising=False)
 
 
 def fails_at_write(patch: pytest.MonkeyPatch) -> None:
-    patch.setattr(checkpoint, "open", FullDisk, raising=False)
+    patch.setattr(whole_file, "open", FullDisk, raising=False)
 
 
 def fails_at_sync(patch: pytest.MonkeyPatch) -> None:
