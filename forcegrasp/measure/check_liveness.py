@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from forcegrasp.errors import MeasurementError
-from forcegrasp.measure.folder import show
-from forcegrasp.measure.samples import place
+from forcegrasp.measure.samples import place, samples_file
 from forcegrasp.measure.schema import FINGERS, FORCE, POSITION, MeasurementSet
 
 #: Means of blocks of the force must vary this many times as much as noise would make them to be contact.
@@ -21,7 +20,7 @@ def check_liveness(measured: MeasurementSet, reach: float) -> list[str]:
       measured: the set.
       reach: how far a finger moves, metres.
     """
-    where = show(measured.path)
+    where = samples_file(measured.path)
     grasps = measured.grasps
     warnings = []
     if not any(np.ptp(grasp.command_m, axis=0).any() for grasp in grasps):

@@ -95,7 +95,10 @@ def _cells(path: Path, row: int, line: str) -> list[str]:
         raise MeasurementError(
             f"{show(path)}: row {row}: a quotation mark is not closed or stands within a cell; correct it"
         )
-    return next(csv.reader([line]), [""])
+    try:
+        return next(csv.reader([line]), [""])
+    except csv.Error as error:  # a carriage return in the middle
+        raise MeasurementError(f"{show(path)}: row {row}: not a row of cells ({error}); correct it") from error
 
 
 def _inspect(path: Path, header: list[str], columns: Columns) -> None:

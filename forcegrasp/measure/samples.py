@@ -13,10 +13,15 @@ from forcegrasp.measure.schema import MeasuredGrasp
 MIN_SAMPLES = 10
 
 
+def samples_file(path: Path) -> str:
+    """The file of the samples, for messages; the set itself if they are in no file."""
+    names = [name for name in ("samples.parquet", "samples.csv") if (path / name).is_file()]
+    return show(path / names[0]) if names else show(path)
+
+
 def place(path: Path, grasp: MeasuredGrasp, index: int | None = None, column: str = "") -> str:
     """Where a sample of a grasp stands, for messages: the file, row and column, or the grasp and time if in no file."""
-    names = [name for name in ("samples.parquet", "samples.csv") if (path / name).is_file()]
-    where = [f"{show(path / names[0]) if names else show(path)}: grasp {show(grasp.name)}"]
+    where = [f"{samples_file(path)}: grasp {show(grasp.name)}"]
     if index is not None:
         where.append(f"row {grasp.rows[index]}" if grasp.rows is not None else f"t_s={grasp.time_s[index]:.9g}")
     return ", ".join([*where, f"column {column}"] if column else where)

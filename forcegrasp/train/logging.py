@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import sys
+import threading
 from pathlib import Path
+from types import TracebackType
+from typing import Self
 
 import torch
 from tensordict import TensorDictBase
 from torch.utils.tensorboard import SummaryWriter
 
 from forcegrasp.config import TrainConfig
+from forcegrasp.errors import CheckpointError
 from forcegrasp.evaluate.plots import force_traces
 from forcegrasp.evaluate.video import NoRendererError, grasp_video
 from forcegrasp.runs.run_dir import RunDir
@@ -20,11 +24,27 @@ TRACES = 6
 
 
 class TrainingLog:
-    """Writes one batch's figures under TensorBoard's tags and into metrics.csv."""
+    """Writes one batch's figures under TensorBoard's tags and into metrics.csv. A context manager.
+
+    Raises:
+      CheckpointError: where the disk is full or not writable; the run's checkpoints are as they were.
+    """
 
     def __init__(self, run: RunDir, config: TrainConfig, frames: int) -> None:
-        self.run, self.config = run, config
+        self.run, self.config, self.frames = run, config, frames
         self._told_no_renderer = False
+
+    def __enter__(self) -> Self:
+        self._hook, threading.excepthook = threading.excepthook, self._thread_failed
+        try:
+            self._open()
+        except OSError as error:
+            threading.excepthook = self._hook
+            raise self._told(error) from error
+        return self
+
+    def _open(self) -> None:
+        run, config, frames = self.run, self.config, self.frames
         run.drop_metrics_after(frames)
         self.writer = SummaryWriter(str(run.tensorboard), purge_step=frames + 1 if frames else None)
         if not frames:
@@ -80,8 +100,27 @@ class TrainingLog:
         _add_gif(self.writer, "grasps/video", data, frames)
         return path
 
-    def close(self) -> None:
-        self.writer.close()
+    def __exit__(self, kind: type | None, error: BaseException | None, _: TracebackType | None) -> None:
+        try:
+            if error is None:
+                self.writer.close()
+        except OSError as late:
+            raise self._told(late) from late
+        finally:
+            threading.excepthook = self._hook
+        if isinstance(error, OSError):
+            raise self._told(error) from error
+
+    def _told(self, error: OSError) -> CheckpointError:
+        return CheckpointError(
+            f"{self.run.path}: could not write ({error.strerror or error}); free space, then go on with: forcegrasp"
+            f" train resume={self.run.path}"
+        )
+
+    def _thread_failed(self, facts: threading.ExceptHookArgs) -> None:
+        """TensorBoard writes in a thread, and raises here what failed there: no traceback is needed for it."""
+        if not isinstance(facts.exc_value, OSError):
+            self._hook(facts)
 
 
 def _nonzero(force: torch.Tensor) -> torch.Tensor:

@@ -105,10 +105,13 @@ def train(config: TrainConfig, run: RunDir, resume: bool = False) -> bool:
     total = config.ppo.total_frames
     if resume:
         trainer.restore(*run.load())
-    log = TrainingLog(run, config, trainer.frames)
     batch = None
-    shown = _progress(total, trainer.frames, config.grasp.steps)
-    with collecting(trainer.collector) as batches, _stop_signals() as stop, shown as progress:
+    with (
+        collecting(trainer.collector) as batches,
+        TrainingLog(run, config, trainer.frames) as log,
+        _stop_signals() as stop,
+        _progress(total, trainer.frames, config.grasp.steps) as progress,
+    ):
         while trainer.frames < total and not stop:
             started = time.perf_counter()
             values = trainer.prepare()
@@ -147,12 +150,11 @@ def train(config: TrainConfig, run: RunDir, resume: bool = False) -> bool:
                 score = figures["force_reward_normalised"] if whole_task else None
                 run.save(trainer.frames, *trainer.state(), keep=every.keep, score=score)
             progress(trainer.frames, figures)
-    if batch is not None and not stop:
-        if config.log.figures_every:
-            log.traces(batch[:6], trainer.frames)
-        if config.log.video_every:
-            log.video(batch[0], trainer.frames)
-    log.close()
+        if batch is not None and not stop:
+            if config.log.figures_every:
+                log.traces(batch[:6], trainer.frames)
+            if config.log.video_every:
+                log.video(batch[0], trainer.frames)
     return trainer.frames >= total
 
 

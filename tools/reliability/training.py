@@ -16,7 +16,7 @@ from forcegrasp.train.loop import train
 from tools.reliability.child import fork
 
 BATCHES = 8
-_TINY = [
+TINY = [
     "grasp.steps=10",
     "physics.threads=1",
     "log.keep=1",
@@ -33,7 +33,7 @@ _TINY = [
 
 def tiny_config(every: int = 1, seed: int = 0, *more: str) -> TrainConfig:
     """Eight batches of two short grasps; a checkpoint after ``every`` batches."""
-    return compose("train", [*_TINY, f"log.checkpoint_every={every}", f"seed={seed}", *more])
+    return compose("train", [*TINY, f"log.checkpoint_every={every}", f"seed={seed}", *more])
 
 
 def start(path: Path, config: TrainConfig) -> int:
