@@ -6,17 +6,19 @@ twice it keeps the last.
 
 from __future__ import annotations
 
-import errno
-import os
 from pathlib import Path
 from typing import Any
 
 import yaml
 from yaml.composer import Composer
 
+from forcegrasp.bounded import read_bytes
+
 #: What a fitted model of hundreds of objects needs, and what is read in seconds.
 MAX_BYTES = 1_000_000
 MAX_DEPTH = 20
+#: Longest value.
+MAX_VALUE = 20_000
 
 
 class PlainYamlError(ValueError):
@@ -36,10 +38,10 @@ def load(path: Path, *, text_only: bool = False, max_bytes: int = MAX_BYTES) -> 
       max_bytes: the largest file that is read.
 
     Raises:
-      OSError: if it can't be read, or is no ordinary file.
+      OSError: if it can't be read, is no ordinary file, or too large.
       PlainYamlError: says why its content is refused.
     """
-    data = _read(path, max_bytes)
+    data = read_bytes(path, max_bytes)
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -57,15 +59,6 @@ def load(path: Path, *, text_only: bool = False, max_bytes: int = MAX_BYTES) -> 
         raise PlainYamlError(str(error)) from error
 
 
-def _read(path: Path, max_bytes: int) -> bytes:
-    if not path.is_file() and path.exists() and not path.is_dir():  # a pipe would be waited for, a device never ends
-        raise OSError(errno.EINVAL, "not an ordinary file", str(path))
-    with open(path, "rb") as file:
-        if os.fstat(file.fileno()).st_size > max_bytes:
-            raise PlainYamlError(f"larger than {max_bytes // 1000} kB; keep it to the lines it needs")
-        return file.read(max_bytes + 1)
-
-
 def _compose_node(self: Any, parent: Any, index: Any) -> yaml.Node | None:
     event = self.peek_event()
     row = event.start_mark.line + 1
@@ -73,6 +66,8 @@ def _compose_node(self: Any, parent: Any, index: Any) -> yaml.Node | None:
         raise PlainYamlError("anchors and aliases are not supported; write the value out", row)
     if getattr(event, "tag", None):
         raise PlainYamlError(f"the tag {event.tag[:60]!r} is not supported; leave it out", row)
+    if len(getattr(event, "value", "")) > MAX_VALUE:  # YAML 1.1 reads 1:59:59: … as a number, and takes its time
+        raise PlainYamlError(f"a value of {len(event.value)} characters; {MAX_VALUE} may be used", row)
     self.depth = getattr(self, "depth", 0) + 1
     if self.depth > MAX_DEPTH:
         raise PlainYamlError("nested too deeply; write it flat", row)

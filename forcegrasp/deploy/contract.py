@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from forcegrasp.bounded import read_bytes
 from forcegrasp.errors import DeployError, closest
 
 FORMAT = "forcegrasp-policy/1"
@@ -22,6 +23,7 @@ CONTRACT_FILE, NETWORK_FILE = "contract.json", "policy.onnx"
 #: Name, number type and meaning of what goes in and comes out of the network.
 INPUT, OUTPUT = "observation", "action"
 FINGERS = 2
+_MAX_CONTRACT_BYTES, _MAX_NETWORK_BYTES = 1_000_000, 500_000_000
 #: Type of an entry → types of its value or of its list's items, as JSON gives them, and how to say that.
 _KINDS: dict[str, tuple[set[type], str]] = {
     "bool": ({bool}, "true or false"),
@@ -142,7 +144,7 @@ def read_contract(folder: Path | str) -> tuple[Contract, bytes]:
     if not path.is_file():
         raise DeployError(f"{folder}: not an exported policy (no {CONTRACT_FILE}); forcegrasp export makes one")
     try:
-        content = json.loads(path.read_text("utf-8"), parse_constant=_refuse)
+        content = json.loads(read_bytes(path, _MAX_CONTRACT_BYTES).decode(), parse_constant=_refuse)
     except OSError as error:
         raise DeployError(f"{path}: could not read ({error.strerror})") from error
     except (ValueError, RecursionError) as error:
@@ -157,7 +159,7 @@ def read_contract(folder: Path | str) -> tuple[Contract, bytes]:
         raise DeployError(f"{path}: {error}") from error
     network = Path(folder) / NETWORK_FILE
     try:
-        data = network.read_bytes()
+        data = read_bytes(network, _MAX_NETWORK_BYTES)
     except OSError as error:
         raise DeployError(f"{network}: could not read ({error.strerror}); export the policy again") from error
     if hashlib.sha256(data).hexdigest() != expected:

@@ -39,7 +39,8 @@ def _draw_group(axes: Axes, group: Group, column: str, frames: np.ndarray, colou
         axes.plot(run.frames / 1e6, run.values[column], color=colour, lw=0.5, alpha=0.5, ls=style)
     mean, low, high = group.mean(column, frames)
     seeds = len(group.averaged)
-    label = f"{group.label} ({seeds} seed{'s' * (seeds > 1)})"
+    name = group.label.replace("$", r"\$")  # no mathematics in it
+    label = f"{name} ({seeds} seed{'s' * (seeds > 1)})"
     axes.plot(frames / 1e6, mean, color=colour, lw=1.8, label=label)
     if seeds > 1:
         axes.fill_between(frames / 1e6, low, high, color=colour, alpha=0.18, lw=0)

@@ -75,6 +75,10 @@ def _count_rows(path: Path) -> int:
             breaks, length = breaks - 1, len(line)  # the last one goes on in the next chunk
             if lines - 1 > MAX_ROWS:
                 raise MeasurementError(f"{show(path)}: more than {MAX_ROWS:,} rows; split it into several sets")
+    try:
+        decode(b"", True)
+    except UnicodeDecodeError as error:
+        raise MeasurementError(f"{show(path)}: row {breaks + 1}: ends within a character; copy it again") from error
     if not lines:
         raise MeasurementError(f"{show(path)}: empty; a header and rows must be there")
     return lines

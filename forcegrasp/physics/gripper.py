@@ -19,9 +19,14 @@ from mujoco.batch import MODEL_FIELDS
 from forcegrasp import plain_yaml
 from forcegrasp.errors import ConfigError, closest
 from forcegrasp.physics.fast import compile_fast
+from forcegrasp.physics.guard import silence_log
+from forcegrasp.physics.scene_file import check_scene
 
 FORMAT = "forcegrasp-gripper/1"
 _WRITE = re.compile(r"(-?)((?:actuator|dof|geom)_\w+)(?: (\d+))?")
+#: Physics steps that divide a control step of 40 ms well, and take less than forever.
+_TIMESTEP_S = (5e-5, 0.02)
+_LONGEST_TEXT = 200
 _NETFORCE = 3  #: index of reduce="netforce" among a contact sensor's ways to reduce
 _SCOPES = ("gripper", "object", "grasp")
 #: Physics tiers, and how much larger than the scene's own their steps may be.
@@ -98,12 +103,14 @@ class Gripper:
         """
         if tier not in TIERS:
             raise ConfigError(f"physics.tier={tier}: must be reference or fast")
+        silence_log()
+        check_scene(self.model)
         try:
             spec = mujoco.MjSpec.from_file(str(self.model))
             if TIERS[tier] == 1 or self.fast == "none":
                 return spec.compile()
             return compile_fast(spec, self, TIERS[tier])
-        except ValueError as error:
+        except (ValueError, RuntimeError) as error:
             raise ConfigError(f"{self.model}: MuJoCo refuses it: {_one_line(error)}") from error
 
 
@@ -219,6 +226,9 @@ def _parameter(path: Path, name: str, entry: Any) -> BaseParameter:
 def _check_against_model(gripper: Gripper) -> None:
     """Finds what the scene does not have, or has the wrong way round, while the description is at hand to be blamed."""
     model = gripper.compile()
+    low, high = _TIMESTEP_S
+    if not low <= model.opt.timestep <= high:  # which may be NaN
+        raise ConfigError(f"{gripper.model}: timestep={model.opt.timestep:g}: must lie in [{low:g}, {high:g}] s")
     for key, kind, count, names in (
         ("fingers.joints", mujoco.mjtObj.mjOBJ_JOINT, model.njnt, gripper.joints),
         ("fingers.actuators", mujoco.mjtObj.mjOBJ_ACTUATOR, model.nu, gripper.actuators),
@@ -334,6 +344,8 @@ def _number(path: Path, where: str, value: Any) -> float:
 
 
 def _text(path: Path, where: str, value: Any) -> str:
+    if isinstance(value, str) and len(value) > _LONGEST_TEXT:
+        raise ConfigError(f"{path}: {where}: {len(value)} characters; {_LONGEST_TEXT} may be used")
     if not isinstance(value, str) or not value.strip() or not value.isprintable():
         raise ConfigError(f"{path}: {where}={_one_line(value)[:40]}: must be text; put it in quotes")
     return value

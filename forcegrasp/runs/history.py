@@ -12,9 +12,14 @@ from typing import Any
 import numpy as np
 
 from forcegrasp import plain_yaml
+from forcegrasp.bounded import read_bytes
 from forcegrasp.config import TrainConfig
 from forcegrasp.errors import CheckpointError
 from forcegrasp.runs.started_with import experiment
+
+
+#: A row is half a kB, and a batch takes a second.
+MAX_METRICS_BYTES = 200_000_000
 
 
 @dataclass
@@ -84,7 +89,7 @@ def read_history(path: Path, columns: list[str]) -> History | None:
     metrics = path / "metrics.csv"
     options = _options(path / "config.yaml")
     try:
-        text = metrics.read_text()
+        text = read_bytes(metrics, MAX_METRICS_BYTES).decode()
     except FileNotFoundError:
         return None
     except (OSError, UnicodeDecodeError) as error:

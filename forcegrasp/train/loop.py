@@ -88,7 +88,7 @@ class Trainer:
             index, moment = key.split(".")
             optimizer["state"].setdefault(int(index), {})[moment] = value
         self.ppo.optimizer.load_state_dict(optimizer)
-        self.frames, self.batches = facts["frames"], facts["batches"]
+        self.frames, self.batches = int(facts["frames"]), int(facts["batches"])
         self.shuffle.set_state(tensors["rng.shuffle"])
         set_random_states(self.collector, self.config.collector.workers, tensors, facts)
 
@@ -146,7 +146,7 @@ def train(config: TrainConfig, run: RunDir, resume: bool = False) -> bool:
             if every.video_every and trainer.batches % every.video_every == 0:
                 log.video(batch[0], trainer.frames)
             if trainer.batches % every.checkpoint_every == 0 or trainer.frames >= total or stop:
-                whole_task = trainer.frames >= trainer.curriculum.schedule.end_frames  # before, it was easier
+                whole_task = trainer.frames >= trainer.schedule.end_frames  # before, it was easier
                 score = figures["force_reward_normalised"] if whole_task else None
                 run.save(trainer.frames, *trainer.state(), keep=every.keep, score=score)
             progress(trainer.frames, figures)

@@ -43,6 +43,8 @@ def fork(work: Callable[[], int | None], said: Path | None = None) -> int:
 def each(cases: Sequence[Any], try_one: Callable[[Any], Any], seconds: float) -> Iterator[tuple[Any, Any, str]]:
     """Tries the cases in forked processes, one process as long as it lives.
 
+    A case may take ``seconds`` of the processor, and five times that by the clock, as other programs may be at work.
+
     Yields:
       case, what ``try_one`` returned (None if it did not; JSON can hold it), and how it went wrong, or "".
     """
@@ -54,8 +56,10 @@ def each(cases: Sequence[Any], try_one: Callable[[Any], Any], seconds: float) ->
         def work(rest: Sequence[Any] = rest, writer: int = writer) -> None:
             _limit_memory()
             for case in rest:
+                started = time.process_time()
                 try:
-                    answer = (try_one(case), "")
+                    value, took = try_one(case), time.process_time() - started
+                    answer = (value, f"took {took:.1f} s" if took > seconds else "")
                 except BaseException as error:
                     where = traceback.extract_tb(error.__traceback__)[-1]
                     place = f"{os.path.basename(where.filename)}:{where.lineno}"
@@ -67,15 +71,12 @@ def each(cases: Sequence[Any], try_one: Callable[[Any], Any], seconds: float) ->
         os.close(writer)
         try:
             for case in rest:
-                started = time.monotonic()
-                answer = _receive(reader, seconds)
+                answer = _receive(reader, 5 * seconds)
                 if isinstance(answer, str):
                     yield case, None, answer
                     done += 1
                     break
-                value, problem = answer
-                took = time.monotonic() - started
-                yield case, value, problem or (f"took {took:.1f} s" if took > seconds else "")
+                yield case, *answer
                 done += 1
         finally:
             os.close(reader)
@@ -92,7 +93,7 @@ def _limit_memory() -> None:
 def _receive(reader: int, seconds: float) -> tuple[Any, str] | str:
     """One answer of the child; text if there is none."""
     data = b""
-    until = time.monotonic() + seconds + 1
+    until = time.monotonic() + seconds
     while len(data) < 8 or len(data) < 8 + int.from_bytes(data[:8], "little"):
         left = until - time.monotonic()
         if left <= 0 or not select.select([reader], [], [], left)[0]:

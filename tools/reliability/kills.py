@@ -122,4 +122,6 @@ def _arm(place: str, nth: int, share: float) -> None:
         Path.unlink = before(Path.unlink)
 
 
-PROMISE = Promise("a training that is killed leaves a readable run, and loses one checkpoint interval at most", 300, trials)
+PROMISE = Promise(
+    "a training that is killed leaves a readable run, and loses one checkpoint interval at most", 300, trials
+)

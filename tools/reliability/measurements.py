@@ -40,7 +40,9 @@ def trials(count: int, seed: int) -> Iterator[Trial]:
         said = folder / "said"
         assert status(fork(lambda: _prepare(folder), said)) == 0, said.read_text()
         sound = {(place, file): (folder / place / file).read_bytes() for place, file, _ in WAYS}
-        before = dict(zip(("csv", "parquet", "model"), (_memory(folder, p) for p in ("csv", "parquet", "model")), strict=True))
+        before = dict(
+            zip(("csv", "parquet", "model"), (_memory(folder, p) for p in ("csv", "parquet", "model")), strict=True)
+        )
 
         def attempt(number: int) -> tuple[str, str, float]:
             place, file, way = WAYS[number % len(WAYS)]

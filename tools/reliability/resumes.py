@@ -38,7 +38,11 @@ def trials(count: int, seed: int) -> Iterator[Trial]:
                 kills += kill_after(go_on(broken.path), float(rng.uniform(0.3, 1) * seconds)) < 0
                 if rng.random() < 0.3:
                     break
-            last = go_on(broken.path) if list(broken.checkpoints.glob("frames_*.safetensors")) else _again(broken.path, config)
+            last = (
+                go_on(broken.path)
+                if list(broken.checkpoints.glob("frames_*.safetensors"))
+                else _again(broken.path, config)
+            )
             if ended := status(last):
                 problem = f"exit status {ended} of the resumed training: {last_words(broken.path)}"
             else:

@@ -10,14 +10,96 @@ import polars as pl
 
 Rng = np.random.Generator
 
-_BYTES = [b"\n", b",", b'"', b"\r", b"\xff", b"nan", b"-", b"1e999", b": ", b"\0", b"\xef\xbb\xbf", b"\t", b"[", b"&a ", b"*a"]
-#: What a cell may say instead: no numbers, numbers that can't be, text that is hard to show.
-_CELLS = ["", " ", "abc", "nan", "inf", "-inf", "1e999", "1,5", "0x1p3", "1_000", "--1", "1e", "١٢", "\u202e1", "'", '"', '""'] + [
-    '"a', "=1+1", "NULL", "None", "1 2", "9" * 400, "x" * 20_000, "\x07", "-0", "1e-320", "99999999", "true", "../../x", "<b>"
+_BYTES = [
+    b"\n",
+    b",",
+    b'"',
+    b"\r",
+    b"\xff",
+    b"nan",
+    b"-",
+    b"1e999",
+    b": ",
+    b"\0",
+    b"\xef\xbb\xbf",
+    b"\t",
+    b"[",
+    b"&a ",
+    b"*a",
 ]
-_VALUES = ["", "~", "[]", "{}", "[1, [2]]", "{a: 1}", "yes", "nan", ".inf", "-1", "0", "1e999", "1e-400", "0x10", "1_0", "2024-13-99"] + [
-    "!!python/name:os.system", "!!binary aGk=", "&a b", "*a", "<<: {a: 1}", "|", ">", "'", '"', "- -", "? a", "%YAML 9", "---", "@", "`"
-] + ["9" * 5000, "x" * 20_000, "[" * 100, "{a: " * 50, "\u202eabc", "\x85", "12:30:45", "tiago\nkind: grasps"]
+#: What a cell may say instead: no numbers, numbers that can't be, text that is hard to show.
+_CELLS = [
+    "",
+    " ",
+    "abc",
+    "nan",
+    "inf",
+    "-inf",
+    "1e999",
+    "1,5",
+    "0x1p3",
+    "1_000",
+    "--1",
+    "1e",
+    "١٢",
+    "\u202e1",
+    "'",
+    '"',
+    '""',
+] + [
+    '"a',
+    "=1+1",
+    "NULL",
+    "None",
+    "1 2",
+    "9" * 400,
+    "x" * 20_000,
+    "\x07",
+    "-0",
+    "1e-320",
+    "99999999",
+    "true",
+    "../../x",
+    "<b>",
+]
+_VALUES = (
+    [
+        "",
+        "~",
+        "[]",
+        "{}",
+        "[1, [2]]",
+        "{a: 1}",
+        "yes",
+        "nan",
+        ".inf",
+        "-1",
+        "0",
+        "1e999",
+        "1e-400",
+        "0x10",
+        "1_0",
+        "2024-13-99",
+    ]
+    + [
+        "!!python/name:os.system",
+        "!!binary aGk=",
+        "&a b",
+        "*a",
+        "<<: {a: 1}",
+        "|",
+        ">",
+        "'",
+        '"',
+        "- -",
+        "? a",
+        "%YAML 9",
+        "---",
+        "@",
+        "`",
+    ]
+    + ["9" * 5000, "x" * 20_000, "[" * 100, "{a: " * 50, "\u202eabc", "\x85", "12:30:45", "tiago\nkind: grasps"]
+)
 
 
 def spoil_bytes(data: bytes, rng: Rng) -> bytes:
@@ -88,7 +170,9 @@ def spoil_lines(data: bytes, rng: Rng) -> bytes:
             rows[one] = [f'"{cell}"' for cell in rows[one]]
         case _:
             scale = float(rng.choice([0, -1, 1e-3, 1e3, 1e300]))
-            rows[1:] = [[_scaled(cell, scale) if k == column else cell for k, cell in enumerate(row)] for row in rows[1:]]
+            rows[1:] = [
+                [_scaled(cell, scale) if k == column else cell for k, cell in enumerate(row)] for row in rows[1:]
+            ]
     return (ends.join(separator.join(row) for row in rows) + ends).encode(encoding)
 
 
@@ -110,7 +194,9 @@ def spoil_parquet(data: bytes, rng: Rng) -> bytes:
         0: lambda: frame.with_columns(pl.lit(None).cast(types[rng.integers(len(types))]).alias(name)),
         1: lambda: frame.drop(name),
         2: lambda: frame.rename({name: str(rng.choice(["t", "", "T_S", "x" * 300, "\n", "f_l_n "]))}),
-        3: lambda: frame.with_columns(pl.when(pl.int_range(pl.len()) % 97 == 5).then(None).otherwise(column).alias(name)),
+        3: lambda: frame.with_columns(
+            pl.when(pl.int_range(pl.len()) % 97 == 5).then(None).otherwise(column).alias(name)
+        ),
         4: lambda: frame.with_columns(pl.concat_list(column).alias(name)),
         5: lambda: frame.with_columns(pl.struct(column).alias(name)),
         6: lambda: frame.sample(fraction=1, shuffle=True, seed=int(rng.integers(1 << 30))),
