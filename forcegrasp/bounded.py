@@ -1,4 +1,4 @@
-"""Reads files that others may have made: ordinary ones, up to a size. A pipe would be waited for, a device never ends."""
+"""Reads files that others may have made: ordinary ones, up to a size. A pipe would block, and a device never ends."""
 
 from __future__ import annotations
 

@@ -14,6 +14,8 @@ from forcegrasp.errors import ConfigError, ForcegraspError
 if TYPE_CHECKING:
     from forcegrasp.config import TrainConfig
 
+#: Why a run of a sweep failed, in its folder.
+FAILURE = "failed.txt"
 #: Exit status after Ctrl-C, as shells have it.
 INTERRUPTED = 130
 PURPOSE = "learn a grasp-force policy with PPO"
@@ -113,6 +115,16 @@ def _sweep(overrides: list[str]) -> int:
         raise
     finally:  # a sweep that was cut short has something to show, too
         _draw_curves(Path(folder))
+    return _tell_failures(sorted(Path(folder).rglob(FAILURE)))
+
+
+def _tell_failures(files: list[Path]) -> int:
+    """Raises ForcegraspError if runs of a sweep failed, after a line about each; returns the exit status 0 if not."""
+    for file in files:
+        reason = file.read_text("utf-8").strip().removeprefix(f"{file.parent}: ")
+        print(f"{file.parent}: {reason}", file=sys.stderr)
+    if files:
+        raise ForcegraspError(f"{len(files)} of the sweep's runs failed, see above and {FAILURE} in their folders")
     return 0
 
 
@@ -135,10 +147,16 @@ def _sweep_job(composed) -> int:
     import_mujoco()  # a launcher may have started a process of its own
     hydra, config = HydraConfig.get(), cast("TrainConfig", OmegaConf.to_object(composed))
     overrides = [text for text in hydra.overrides.task if not text.startswith("sweep=")]  # this run is a single one
-    status = _begin_or_resume(Path(hydra.runtime.output_dir), config, overrides)
+    path = Path(hydra.runtime.output_dir)
+    (path / FAILURE).unlink(missing_ok=True)
+    try:
+        status = _begin_or_resume(path, config, overrides)
+    except (ForcegraspError, OSError) as error:  # raised here, Hydra would tell of the first one alone
+        (path / FAILURE).write_text(f"{error}\n", "utf-8")
+        return 2
     if status == INTERRUPTED:
         if str(hydra.runtime.choices["hydra/launcher"]).startswith("submitit_"):  # a scheduler ended this job alone
-            raise ForcegraspError(f"{hydra.runtime.output_dir}: stopped and saved; the same sweep typed again goes on")
+            raise ForcegraspError(f"{path}: stopped and saved; the same sweep typed again goes on")
         raise KeyboardInterrupt  # ends the sweep, not just this run
     return status
 
@@ -183,6 +201,7 @@ def _resume(path: Path) -> int:
 
     run = RunDir.open(path)
     config = run.config()
+    (path / FAILURE).unlink(missing_ok=True)  # told when it failed; it gets another chance
     if run.load()[1]["frames"] >= config.ppo.total_frames:
         print(f"{path}: already trained to the end ({config.ppo.total_frames:,} frames)")
         return 0

@@ -17,7 +17,6 @@ from forcegrasp.config import TrainConfig
 from forcegrasp.errors import CheckpointError
 from forcegrasp.runs.started_with import experiment
 
-
 #: A row is half a kB, and a batch takes a second.
 MAX_METRICS_BYTES = 200_000_000
 

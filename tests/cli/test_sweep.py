@@ -135,9 +135,8 @@ def test_submitit_runs_side_by_side_and_a_failing_run_takes_no_other_along(tiny,
     )
     assert done.returncode == 2, done.stderr
     first, last = done.stderr.splitlines()
-    assert "seed=0" in first
-    assert last.startswith("forcegrasp: ")
-    assert "ib_s0_0: already holds a run" in last
+    assert first.startswith("sweep/ib_s0_0: already holds a run")
+    assert last.startswith("forcegrasp: 1 of the sweep's runs failed")
     assert final(RunDir("sweep/ib_s1_1"))
     assert "the runs' jobs write to sweep/.submitit" in done.stdout
     assert "learning curves are in sweep/curves.png" in done.stdout
@@ -146,24 +145,25 @@ def test_submitit_runs_side_by_side_and_a_failing_run_takes_no_other_along(tiny,
     assert main(["curves", "sweep"]) == 0
 
 
-def test_a_failing_run_is_named_without_a_traceback(tiny, monkeypatch, capsys):
+def test_failing_runs_are_all_named_without_a_traceback(tiny, monkeypatch, capsys):
     from forcegrasp.errors import PhysicsError
 
     started = []
 
     def diverge(config, *_):
         started.append(config.seed)
-        raise PhysicsError("grasp 3 diverged")
+        if config.seed != 1:
+            raise PhysicsError(f"grasp {config.seed} diverged")
+        return True
 
     monkeypatch.setattr("forcegrasp.train.loop.train", diverge)
-    assert main(["train", "-m", "seed=0,1", *tiny["train"]]) == 2
-    assert started == [0, 1], "it must not take the others along"
+    assert main(["train", "-m", "seed=0,1,2", *tiny["train"]]) == 2
+    assert started == [0, 1, 2], "it must not take the others along"
     out, err = capsys.readouterr()
     assert "no learning curves: " in out
-    lines = err.splitlines()
-    assert "seed=0" in lines[0]
-    assert lines[-1] == "forcegrasp: grasp 3 diverged"
-    assert len(lines) == 2
+    *failed, end = err.splitlines()
+    assert [line.rpartition("_s")[2] for line in failed] == ["0_0: grasp 0 diverged", "2_2: grasp 2 diverged"]
+    assert end == "forcegrasp: 2 of the sweep's runs failed, see above and failed.txt in their folders"
 
 
 def test_single_run_is_named_after_time_experiment_and_seed(tiny, tmp_path):

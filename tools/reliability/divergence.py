@@ -52,4 +52,4 @@ def _value(rng: np.random.Generator) -> float:
     return float(rng.choice([np.nan, np.inf * sign, sign * 10 ** rng.uniform(15, 300)]))
 
 
-PROMISE = Promise("a simulation that diverges is told with the grasp, the step and the parameters", 1000, trials)
+PROMISE = Promise("a simulation that diverges is told with the grasp, the step and the parameters", 1000, 40, trials)

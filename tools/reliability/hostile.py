@@ -71,8 +71,7 @@ def _tree(folder: Path) -> set[Path]:
 
 def _harm(root: Path) -> str:
     """What is there that should not be, or no longer."""
-    marks = [path for path in root.rglob(MARK)]
-    if marks:
+    if list(root.rglob(MARK)):
         return "was executed"
     there = {path.name for path in (*root.iterdir(), *(root / "outside").iterdir())}
     if there != {"case", "outside", "secret"} or (root / "outside" / "secret").read_text() != "secret":
@@ -80,4 +79,4 @@ def _harm(root: Path) -> str:
     return ""
 
 
-PROMISE = Promise("no file executes anything, writes elsewhere, or takes much time or memory", 0, trials)
+PROMISE = Promise("no file executes anything, writes elsewhere, or takes much time or memory", 0, 12, trials)

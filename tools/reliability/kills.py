@@ -17,8 +17,7 @@ from forcegrasp.runs import whole_file
 from forcegrasp.runs.run_dir import RunDir
 from forcegrasp.train.loop import train
 from tools.reliability.child import fork
-from tools.reliability.training import BATCHES, go_on, kill_after, last_words, start, status, tiny_config
-from tools.reliability.training import what_was_lost
+from tools.reliability.training import BATCHES, go_on, kill_after, last_words, start, status, tiny_config, what_was_lost
 from tools.reliability.trial import Promise, Trial
 
 #: Where in the writing of a file the process dies.
@@ -123,5 +122,5 @@ def _arm(place: str, nth: int, share: float) -> None:
 
 
 PROMISE = Promise(
-    "a training that is killed leaves a readable run, and loses one checkpoint interval at most", 300, trials
+    "a training that is killed leaves a readable run, and loses one checkpoint interval at most", 300, 3, trials
 )

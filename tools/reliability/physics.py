@@ -9,8 +9,8 @@ import numpy as np
 
 from forcegrasp.effects.base import Effect
 from forcegrasp.effects.registry import catalogue
-from forcegrasp.physics.guard import silence_log
 from forcegrasp.physics.gripper import Gripper, load_gripper
+from forcegrasp.physics.guard import silence_log
 from forcegrasp.physics.model import CONTROL_PERIOD_S
 from forcegrasp.physics.plant import Plant, write_base
 from tools.reliability.trial import Promise, Trial
@@ -79,4 +79,4 @@ def grasp(plant: Plant, rng: np.random.Generator) -> list[list[str]]:
     return [[mujoco.mjtWarning(int(kind)).name for kind in np.flatnonzero(counts)] for counts in warnings]
 
 
-PROMISE = Promise("150 steps of any allowed gripper, object and effects raise no warning of MuJoCo", 10_000, trials)
+PROMISE = Promise("150 steps of any allowed gripper, object and effects raise no warning of MuJoCo", 10_000, 4, trials)

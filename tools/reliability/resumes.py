@@ -57,4 +57,4 @@ def _again(path: Path, config) -> int:
     return start(path, config)
 
 
-PROMISE = Promise("a resumed training ends with the same bits as an uninterrupted one", 20, trials)
+PROMISE = Promise("a resumed training ends with the same bits as an uninterrupted one", 20, 1, trials)

@@ -1,4 +1,4 @@
-"""Ways to spoil a file: changed bytes, changed cells and lines of a CSV, changed columns of a Parquet file, odd YAML."""
+"""Ways to spoil a file: changed bytes, cells and lines of a CSV, columns of a Parquet file, odd YAML."""
 
 from __future__ import annotations
 
@@ -27,79 +27,23 @@ _BYTES = [
     b"&a ",
     b"*a",
 ]
-#: What a cell may say instead: no numbers, numbers that can't be, text that is hard to show.
-_CELLS = [
-    "",
-    " ",
-    "abc",
-    "nan",
-    "inf",
-    "-inf",
-    "1e999",
-    "1,5",
-    "0x1p3",
-    "1_000",
-    "--1",
-    "1e",
-    "١٢",
-    "\u202e1",
-    "'",
-    '"',
-    '""',
-] + [
-    '"a',
-    "=1+1",
-    "NULL",
-    "None",
-    "1 2",
-    "9" * 400,
-    "x" * 20_000,
-    "\x07",
-    "-0",
-    "1e-320",
-    "99999999",
-    "true",
-    "../../x",
-    "<b>",
-]
-_VALUES = (
-    [
-        "",
-        "~",
-        "[]",
-        "{}",
-        "[1, [2]]",
-        "{a: 1}",
-        "yes",
-        "nan",
-        ".inf",
-        "-1",
-        "0",
-        "1e999",
-        "1e-400",
-        "0x10",
-        "1_0",
-        "2024-13-99",
-    ]
-    + [
-        "!!python/name:os.system",
-        "!!binary aGk=",
-        "&a b",
-        "*a",
-        "<<: {a: 1}",
-        "|",
-        ">",
-        "'",
-        '"',
-        "- -",
-        "? a",
-        "%YAML 9",
-        "---",
-        "@",
-        "`",
-    ]
-    + ["9" * 5000, "x" * 20_000, "[" * 100, "{a: " * 50, "\u202eabc", "\x85", "12:30:45", "tiago\nkind: grasps"]
+_ODD_CELLS = "|| |abc|nan|inf|-inf|1e999|1,5|0x1p3|1_000|--1|1e|١٢|\u202e1|'|\"|\"\"|\"a|=1+1|NULL|1 2|\x07|-0|true"
+_ODD_VALUES = (
+    "# ~# []# {}# [1, [2]]# {a: 1}# yes# nan# .inf# -1# 0# 1e999# 1e-400# 0x10# 1_0# 2024-13-99# 12:30:45# |# >"
+    "# !!python/name:os.system# !!binary aGk=# &a b# *a# <<: {a: 1}# '# \"# - -# ? a# %YAML 9# ---# @# `# \x85"
 )
+#: What a cell may say instead: no numbers, numbers that can't be, text that is hard to show.
+_CELLS = [*_ODD_CELLS.split("|"), "9" * 400, "x" * 20_000, "../../x", "<b>"]
+#: What a value in YAML may say instead.
+_VALUES = [
+    *_ODD_VALUES.split("#"),
+    "9" * 5000,
+    "x" * 20_000,
+    "[" * 100,
+    "{a: " * 50,
+    "\u202eabc",
+    "tiago\nkind: grasps",
+]
 
 
 def spoil_bytes(data: bytes, rng: Rng) -> bytes:

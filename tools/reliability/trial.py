@@ -21,4 +21,5 @@ class Promise:
 
     text: str
     trials: int  #: of the figure in docs/reliability.md
+    few: int  #: of the small version that is part of the tests; 0 if there is none
     run: Callable[[int, int], Iterator[Trial]]  #: (trials, seed) → trials, as many or more

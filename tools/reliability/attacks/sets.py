@@ -12,7 +12,7 @@ import polars as pl
 
 from forcegrasp.cli.main import main
 from forcegrasp.deploy.contract import read_contract
-from forcegrasp.measure import check_set, read_set
+from forcegrasp.measure import MeasurementSet, check_set, read_set
 from forcegrasp.physics.sampling import OPEN_M
 from tools.reliability.attacks.attack import MARK, Attack, not_files, replace
 
@@ -136,7 +136,9 @@ GRIPPERS = [
 
 
 def _read() -> None:
-    check_set(read_set("."), OPEN_M)
+    measured = read_set(".")
+    assert isinstance(measured, MeasurementSet)
+    check_set(measured, OPEN_M)
 
 
 def attacks() -> Iterator[Attack]:
