@@ -27,7 +27,7 @@ _BYTES = [
     b"&a ",
     b"*a",
 ]
-_ODD_CELLS = "|| |abc|nan|inf|-inf|1e999|1,5|0x1p3|1_000|--1|1e|١٢|\u202e1|'|\"|\"\"|\"a|=1+1|NULL|1 2|\x07|-0|true"
+_ODD_CELLS = '|| |abc|nan|inf|-inf|1e999|1,5|0x1p3|1_000|--1|1e|١٢|\u202e1|\'|"|""|"a|=1+1|NULL|1 2|\x07|-0|true'
 _ODD_VALUES = (
     "# ~# []# {}# [1, [2]]# {a: 1}# yes# nan# .inf# -1# 0# 1e999# 1e-400# 0x10# 1_0# 2024-13-99# 12:30:45# |# >"
     "# !!python/name:os.system# !!binary aGk=# &a b# *a# <<: {a: 1}# '# \"# - -# ? a# %YAML 9# ---# @# `# \x85"
