@@ -51,8 +51,9 @@ def load(path: Path, *, text_only: bool = False, max_bytes: int = MAX_BYTES) -> 
         return yaml.load(text, Loader=_Text) if text_only else yaml.load(text, Loader=_Typed)
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
-        problem = getattr(error, "problem", None) or getattr(error, "reason", None) or "not YAML that can be read"
-        raise PlainYamlError(str(problem), mark.line + 1 if mark else 0) from error
+        said = [getattr(error, name, None) for name in ("context", "problem", "reason")]
+        problem = ", ".join(str(part) for part in said if part) or "not YAML that can be read"
+        raise PlainYamlError(problem, mark.line + 1 if mark else 0) from error
     except PlainYamlError:
         raise
     except (ValueError, OverflowError, RecursionError) as error:  # such as a date in the 13th month

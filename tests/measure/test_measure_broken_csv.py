@@ -274,3 +274,14 @@ def test_row_numbers_of_interleaved_rows(folder):
     mixed[310], mixed[316] = mixed[316], mixed[310]  # of the same grasp, one step apart
     (folder / "samples.csv").write_text("\n".join([header, *mixed]))
     refuse(folder, "samples.csv", "row 318", "time runs back")
+
+
+def test_carriage_return_within_a_cell(folder):
+    edit(folder / "grasps.csv", 3, "object", "spo\rnge")
+    refuse(folder, "grasps.csv", "row 3")
+
+
+def test_file_that_ends_within_a_character(folder):
+    path = folder / "grasps.csv"
+    path.write_bytes(path.read_bytes() + "g9,ä".encode()[:-1])
+    refuse(folder, "grasps.csv", "ends within a character")

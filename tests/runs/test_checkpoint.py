@@ -134,6 +134,7 @@ def metadata(text: str) -> dict[str, str]:
         metadata('{"facts": "{}"}'),
         metadata('{"facts": "{}", "sha256": null}'),
         metadata('{"facts": "[]", "sha256": "0"}'),
+        metadata("[" * 100_000),
     ],
 )
 def test_foreign_safetensors_are_refused(tmp_path, meta):
@@ -229,3 +230,13 @@ def test_header_is_plain_json(saved):
     data = saved.read_bytes()
     header = json.loads(data[8 : 8 + int.from_bytes(data[:8], "little")])
     assert set(header["__metadata__"]) == {"forcegrasp"}
+
+
+def test_pipe_is_refused(tmp_path):
+    os.mkfifo(tmp_path / "a.safetensors")
+    refused(tmp_path / "a.safetensors", "not an ordinary file")
+
+
+def test_facts_that_are_no_mapping_are_refused(tmp_path):
+    checkpoint.write(tmp_path / "a.safetensors", {}, [1, 2])  # pyright: ignore[reportArgumentType]
+    refused(tmp_path / "a.safetensors", "no mapping")

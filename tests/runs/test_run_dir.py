@@ -19,6 +19,7 @@ import yaml
 from forcegrasp.cli.options import compose
 from forcegrasp.config import TrainConfig
 from forcegrasp.errors import CheckpointError
+from forcegrasp.runs import checkpoint
 from forcegrasp.runs.policy import load_policy
 from forcegrasp.runs.run_dir import RunDir, fingerprint
 
@@ -83,6 +84,36 @@ def test_keep_is_honoured(run, keep):
         assert path.exists()
         kept = sorted(int(p.stem.removeprefix("frames_")) for p in run.checkpoints.iterdir())
         assert kept == list(range(10, frames + 1, 10))[-keep:]
+
+
+def test_the_best_is_kept_beside_the_newest(run):
+    for frames, score in ((1, None), (2, 5.0), (3, 7.0), (4, 6.0), (5, 7.0), (6, None)):
+        run.save(frames, {"x": torch.tensor([frames])}, {"batches": frames}, keep=1, score=score)
+        (run.checkpoints / "frames_000000000000.part").touch()  # as a kill leaves it
+    assert {path.name for path in run.checkpoints.glob("*.safetensors")} == {
+        "best.safetensors",
+        "frames_000000000006.safetensors",
+    }
+    assert loaded_frames(run) == 6, "a run goes on from the newest"
+    assert run.load_file(run.best)[1]["frames"] == 3, "the first of the best"
+    damage(run.best)
+    run.save(7, {"x": torch.tensor([7])}, {"batches": 7}, keep=1, score=1.0)
+    assert run.load_file(run.best)[1]["frames"] == 7
+    assert not list(run.checkpoints.glob("*.part"))
+
+
+def test_the_best_can_be_had_as_a_policy(run):
+    run.save(1, {"policy.module.0.bias": torch.zeros(3)}, {}, keep=1, score=1.0)
+    with pytest.raises(CheckpointError, match=r"best\.safetensors: the checkpoint's weights do not fit"):
+        load_policy(run.best)
+    with pytest.raises(CheckpointError, match="not a readable checkpoint"):
+        load_policy(run.checkpoints / "none.safetensors")
+
+
+def test_checkpoint_that_is_none_of_a_training_is_refused(run):
+    checkpoint.write(run.checkpoints / "frames_000000000001.safetensors", {}, {"config": run.fingerprint})
+    with pytest.raises(CheckpointError, match="not a checkpoint of a training"):
+        run.load()
 
 
 def test_older_checkpoints_are_removed_only_after_the_new_one_is_written(run, monkeypatch):
