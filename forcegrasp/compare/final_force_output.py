@@ -279,7 +279,8 @@ def draw(analysis: TableAnalysis) -> Figure:
     for k, (name, rows) in enumerate(analysis.rows.items()):
         colour, base, fit = _COLOURS[k % len(_COLOURS)], law.fits[name], best.fits[name]
         x = np.linspace(0.0, rows.delta_m.max(), 301)
-        above.plot(1e3 * rows.delta_m, rows.force_n, "o", color=colour, label=name)
+        label = name.replace("$", r"\$")  # no mathematics in it
+        above.plot(1e3 * rows.delta_m, rows.force_n, "o", color=colour, label=label)
         above.plot(1e3 * x, base.predict(x), "--", color=colour, lw=1)
         below.plot(1e3 * rows.delta_m, base.residual, "x--", color=colour, lw=0.7, ms=5)
         if analysis.found:
