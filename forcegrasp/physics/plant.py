@@ -12,6 +12,7 @@ from mujoco.batch import Batch
 from forcegrasp.physics import guard
 from forcegrasp.physics.fast import SPHERE
 from forcegrasp.physics.gripper import BaseParameter, Gripper
+from forcegrasp.physics.inertia import inertia_of_radius
 
 if TYPE_CHECKING:
     from forcegrasp.effects.base import Effect
@@ -180,23 +181,10 @@ class Plant:
         sphere = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, SPHERE.format(geom.name))
         if sphere >= 0:
             self._write_base("geom_size", (ids, sphere, 0), radius_m)
-        if np.allclose(self._inertia(geom.size[column : column + 1]), model.body_inertia[self._object_body], rtol=1e-9):
-            self._write_base("body_inertia", (ids, self._object_body), self._inertia(radius_m))
-
-    def _inertia(self, radius: np.ndarray) -> np.ndarray:
-        """Moments of inertia of an object that is all one geom, ``(len(radius), 3)``."""
-        mass, geom = self.model.body_mass[self._object_body], self.model.geom(self.gripper.object_geom)
-        # The order of operations is the compiler's: the last bit of an inertia can move a contact point.
-        if geom.type[0] == mujoco.mjtGeom.mjGEOM_CYLINDER:
-            length = 2 * geom.size[1]
-            across = mass * (3 * radius * radius + length * length) / 12
-            return np.stack([across, across, mass * radius * radius / 2], axis=1)
-        if geom.type[0] == mujoco.mjtGeom.mjGEOM_SPHERE:
-            return np.repeat((2 * mass * radius * radius / 5)[:, None], 3, axis=1)
-        half = np.repeat(geom.size[None], len(radius), axis=0)
-        half[:, self.gripper.axis] = radius
-        squares = half**2
-        return mass / 3 * (squares.sum(axis=1, keepdims=True) - squares)
+        as_in_scene = inertia_of_radius(model, self.gripper, geom.size[column : column + 1])
+        if np.allclose(as_in_scene, model.body_inertia[self._object_body], rtol=1e-9):
+            inertia = inertia_of_radius(model, self.gripper, radius_m)
+            self._write_base("body_inertia", (ids, self._object_body), inertia)
 
     def attach(self, effects: Sequence[tuple[Effect, np.ndarray]]) -> None:
         """Puts effects into the plant, each on its own rows, in the order of their stages; replaces earlier ones."""

@@ -1,0 +1,54 @@
+"""Is there what MuJoCo Warp needs? Nothing of it is imported before somebody asks for it."""
+
+# pyright: standard, reportMissingImports=false
+
+from __future__ import annotations
+
+import sys
+from functools import cache
+from importlib.util import find_spec
+from pathlib import Path
+
+from forcegrasp.errors import ConfigError
+
+
+def check_device(device: str) -> None:
+    """Raises ConfigError, with what to do, unless MuJoCo Warp can simulate on this device (``cpu`` or ``cuda``)."""
+    if find_spec("mujoco_warp") is None or find_spec("warp") is None:
+        raise ConfigError("physics.engine=warp: MuJoCo Warp is not installed: pip install 'forcegrasp[warp]'")
+    _start_warp()
+    if device == "cpu":
+        return
+    import torch
+    import warp
+
+    if not warp.is_cuda_available():
+        raise ConfigError("physics.device=cuda: no GPU with a CUDA driver here; use physics.device=cpu")
+    if not torch.cuda.is_available():
+        raise ConfigError(
+            f"physics.device=cuda: torch {torch.__version__} can't use the GPU: install a build of it for CUDA"
+        )
+
+
+@cache
+def _start_warp() -> None:
+    """Starts Warp without its greetings; says so where its kernels are yet to be compiled."""
+    import warp
+
+    level = warp.config.log_level
+    warp.config.log_level = warp.LOG_ERROR
+    warp.init()
+    warp.config.log_level = max(level, warp.LOG_WARNING)
+    if not kernels_are_cached():
+        print(
+            "forcegrasp: Warp compiles its kernels: it takes a minute or so, once per machine and version",
+            file=sys.stderr,
+        )
+
+
+def kernels_are_cached() -> bool:
+    """Whether Warp has compiled kernels on this machine before."""
+    import warp
+
+    folder = warp.config.kernel_cache_dir
+    return folder is not None and Path(folder).is_dir() and any(Path(folder).iterdir())

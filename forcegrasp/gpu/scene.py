@@ -1,0 +1,122 @@
+"""TIAGo's scene in as many worlds as there are grasps, on a device; one recorded graph steps them all."""
+
+# pyright: standard, reportMissingImports=false
+
+from __future__ import annotations
+
+import mujoco
+import mujoco_warp as mjw
+import numpy as np
+import torch
+import warp as wp
+from torch import Tensor
+
+from forcegrasp.physics.gripper import load_gripper
+from forcegrasp.physics.inertia import inertia_of_radius
+from forcegrasp.physics.model import CONTROL_PERIOD_S
+from forcegrasp.physics.parameters import GraspParameters
+
+# Fields of the model that are written per grasp, and those that MuJoCo Warp derives from them.
+_WRITTEN = ("geom_size", "geom_solimp", "body_inertia", "actuator_biasprm")
+_DERIVED = ("geom_aabb", "geom_rbound", "dof_invweight0", "body_invweight0")
+# Ten contacts of pads and up to four with the floor, four rows each, and two joint limits.
+_CONTACTS, _ROWS = 16, 64
+# What must not be NaN nor larger than MuJoCo's mjMAXVAL, and the warning that tells. MuJoCo Warp itself goes on.
+_SOUND = {
+    mujoco.mjtWarning.mjWARN_BADQPOS: "qpos",
+    mujoco.mjtWarning.mjWARN_BADQVEL: "qvel",
+    mujoco.mjtWarning.mjWARN_BADCTRL: "ctrl",
+}
+_LARGEST = 1e10
+_FULL = mjw.OverflowType.ALL & ~(mjw.OverflowType.ITERATIONS | mjw.OverflowType.LS_ITERATIONS)
+
+
+class WarpScene:
+    """State, parameters and time of ``n`` grasps. Every tensor is float32 and lies on the device.
+
+    Args:
+      n: number of grasps.
+      tier: physics tier, see :meth:`~forcegrasp.physics.gripper.Gripper.compile`.
+      device: ``"cpu"`` or ``"cuda"``.
+
+    Raises:
+      ConfigError: if there is no such tier.
+    """
+
+    def __init__(self, n: int, tier: str, device: str) -> None:
+        self._gripper = gripper = load_gripper("tiago")
+        self._host = host = gripper.compile(tier)
+        self.n, self.device = n, torch.device(device)
+        joints = [host.joint(name) for name in gripper.joints]
+        self._fingers = [int(joint.qposadr[0]) for joint in joints]
+        self._actuators = [host.actuator(name).id for name in gripper.actuators]
+        geom = host.geom(gripper.object_geom)
+        self._body = int(geom.bodyid[0])
+        self._geoms = np.flatnonzero(host.geom_bodyid == self._body).tolist()
+        self._object = int(host.joint(gripper.object_joint).qposadr[0]) + gripper.axis
+        self._readings = [slice(s.adr[0], s.adr[0] + s.dim[0]) for s in map(host.sensor, gripper.force_sensors)]
+        with wp.ScopedDevice(wp.device_from_torch(self.device)):
+            self._model = mjw.put_model(host, dict.fromkeys(_WRITTEN + _DERIVED, n))
+            self._model.opt.warn_overflow = 0  # `warnings` tells
+            self._model.opt.graph_conditional = self.device.type == "cpu" or wp.is_conditional_graph_supported()
+            self._data = mjw.make_data(host, nworld=n, nconmax=_CONTACTS, njmax=_ROWS)
+            self._fields = {name: wp.to_torch(getattr(self._model, name)) for name in _WRITTEN}
+            state = ("qpos", "qvel", "qacc_warmstart", "ctrl", "sensordata", "overflow")
+            self._state = {name: wp.to_torch(getattr(self._data, name)) for name in state}
+            self._start = torch.as_tensor(host.key_qpos[0], dtype=torch.float32, device=self.device)
+            mjw.step(self._model, self._data)  # loads every kernel, which can't be done while recording
+            with wp.ScopedCapture() as capture:
+                for _ in range(round(CONTROL_PERIOD_S / host.opt.timestep)):
+                    mjw.step(self._model, self._data)
+            self._graph = capture.graph
+
+    @property
+    def position(self) -> Tensor:
+        """Finger positions (left, right), metres, ``(n, 2)``; 0 is closed."""
+        return self._state["qpos"][:, self._fingers]
+
+    @property
+    def object_position(self) -> Tensor:
+        """Object position along the grasp axis, metres, ``(n,)``."""
+        return self._state["qpos"][:, self._object] - self._start[self._object]
+
+    @property
+    def pad_force(self) -> Tensor:
+        """Sum of each finger's force sensor at the last physics step, before f_α, newtons, ``(n, 2)``."""
+        return torch.stack([self._state["sensordata"][:, part].sum(-1) for part in self._readings], dim=1)
+
+    def reset(self, ids: np.ndarray, parameters: GraspParameters) -> None:
+        """Opens these grippers and puts objects of the given parameters between the fingers; other rows stay."""
+        rows = torch.as_tensor(ids, device=self.device)
+
+        def put(field: Tensor, index: list[int], column: int, values: np.ndarray) -> None:
+            field[rows[:, None], index, column] = self._tensor(values)[:, None]
+
+        put(self._fields["geom_size"], self._geoms, 0, parameters.radius_m)  # cylinder, and sphere of the fast tier
+        put(self._fields["geom_solimp"], self._geoms, 2, parameters.rho_m)
+        put(self._fields["actuator_biasprm"], self._actuators, 2, parameters.b2)
+        inertia = inertia_of_radius(self._host, self._gripper, parameters.radius_m)
+        self._fields["body_inertia"][rows, self._body] = self._tensor(inertia)
+        for name, state in self._state.items():
+            state[rows] = self._start if name == "qpos" else 0
+        self._state["qpos"][rows, self._object] += self._tensor(parameters.offset_m)
+        groups = mjw.SetConstGroup.FIXED | mjw.SetConstGroup.INERT0
+        with wp.ScopedDevice(wp.device_from_torch(self.device)):
+            mjw.set_const(self._model, self._data, groups)
+
+    def advance(self, command_m: Tensor) -> None:
+        """Holds commanded finger positions, metres, ``(n, 2)``, for one control step."""
+        self._state["ctrl"][:, self._actuators] = command_m
+        wp.capture_launch(self._graph)
+
+    def warnings(self) -> Tensor:
+        """Whether each of MuJoCo's warnings holds, ``(n, kinds)``, as far as MuJoCo Warp lets them be told."""
+        warnings = torch.zeros(self.n, mujoco.mjtWarning.mjNWARNING.value, dtype=torch.bool, device=self.device)
+        for kind, name in _SOUND.items():
+            warnings[:, kind.value] = ~(self._state[name].abs() < _LARGEST).all(-1)
+        warnings[:, mujoco.mjtWarning.mjWARN_CONTACTFULL.value] = self._state["overflow"].bitwise_and(_FULL) != 0
+        return warnings
+
+    def _tensor(self, values: np.ndarray) -> Tensor:
+        return torch.as_tensor(values, dtype=torch.float32, device=self.device)
+
