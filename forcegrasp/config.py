@@ -43,7 +43,24 @@ class PhysicsConfig:
         "reference: the paper's physics. fast: sphere for the pads' contact and 8 ms steps, within sensor noise of it",
         choices=("reference", "fast"),
     )
-    threads: int = option(0, "physics threads; 0 uses every core", low=0, high=4096)
+    threads: int = option(0, "physics threads of engine mujoco; 0 uses every core", low=0, high=4096)
+    engine: str = option(
+        "mujoco",
+        "mujoco: on the CPU. warp: MuJoCo Warp, for thousands of grasps on a GPU, see docs/gpu.md",
+        choices=("mujoco", "warp"),
+    )
+    device: str = option("cpu", "where engine warp and the learner compute", choices=("cpu", "cuda"))
+
+    def check(self, path: str) -> None:
+        """Refuses a device that the engine can't use."""
+        if self.engine == "mujoco" and self.device != "cpu":
+            raise ConfigError(f"{path}device={self.device}: engine mujoco runs on the CPU; add physics=warp")
+
+
+def check_no_effects(model: object, physics: PhysicsConfig, name: str = "model") -> None:
+    """Raises ConfigError if a fitted model is to be simulated by an engine that knows no effects."""
+    if model and physics.engine == "warp":
+        raise ConfigError(f"{name}: engine warp simulates the nominal gripper alone; use physics.engine=mujoco")
 
 
 @dataclass
@@ -253,7 +270,8 @@ class TrainConfig:
     log: LogConfig = field(default_factory=LogConfig)
 
     def check(self, path: str) -> None:
-        """Refuses a curriculum that starts with objects that could be squeezed flat, and unequal shares of grasps."""
+        """Refuses objects that could be squeezed flat, a model on an engine without effects, unequal shares of grasps."""
+        check_no_effects(self.model, self.physics, f"{path}model={self.model}")
         check_deformation(self.grasp.deformation_m, self.curriculum.radius_m, f"{path}curriculum.radius_m")
         grasps, workers = self.ppo.grasps, self.collector.workers
         if grasps % workers:
@@ -359,6 +377,10 @@ class EvaluateConfig:
         5e-5, "object speed that counts as fast", unit="m per control step", source="paper, Table 2", low=0, high=1
     )
 
+    def check(self, path: str) -> None:
+        """Refuses a model on an engine that knows no effects."""
+        check_no_effects(self.model, self.physics, f"{path}model={self.model}")
+
 
 @dataclass
 class CurvesConfig:
@@ -401,6 +423,10 @@ class RenderConfig:
     model: str = option("", "model file of forcegrasp fit or add to simulate the grasp with")
     physics: PhysicsConfig = field(default_factory=PhysicsConfig)
     sensors: SensorConfig = field(default_factory=SensorConfig)
+
+    def check(self, path: str) -> None:
+        """Refuses a model on an engine that knows no effects."""
+        check_no_effects(self.model, self.physics, f"{path}model={self.model}")
 
 
 def check_deformation(deformation_m: float, radius_m: list[float], name: str) -> None:

@@ -63,7 +63,10 @@ def _run(overrides: list[str]) -> int:
 
 
 def _check(config) -> None:
-    """Refuses a model that can't be read, and Ray where it isn't installed, before anything is written."""
+    """Refuses a model that can't be read, and an engine or Ray where it can't run, before anything is written."""
+    from forcegrasp.gpu import check_engine
+
+    check_engine(config.physics)
     if config.model:
         from forcegrasp.effects.variation import read_tiago_model
 

@@ -64,7 +64,7 @@ def build_env(
       ConfigError: if an option is out of its range.
     """
     sensors, observation = sensors or SensorConfig(), observation or ObservationConfig()
-    action, reward = action or ActionConfig(), reward or RewardConfig()
+    action, reward, physics = action or ActionConfig(), reward or RewardConfig(), physics or PhysicsConfig()
     for name, part in (("sensors", sensors), ("observation", observation), ("action", action)):
         validate(part, f"{name}.")
     transforms: list[Transform] = [
@@ -72,6 +72,7 @@ def build_env(
             in_keys=["measured_position", "measured_force"],
             out_keys=["sensed_position", "sensed_force"],
             std=[sensors.position_std_m, sensors.force_std_n],
+            device=physics.device,
         ),
         HadContact(sensors.contact_threshold_n),
         ForceError(),

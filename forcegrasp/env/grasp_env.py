@@ -11,10 +11,11 @@ from tensordict import TensorDict, TensorDictBase
 from torchrl.data import Bounded, Categorical, Composite, Unbounded
 from torchrl.envs import EnvBase
 
-from forcegrasp.config import GraspConfig, PhysicsConfig, RewardConfig, validate
+from forcegrasp.config import GraspConfig, PhysicsConfig, RewardConfig, check_no_effects, validate
 from forcegrasp.effects.model_file import Model
 from forcegrasp.effects.variation import ModelVariation
 from forcegrasp.env.reward import force_reward, normalised_force_reward, object_penalty
+from forcegrasp.gpu.simulator import WarpGraspSimulator
 from forcegrasp.physics import GraspParameters, GraspSampler, GraspSimulator
 from forcegrasp.physics.sampling import OPEN_M
 
@@ -43,7 +44,7 @@ class GraspEnv(EnvBase):
 
     Args:
       n: number of grasps, the batch size.
-      physics: tier and threads.
+      physics: engine, device, tier and threads. On device ``cuda`` all tensors are there, and stay there.
       grasp: ranges the grasps are drawn from.
       reward: form, weights and velocity threshold.
       sampler: what to draw grasps with instead, ``(rng, ids) -> GraspParameters``.
@@ -66,41 +67,50 @@ class GraspEnv(EnvBase):
         seed: int = 0,
         model: Model | None = None,
     ) -> None:
-        super().__init__(device="cpu", batch_size=torch.Size([n]))
         physics, grasp = physics or PhysicsConfig(), grasp or GraspConfig()
-        self.reward_config = dataclasses.replace(reward or RewardConfig())
-        for name, part in (("physics", physics), ("grasp", grasp), ("reward", self.reward_config)):
+        reward = dataclasses.replace(reward or RewardConfig())
+        for name, part in (("physics", physics), ("grasp", grasp), ("reward", reward)):
             validate(part, f"{name}.")
+        simulator = _simulator(n, physics, model)  # first: it says what is wrong with the device
+        super().__init__(device=physics.device, batch_size=torch.Size([n]))
+        self.simulator, self.reward_config = simulator, reward
         self.sampler = sampler or GraspSampler(grasp)
         self.episode_steps = grasp.steps
-        variation = None if model is None else ModelVariation(model)
-        self.simulator = GraspSimulator(n, physics.tier, physics.threads, variation)
+        self._drawn = self._column(simulator.parameters.as_array())
         self.set_seed(seed)
         self._make_specs(n)
 
     def _make_specs(self, n: int) -> None:
-        self.action_spec = Composite(
-            joint_delta=Bounded(-OPEN_M, OPEN_M, shape=torch.Size([n, 2]), dtype=torch.float32), shape=(n,)
-        )
-        self.observation_spec = Composite(shape=(n,))
+        def unbounded(size: int) -> Unbounded:
+            return Unbounded(shape=torch.Size([n, size]), dtype=torch.float32, device=self.device)
+
+        delta = Bounded(-OPEN_M, OPEN_M, shape=torch.Size([n, 2]), dtype=torch.float32, device=self.device)
+        self.action_spec = Composite(joint_delta=delta, shape=(n,), device=self.device)
+        self.observation_spec = Composite(shape=(n,), device=self.device)
         for key, (size, _) in OBSERVATIONS.items():
-            self.observation_spec[key] = Unbounded(shape=torch.Size([n, size]), dtype=torch.float32)
+            self.observation_spec[key] = unbounded(size)
         self.observation_spec["reward_terms"].shape = torch.Size([n])
-        self.reward_spec = Unbounded(shape=torch.Size([n, 1]), dtype=torch.float32)
-        flag = Categorical(2, shape=torch.Size([n, 1]), dtype=torch.bool)
-        self.full_done_spec = Composite(done=flag.clone(), terminated=flag.clone(), truncated=flag.clone(), shape=(n,))
+        self.reward_spec = unbounded(1)
+        flag = Categorical(2, shape=torch.Size([n, 1]), dtype=torch.bool, device=self.device)
+        flags = {name: flag.clone() for name in ("done", "terminated", "truncated")}
+        self.full_done_spec = Composite(flags, shape=(n,), device=self.device)
 
     def _set_seed(self, seed: int | None) -> None:
         self.rng = np.random.default_rng(seed)
 
     def _reset(self, tensordict: TensorDictBase | None = None, **kwargs) -> TensorDictBase:
         mask = None if tensordict is None else tensordict.get("_reset", None)
-        ids = np.arange(self.simulator.n) if mask is None else np.flatnonzero(mask.numpy().reshape(-1))
+        ids = np.arange(self.simulator.n) if mask is None else np.flatnonzero(mask.cpu().numpy().reshape(-1))
         self.simulator.reset(self.sampler(self.rng, ids), ids, self.rng)
+        self._drawn = self._column(self.simulator.parameters.as_array())
         return self._state().update(self._done())
 
     def _step(self, tensordict: TensorDictBase) -> TensorDictBase:
-        self.simulator.step(tensordict.get("joint_delta").numpy().astype(np.float64))
+        delta = tensordict.get("joint_delta")
+        if isinstance(self.simulator, WarpGraspSimulator):
+            self.simulator.step(delta)
+        else:
+            self.simulator.step(delta.numpy().astype(np.float64))
         state, config = self._state(), self.reward_config
         goal = state.get("goal_force")
         error = goal - state.get("measured_force" if config.forces == "measured" else "force")
@@ -108,14 +118,13 @@ class GraspEnv(EnvBase):
         reward = config.force_weight * force + config.object_weight * state["reward_terms", "object"]
         return state.set("reward", reward).update(self._done())
 
+    def _column(self, values: np.ndarray | torch.Tensor) -> torch.Tensor:
+        """What a simulator has, ``(n, ...)``, as the environment tells it. What is on a device stays there."""
+        return torch.as_tensor(values, dtype=torch.float32, device=self.device).reshape(self.simulator.n, -1)
+
     def _state(self) -> TensorDict:
-        simulator = self.simulator
-        parameters = simulator.parameters
-
-        def column(values: np.ndarray) -> torch.Tensor:
-            return torch.from_numpy(values.reshape(simulator.n, -1).astype(np.float32))
-
-        force, goal, speed = column(simulator.force), column(parameters.goal_force_n), column(simulator.object_speed)
+        simulator, column, parameters = self.simulator, self._column, self._drawn.clone()
+        force, goal, speed = column(simulator.force), parameters[:, -1:], column(simulator.object_speed)
         error = goal - force
         terms = {
             "force_paper": force_reward(error),
@@ -129,18 +138,26 @@ class GraspEnv(EnvBase):
                 "commanded_position": column(simulator.commanded_position),
                 "force": force,
                 "measured_force": column(simulator.measured_force),
-                "goal_force": goal,
+                "goal_force": goal.clone(),
                 "object_position": column(simulator.object_position),
                 "object_speed": speed,
-                "grasp_parameters": column(parameters.as_array()),
+                "grasp_parameters": parameters,
                 "reward_terms": TensorDict(terms, batch_size=self.batch_size),
             },
             batch_size=self.batch_size,
         )
 
     def _done(self) -> TensorDict:
-        truncated = torch.from_numpy(self.simulator.steps >= self.episode_steps).unsqueeze(-1)
+        truncated = torch.as_tensor(self.simulator.steps >= self.episode_steps).unsqueeze(-1)
         return TensorDict(
             {"done": truncated, "truncated": truncated.clone(), "terminated": torch.zeros_like(truncated)},
             batch_size=self.batch_size,
         )
+
+
+def _simulator(n: int, physics: PhysicsConfig, model: Model | None) -> GraspSimulator | WarpGraspSimulator:
+    check_no_effects(model, physics)
+    if physics.engine == "warp":
+        return WarpGraspSimulator(n, physics.tier, physics.device)
+    variation = None if model is None else ModelVariation(model)
+    return GraspSimulator(n, physics.tier, physics.threads, variation)

@@ -21,6 +21,7 @@ from forcegrasp.evaluate.plots import cell_boxes, force_traces
 from forcegrasp.evaluate.rollouts import roll_out
 from forcegrasp.evaluate.statistics import Bootstrap
 from forcegrasp.evaluate.tables import markdown, print_report
+from forcegrasp.gpu import check_engine
 
 #: Figures of which more is better; of the others less is.
 _MORE_IS_BETTER = ("force_reward_normalised", "force_reward_paper", "force_reward_measured")
@@ -37,6 +38,7 @@ def evaluate(config: EvaluateConfig, out: Path, console: Console | None = None) 
     """
     console = console or Console()
     torch.set_num_threads(1)
+    check_engine(config.physics)
     model = read_tiago_model(config.model) if config.model else None
     contestants = load_contestants(config.policies)
     baseline = config.baseline if config.baseline in {c.name for c in contestants} else ""

@@ -21,7 +21,7 @@ BATCH = 256
 def roll_out(
     policy: TensorDictModuleBase, grasps: GraspParameters, grasp: GraspConfig, seed: int = 0, **parts: Any
 ) -> TensorDictBase:
-    """Runs one deterministic episode of every grasp and returns them whole, batch ``(n, T)``.
+    """Runs one deterministic episode of every grasp and returns them whole, batch ``(n, T)``, on the CPU.
 
     Args:
       policy: reads and writes tensordicts; a policy with a state brings its ``make_tensordict_primer()``.
@@ -40,7 +40,7 @@ def roll_out(
         if make_primer := getattr(policy, "make_tensordict_primer", None):
             env.append_transform(make_primer())
         with torch.no_grad(), set_exploration_type(ExplorationType.DETERMINISTIC):
-            rollout = env.rollout(grasp.steps, policy, break_when_any_done=False)
+            rollout = env.rollout(grasp.steps, policy.to(env.device), break_when_any_done=False)
         # the stacked observation is most of the memory, and nobody looks at it afterwards
-        episodes.append(rollout.exclude("observation", ("next", "observation")))
+        episodes.append(rollout.exclude("observation", ("next", "observation")).cpu())
     return cast(TensorDictBase, torch.cat(episodes))

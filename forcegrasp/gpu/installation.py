@@ -9,29 +9,28 @@ from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 
+from forcegrasp.config import PhysicsConfig
 from forcegrasp.errors import ConfigError
 
 
-def check_device(device: str) -> None:
-    """Raises ConfigError, with what to do, unless MuJoCo Warp can simulate on this device (``cpu`` or ``cuda``)."""
+def check_engine(physics: PhysicsConfig) -> None:
+    """Raises ConfigError, with what to do, if the engine can't run here: quickly, before anything is written."""
+    if physics.engine != "warp":
+        return
     if find_spec("mujoco_warp") is None or find_spec("warp") is None:
         raise ConfigError("physics.engine=warp: MuJoCo Warp is not installed: pip install 'forcegrasp[warp]'")
-    _start_warp()
-    if device == "cpu":
-        return
-    import torch
-    import warp
+    if physics.device == "cuda":
+        import torch
 
-    if not warp.is_cuda_available():
-        raise ConfigError("physics.device=cuda: no GPU with a CUDA driver here; use physics.device=cpu")
-    if not torch.cuda.is_available():
-        raise ConfigError(
-            f"physics.device=cuda: torch {torch.__version__} can't use the GPU: install a build of it for CUDA"
-        )
+        if not torch.cuda.is_available():
+            raise ConfigError(
+                f"physics.device=cuda: torch {torch.__version__} finds no GPU; it takes a CUDA driver and a build of"
+                " torch for CUDA; or use physics.device=cpu"
+            )
 
 
 @cache
-def _start_warp() -> None:
+def start_warp() -> None:
     """Starts Warp without its greetings; says so where its kernels are yet to be compiled."""
     import warp
 
@@ -40,10 +39,7 @@ def _start_warp() -> None:
     warp.init()
     warp.config.log_level = max(level, warp.LOG_WARNING)
     if not kernels_are_cached():
-        print(
-            "forcegrasp: Warp compiles its kernels: it takes a minute or so, once per machine and version",
-            file=sys.stderr,
-        )
+        print("forcegrasp: Warp compiles its kernels, once per machine: this takes a minute or so", file=sys.stderr)
 
 
 def kernels_are_cached() -> bool:

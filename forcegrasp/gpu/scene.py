@@ -1,6 +1,6 @@
 """TIAGo's scene in as many worlds as there are grasps, on a device; one recorded graph steps them all."""
 
-# pyright: standard, reportMissingImports=false
+# pyright: standard, reportMissingImports=false, reportArgumentType=false
 
 from __future__ import annotations
 
@@ -46,7 +46,8 @@ class WarpScene:
     def __init__(self, n: int, tier: str, device: str) -> None:
         self._gripper = gripper = load_gripper("tiago")
         self._host = host = gripper.compile(tier)
-        self.n, self.device = n, torch.device(device)
+        self._warp_device = wp.get_device(device)
+        self.n, self.device = n, torch.device(wp.device_to_torch(self._warp_device))
         joints = [host.joint(name) for name in gripper.joints]
         self._fingers = [int(joint.qposadr[0]) for joint in joints]
         self._actuators = [host.actuator(name).id for name in gripper.actuators]
@@ -55,10 +56,10 @@ class WarpScene:
         self._geoms = np.flatnonzero(host.geom_bodyid == self._body).tolist()
         self._object = int(host.joint(gripper.object_joint).qposadr[0]) + gripper.axis
         self._readings = [slice(s.adr[0], s.adr[0] + s.dim[0]) for s in map(host.sensor, gripper.force_sensors)]
-        with wp.ScopedDevice(wp.device_from_torch(self.device)):
+        with wp.ScopedDevice(self._warp_device):
             self._model = mjw.put_model(host, dict.fromkeys(_WRITTEN + _DERIVED, n))
             self._model.opt.warn_overflow = 0  # `warnings` tells
-            self._model.opt.graph_conditional = self.device.type == "cpu" or wp.is_conditional_graph_supported()
+            self._model.opt.graph_conditional = self._warp_device.is_cpu or wp.is_conditional_graph_supported()
             self._data = mjw.make_data(host, nworld=n, nconmax=_CONTACTS, njmax=_ROWS)
             self._fields = {name: wp.to_torch(getattr(self._model, name)) for name in _WRITTEN}
             state = ("qpos", "qvel", "qacc_warmstart", "ctrl", "sensordata", "overflow")
@@ -101,7 +102,7 @@ class WarpScene:
             state[rows] = self._start if name == "qpos" else 0
         self._state["qpos"][rows, self._object] += self._tensor(parameters.offset_m)
         groups = mjw.SetConstGroup.FIXED | mjw.SetConstGroup.INERT0
-        with wp.ScopedDevice(wp.device_from_torch(self.device)):
+        with wp.ScopedDevice(self._warp_device):
             mjw.set_const(self._model, self._data, groups)
 
     def advance(self, command_m: Tensor) -> None:
@@ -119,4 +120,3 @@ class WarpScene:
 
     def _tensor(self, values: np.ndarray) -> Tensor:
         return torch.as_tensor(values, dtype=torch.float32, device=self.device)
-

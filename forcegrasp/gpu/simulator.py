@@ -8,7 +8,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from forcegrasp.gpu.installation import check_device
+from forcegrasp.config import PhysicsConfig
+from forcegrasp.gpu.installation import check_engine, start_warp
 from forcegrasp.physics import GraspParameters, guard
 from forcegrasp.physics.sampling import OPEN_M
 
@@ -29,7 +30,8 @@ class WarpGraspSimulator:
     """
 
     def __init__(self, n: int, tier: str = "fast", device: str = "cpu") -> None:
-        check_device(device)
+        check_engine(PhysicsConfig(tier, engine="warp", device=device))
+        start_warp()
         from forcegrasp.gpu.scene import WarpScene
 
         self._scene = scene = WarpScene(n, tier, device)
@@ -88,8 +90,10 @@ class WarpGraspSimulator:
         rows = torch.as_tensor(ids, device=self.device)
         scale = torch.as_tensor(parameters.force_scale, dtype=torch.float32, device=self.device)
         self._force_scale[rows, 0] = scale
-        for state, start in ((self.commanded_position, OPEN_M), (self.object_speed, 0.0), (self.steps, 0)):
-            state[rows] = start
+        # not in place: somebody may have read them
+        self.commanded_position = self.commanded_position.index_fill(0, rows, OPEN_M)
+        self.object_speed = self.object_speed.index_fill(0, rows, 0.0)
+        self.steps = self.steps.index_fill(0, rows, 0)
 
     def step(self, joint_delta: Tensor) -> None:
         """Commands ``q_des = q + u`` to both fingers and simulates one control step (paper, eq. 4).

@@ -81,7 +81,7 @@ class TrainingLog:
 
     def traces(self, episodes: TensorDictBase, frames: int) -> None:
         """Draws force against goal for a few episodes, as PNG and in TensorBoard."""
-        figure = force_traces(episodes, f"after {frames:,} frames")
+        figure = force_traces(episodes.cpu(), f"after {frames:,} frames")
         figure.savefig(self.run.figures / f"traces_{frames:012d}.png", dpi=100)
         self.writer.add_figure("grasps/force_traces", figure, frames)
 
@@ -91,7 +91,7 @@ class TrainingLog:
             return None
         path = self.run.figures / f"grasp_{frames:012d}.gif"
         try:
-            data = grasp_video({f"after {frames:,} frames": episode}, self.config.sensors)
+            data = grasp_video({f"after {frames:,} frames": episode.cpu()}, self.config.sensors)
         except NoRendererError as error:
             print(f"forcegrasp: no video: {error}", file=sys.stderr)
             self._told_no_renderer = True

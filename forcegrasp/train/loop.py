@@ -41,12 +41,15 @@ class Trainer:
         self.frames = self.batches = 0
         torch.set_num_threads(1)  # the physics needs the cores
         torch.manual_seed(config.seed)
-        self.shuffle = torch.Generator().manual_seed(config.seed)
         self.env: TransformedEnv = training_env(config, model)
         self.schedule = LinearSchedule(config.curriculum, config.grasp, config.reward, config.ppo.total_frames)
+        device = self.env.device
+        self.shuffle = torch.Generator(device).manual_seed(config.seed)
         size = self.env.observation_spec["observation"].shape[-1]
         self.policy = make_policy(size, config.ppo)
         self.value = make_value(size, config.ppo)
+        for net in (self.policy, self.value):
+            net.to(device)
         self.ppo = PPO(self.policy, self.value, config.ppo)
         self.collector = make_collector(config, self.env, self.policy, self.schedule, model)
 
@@ -64,7 +67,7 @@ class Trainer:
         generators, facts = random_states(self.collector)
         tensors |= generators | {"rng.shuffle": self.shuffle.get_state()}
         facts |= {"batches": self.batches, "curriculum": self.schedule(self.frames).scalars()}
-        return {k: v.detach().contiguous().clone() for k, v in tensors.items()}, facts
+        return {k: v.detach().cpu().contiguous().clone() for k, v in tensors.items()}, facts
 
     def restore(self, tensors: dict[str, Tensor], facts: dict[str, Any]) -> None:
         """The inverse of :meth:`state`.

@@ -40,7 +40,7 @@ class Value(nn.Module):
         if state:
             parameters, force, position, object_position = state
             # true gap between each finger and the object's surface, in centimetres
-            side = torch.tensor([-1.0, 1.0])
+            side = torch.tensor([-1.0, 1.0], device=position.device)
             gap = (position - side * object_position - parameters[..., 2:3]) * 100
             true = (parameters - self.middle) / self.half_width
             moved = (object_position - parameters[..., 3:4]) * 1000
@@ -107,7 +107,8 @@ class PPO:
         sums = dict.fromkeys(DIAGNOSTICS, torch.zeros(()))
         updates = 0
         for _ in range(self.config.epochs):
-            for ids in torch.randperm(len(frames), generator=generator).split(self.config.minibatch):
+            order = torch.randperm(len(frames), generator=generator, device=generator.device)
+            for ids in order.split(self.config.minibatch):
                 losses = self.loss(frames[ids])
                 # value errors in units of the horizon: in units of reward they would drown the policy's
                 objective = losses["loss_objective"] + losses["loss_critic"] / self.horizon**2

@@ -22,16 +22,22 @@ class ObservationNoise(Transform):
       out_keys: where the readings go.
       std: one standard deviation per key, in that key's unit; 0 copies the value.
       seed: seed of the generator.
+      device: where the noise is drawn; that of the readings, lest it be copied there.
     """
 
     def __init__(
-        self, in_keys: Sequence[NestedKey], out_keys: Sequence[NestedKey], std: Sequence[float], seed: int = 0
+        self,
+        in_keys: Sequence[NestedKey],
+        out_keys: Sequence[NestedKey],
+        std: Sequence[float],
+        seed: int = 0,
+        device: torch.device | str = "cpu",
     ) -> None:
         if not len(in_keys) == len(out_keys) == len(std):
             raise ValueError(f"needs one out_key and one std per in_key; got {in_keys}, {out_keys}, {std}")
         super().__init__(in_keys=in_keys, out_keys=out_keys)
         self.std = [float(s) for s in std]
-        self.generator = torch.Generator()
+        self.generator = torch.Generator(device)
         self.set_seed(seed)
 
     def set_seed(self, seed: int) -> None:
@@ -41,7 +47,8 @@ class ObservationNoise(Transform):
     def _call(self, next_tensordict: TensorDictBase) -> TensorDictBase:
         for in_key, out_key, std in zip(self.in_keys, self.out_keys, self.std, strict=True):
             value = next_tensordict[in_key]
-            noise = torch.randn(value.shape, generator=self.generator, dtype=value.dtype)
+            device = self.generator.device
+            noise = torch.randn(value.shape, generator=self.generator, dtype=value.dtype, device=device)
             next_tensordict.set(out_key, value + std * noise.to(value.device))
         return next_tensordict
 

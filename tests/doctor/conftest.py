@@ -25,6 +25,7 @@ SOUND = {
         'onnx>=1.19; extra == "onnx"',
         'ray==2.60.0; extra == "ray"',
         'hydra-submitit-launcher==1.2.0; extra == "cluster"',
+        'mujoco-warp==4.0.0; extra == "warp"',
         'pytest; extra == "dev"',
     ),
     "torch": ("2.13.0+cpu", "sympy>=1.13"),
@@ -39,6 +40,7 @@ SOUND = {
     "onnx": ("1.23.2",),
     "ray": ("2.60.0",),
     "hydra-submitit-launcher": ("1.2.0",),
+    "mujoco-warp": ("4.0.0",),
 }
 
 

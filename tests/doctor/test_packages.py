@@ -131,7 +131,7 @@ def test_extras_are_notes(environment):
     del environment["rosbags"]
     environment["onnx"].version = "1.0"
     lines = [finding.line() for finding in check_extras()]
-    assert [finding.level for finding in check_extras()] == ["note", "note", "fine", "fine"]
+    assert [finding.level for finding in check_extras()] == ["note", "note", "fine", "fine", "fine"]
     assert "onnx 1.0 is installed, >=1.19 is needed; if you want it: pip install 'forcegrasp[onnx]'" in lines[0]
     assert "rosbags is not installed; if you want it: pip install 'forcegrasp[rosbag]'" in lines[1]
     environment["forcegrasp"].requires = []
@@ -188,7 +188,7 @@ def test_every_package_that_is_imported_is_tried(root):
                 imported |= {alias.name.partition(".")[0] for alias in node.names}
             elif isinstance(node, ast.ImportFrom):
                 imported.add((node.module or "").partition(".")[0])
-    of_extras = {"rosbags", "onnx", "onnxruntime", "onnxscript"}
+    of_extras = {"rosbags", "onnx", "onnxruntime", "onnxscript", "mujoco_warp", "warp"}
     for_types_only = {"typing_extensions"}
     with_others = {"markupsafe"}  # of jinja2
     others = imported - set(sys.stdlib_module_names) - {"forcegrasp"} - of_extras - for_types_only - with_others
