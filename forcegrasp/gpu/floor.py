@@ -1,7 +1,7 @@
-"""Depths at which an upright cylinder stands in the floor, as exact as float32 allows.
+"""Where an upright cylinder touches the floor, as exact as float32 allows.
 
-MuJoCo Warp finds a tilt's part in them from 1 − cos² of the angle, which in float32 is 0 below 0.02°. The object then
-rocks within that angle: fingertip forces flicker by up to 20 mN, more than a sensor's noise. Here the sine is used.
+MuJoCo Warp 4.0 finds a tilt's part in the depths from 1 − cos² of its angle. In float32 that is 0 or rounding below 0.02°:
+the object rocks within that angle, and forces flicker by more than a sensor's noise. Here it is found from the sine.
 """
 
 # pyright: standard, reportMissingImports=false, reportGeneralTypeIssues=false, reportInvalidTypeForm=false
@@ -45,15 +45,21 @@ def _correct(
     if cosine < 0.9:
         return  # it lies, and rests on its side
     lean = axis + normal * cosine  # as long as the sine
-    to_end = axis * size[w % size.shape[0], cylinder][1]
-    rim = position[contact] - center - to_end  # from the middle of the lower end, whose plane holds it
-    height = wp.dot(center - geom_position[w, floor], normal) + wp.dot(to_end, normal)
-    exact = height + wp.dot(rim, lean) / cosine
-    position[contact] = position[contact] + normal * (0.5 * (depth[contact] - exact))
+    radius, half_length = size[w % size.shape[0], cylinder][0], size[w % size.shape[0], cylinder][1]
+    end = center + axis * half_length
+    rim = position[contact] - end
+    rim = wp.normalize(rim - normal * wp.dot(rim, normal)) * radius
+    rim = rim + normal * (wp.dot(rim, lean) / cosine)  # in the plane of the lower end
+    exact = wp.dot(end + rim - geom_position[w, floor], normal)
+    position[contact] = end + rim - normal * (0.5 * exact)
     depth[contact] = exact
 
 
-def exact_depths(floor: int, cylinder: int) -> Callable[[mjw.Model, mjw.Data], None]:
+#: Rounding may put a point above the floor that is in it; nearer than this it is a contact to be corrected. Metres.
+GAP_M = 0.02
+
+
+def exact_contacts(floor: int, cylinder: int) -> Callable[[mjw.Model, mjw.Data], None]:
     """Returns what corrects the contacts of two geoms, between their detection and what is made of them."""
 
     def correct(model: mjw.Model, data: mjw.Data) -> None:

@@ -11,7 +11,7 @@ import torch
 import warp as wp
 from torch import Tensor
 
-from forcegrasp.gpu.floor import exact_depths
+from forcegrasp.gpu.floor import GAP_M, exact_contacts
 from forcegrasp.physics.gripper import load_gripper
 from forcegrasp.physics.inertia import inertia_of_radius
 from forcegrasp.physics.model import CONTROL_PERIOD_S
@@ -57,11 +57,13 @@ class WarpScene:
         self._geoms = np.flatnonzero(host.geom_bodyid == self._body).tolist()
         self._object = int(host.joint(gripper.object_joint).qposadr[0]) + gripper.axis
         self._readings = [slice(s.adr[0], s.adr[0] + s.dim[0]) for s in map(host.sensor, gripper.force_sensors)]
+        floor = host.geom("floor").id
+        host.geom_gap[floor] = GAP_M
         with wp.ScopedDevice(self._warp_device):
             self._model = mjw.put_model(host, dict.fromkeys(_WRITTEN + _DERIVED, n))
             self._model.opt.warn_overflow = 0  # `warnings` tells
             self._model.opt.graph_conditional = self._warp_device.is_cpu or wp.is_conditional_graph_supported()
-            self._model.callback.contactfilter = exact_depths(host.geom("floor").id, geom.id)
+            self._model.callback.contactfilter = exact_contacts(floor, geom.id)
             self._data = mjw.make_data(host, nworld=n, nconmax=_CONTACTS, njmax=_ROWS)
             self._fields = {name: wp.to_torch(getattr(self._model, name)) for name in _WRITTEN}
             state = ("qpos", "qvel", "qacc_warmstart", "ctrl", "sensordata", "overflow")
