@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -29,3 +31,18 @@ def draw() -> Callable[..., GraspParameters]:
         return GraspSampler(GraspConfig(**ranges))(np.random.default_rng(seed), np.arange(n))
 
     return grasps
+
+
+@pytest.fixture(scope="session")
+def warp() -> None:
+    """Skips a test unless MuJoCo Warp is installed and has compiled kernels here, or FORCEGRASP_WARP is set.
+
+    To compile them takes a minute or so, once per machine.
+    """
+    if find_spec("mujoco_warp") is None or find_spec("warp") is None:
+        pytest.skip("MuJoCo Warp is not installed: pip install 'forcegrasp[warp]'")
+    from forcegrasp.gpu.installation import kernels_are_cached, start_warp
+
+    start_warp()
+    if not (kernels_are_cached() or os.environ.get("FORCEGRASP_WARP")):
+        pytest.skip("Warp's kernels are not compiled here; set FORCEGRASP_WARP=1 to have it done")

@@ -64,15 +64,16 @@ def build_env(
       ConfigError: if an option is out of its range.
     """
     sensors, observation = sensors or SensorConfig(), observation or ObservationConfig()
-    action, reward, physics = action or ActionConfig(), reward or RewardConfig(), physics or PhysicsConfig()
+    action, reward = action or ActionConfig(), reward or RewardConfig()
     for name, part in (("sensors", sensors), ("observation", observation), ("action", action)):
         validate(part, f"{name}.")
+    grasps = GraspEnv(n, physics, grasp, reward, sampler, model=model)
     transforms: list[Transform] = [
         ObservationNoise(
             in_keys=["measured_position", "measured_force"],
             out_keys=["sensed_position", "sensed_force"],
             std=[sensors.position_std_m, sensors.force_std_n],
-            device=physics.device,
+            device=grasps.device,
         ),
         HadContact(sensors.contact_threshold_n),
         ForceError(),
@@ -86,7 +87,7 @@ def build_env(
     if action.inductive_bias:
         transforms.append(InductiveBias(action.bias_one_contact, action.bias_floor))
     transforms.append(ActionScale(action.max_delta_m))
-    env = TransformedEnv(GraspEnv(n, physics, grasp, reward, sampler, model=model), Compose(transforms))
+    env = TransformedEnv(grasps, Compose(transforms))
     seed_env(env, seed)
     return env
 

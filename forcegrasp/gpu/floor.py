@@ -1,10 +1,11 @@
 """Where an upright cylinder touches the floor, as exact as float32 allows.
 
-MuJoCo Warp 4.0 finds a tilt's part in the depths from 1 − cos² of its angle. In float32 that is 0 or rounding below 0.02°:
-the object rocks within that angle, and forces flicker by more than a sensor's noise. Here it is found from the sine.
+MuJoCo Warp 4.0 finds a tilt's part in the depths from 1 − cos² of its angle. In float32 that is 0 or rounding below
+0.02°: the object rocks within that angle, and forces flicker by more than a sensor's noise. Here the sine is used.
 """
 
-# pyright: standard, reportMissingImports=false, reportGeneralTypeIssues=false, reportInvalidTypeForm=false
+# pyright: standard, reportMissingImports=false, reportArgumentType=false, reportAttributeAccessIssue=false
+# pyright: reportCallIssue=false, reportIndexIssue=false, reportOperatorIssue=false, reportInvalidTypeForm=false
 
 from __future__ import annotations
 

@@ -113,7 +113,7 @@ class WarpGraspSimulator:
           PhysicsError: if a grasp diverged.
         """
         before = self.object_position
-        self.commanded_position = position.clamp(0.0, OPEN_M)
+        self.commanded_position = position.float().clamp(0.0, OPEN_M)
         self._scene.advance(self.commanded_position)
         warnings = self._scene.warnings()
         if warnings.any():  # waits for the device: once per control step, in which torchrl asks whether all is done

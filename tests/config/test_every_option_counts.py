@@ -31,7 +31,7 @@ from forcegrasp.config import (
     TrainConfig,
     validate,
 )
-from forcegrasp.errors import ForcegraspError
+from forcegrasp.errors import ConfigError, ForcegraspError
 from forcegrasp.evaluate.compare_policies import evaluate
 from forcegrasp.runs import checkpoint
 from forcegrasp.runs.run_dir import RunDir
@@ -62,6 +62,8 @@ MODEL = Path(__file__).parent / "model.yaml"
 SHARED_CASES: dict[str, Any] = {
     "physics.tier": "reference",
     "physics.threads": 2,
+    "physics.engine": "warp",
+    "physics.device": "cuda",
     "grasp.kappa": [0.0, 0.5],
     "grasp.b2": [-9.0, -9.0],
     "grasp.radius_m": [0.03, 0.035],
@@ -74,6 +76,9 @@ SHARED_CASES: dict[str, Any] = {
     "sensors.force_std_n": 0.1,
     "sensors.contact_threshold_n": 0.2,
 }
+
+#: They have tests of their own, as they want packages and hardware.
+ELSEWHERE = ("physics.engine", "physics.device")
 
 #: The same, for the options of training alone.
 TRAIN_CASES: dict[str, Any] = {
@@ -278,7 +283,8 @@ def test_the_same_evaluation_finds_the_same(tmp_path, plain_evaluation, learned)
 
 
 @pytest.mark.parametrize(
-    "name", [name for name in TRAIN_CASES if name != "reward.forces" and not name.startswith("collector.")]
+    "name",
+    [n for n in TRAIN_CASES if n not in ("reward.forces", *ELSEWHERE) and not n.startswith("collector.")],
 )
 def test_option_of_train(name, tmp_path, plain_training):
     different = trained(tmp_path, **{name: TRAIN_CASES[name]})
@@ -319,10 +325,28 @@ def test_forces_that_the_reward_judges_differ_with_a_model(tmp_path):
     assert one["weights"] != other["weights"]
 
 
-@pytest.mark.parametrize("name", [name for name in EVALUATE_CASES if name not in ("out", "physics.threads")])
+@pytest.mark.parametrize("name", [n for n in EVALUATE_CASES if n not in ("out", "physics.threads", *ELSEWHERE)])
 def test_option_of_evaluate(name, tmp_path, plain_evaluation, learned):
     different = evaluated(tmp_path, **learned | {name: EVALUATE_CASES[name]})
     assert different != plain_evaluation
+
+
+@pytest.mark.parametrize("verb", ["train", "evaluate", "render"])
+def test_engine_and_device_reach_the_simulator(verb, tmp_path, monkeypatch):
+    """What they simulate is tested in tests/gpu; here they may be missing."""
+    asked = []
+
+    def begin(n, tier, device):
+        asked.append(device)
+        raise ConfigError("enough")
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("forcegrasp.env.grasp_env.WarpGraspSimulator", begin)
+    monkeypatch.setattr("forcegrasp.gpu.installation.find_spec", lambda name: name)
+    monkeypatch.setattr("torch.cuda.is_available", lambda: True)
+    for options in (["physics.engine=warp"], ["physics.engine=warp", "physics.device=cuda"]):
+        assert main([verb, *options]) == 2
+    assert asked == ["cpu", "cuda"]
 
 
 def test_threads_of_evaluate_reach_the_engine(tmp_path, monkeypatch):
@@ -509,6 +533,8 @@ RENDER_CASES: dict[str, Any] = {
     "model": "model.yaml",
     "physics.tier": "reference",
     "physics.threads": 2,
+    "physics.engine": "warp",
+    "physics.device": "cuda",
     "sensors.position_std_m": 0.001,
     "sensors.force_std_n": 0.1,
     "sensors.contact_threshold_n": 0.2,
@@ -566,7 +592,7 @@ def test_the_same_rendering_shows_the_same(tmp_path, plain_rendering, run_path):
     assert rendered(tmp_path, policies=[str(run_path)]) == plain_rendering
 
 
-@pytest.mark.parametrize("name", RENDER_CASES)
+@pytest.mark.parametrize("name", [name for name in RENDER_CASES if name not in ELSEWHERE])
 def test_option_of_render(name, tmp_path, plain_rendering, run_path):
     (tmp_path / "model.yaml").write_text(MODEL.replace("EFFECTS", "{}"))
     assert rendered(tmp_path, **{"policies": [str(run_path)], name: RENDER_CASES[name]}) != plain_rendering
