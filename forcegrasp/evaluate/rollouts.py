@@ -37,10 +37,12 @@ def roll_out(
     for first in range(0, len(grasps), BATCH):
         chunk = grasps[np.arange(first, min(first + BATCH, len(grasps)))]
         env = build_env(len(chunk), grasp=grasp, sampler=FixedGrasps(chunk), seed=seed + first, **parts)
+        if isinstance(policy, torch.nn.Module):
+            policy.to(env.device)
         if make_primer := getattr(policy, "make_tensordict_primer", None):
             env.append_transform(make_primer())
         with torch.no_grad(), set_exploration_type(ExplorationType.DETERMINISTIC):
-            rollout = env.rollout(grasp.steps, policy.to(env.device), break_when_any_done=False)
+            rollout = env.rollout(grasp.steps, policy, break_when_any_done=False)
         # the stacked observation is most of the memory, and nobody looks at it afterwards
         episodes.append(rollout.exclude("observation", ("next", "observation")).cpu())
     return cast(TensorDictBase, torch.cat(episodes))

@@ -104,7 +104,14 @@ def is_equal(one: Any, other: Any) -> bool:
 def test_every_option_is_in_the_table() -> None:
     classes = [value for name in transforms.__all__ if isinstance(value := getattr(transforms, name), type)]
     options = {(kind, option) for kind in classes for option in inspect.signature(kind).parameters}
-    assert options == {(kind, option) for kind, option, _ in CHANGED}
+    assert options == {(kind, option) for kind, option, _ in CHANGED} | {(ObservationNoise, "device")}
+
+
+def test_noise_is_drawn_on_its_device(monkeypatch) -> None:
+    asked, plain = [], torch.Generator
+    monkeypatch.setattr(torch, "Generator", lambda device: asked.append(device) or plain())
+    ObservationNoise(**BASE[ObservationNoise], device="cuda")
+    assert asked == ["cuda"]
 
 
 @pytest.mark.parametrize(("kind", "option", "value"), CHANGED, ids=lambda item: getattr(item, "__name__", str(item)))
