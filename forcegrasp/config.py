@@ -270,9 +270,12 @@ class TrainConfig:
     log: LogConfig = field(default_factory=LogConfig)
 
     def check(self, path: str) -> None:
-        """Refuses objects that could be squeezed flat, a model on an engine without effects, unequal shares of grasps."""
+        """Refuses objects squeezed flat, a model on an engine without effects, and shares that workers can't have."""
         check_no_effects(self.model, self.physics, f"{path}model={self.model}")
         check_deformation(self.grasp.deformation_m, self.curriculum.radius_m, f"{path}curriculum.radius_m")
+        if self.collector.kind == "ray" and self.physics.device != "cpu":
+            device = f"{path}physics.device={self.physics.device}"
+            raise ConfigError(f"{device}: Ray's workers have no GPU; use collector=direct")
         grasps, workers = self.ppo.grasps, self.collector.workers
         if grasps % workers:
             raise ConfigError(

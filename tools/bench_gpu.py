@@ -53,7 +53,7 @@ def training(n: int, physics: PhysicsConfig, steps: int) -> Callable[[], object]
     config = TrainConfig(physics=physics, grasp=GraspConfig(steps=steps))
     config.ppo.grasps, config.ppo.initial_action = n, -1.0
     trainer = Trainer(config)
-    batches = iter(trainer.collector())
+    batches = iter(trainer.collector)
     return lambda: trainer.ppo.update(next(batches), trainer.shuffle)
 
 

@@ -88,6 +88,7 @@ MISTAKES = [
     (["train", "grasp.deformation_m=0.02"], "eq. 3"),
     (["train", "curriculum.radius_m=[0.0125,0.02]", "grasp.deformation_m=0.014"], "curriculum.radius_m"),
     (["train", "physics.device=cuda"], "physics.device=cuda: engine mujoco runs on the CPU; add physics=warp"),
+    (["train", "physics=warp", "physics.device=cuda", "collector=ray"], "Ray's workers have no GPU"),
     (["evaluate", "physics.device=tpu"], "must be one of cpu, cuda"),
     (
         ["train", "physics=warp", "model=virtual_robot"],

@@ -30,7 +30,7 @@ RUN = [
     "docs/write-an-effect.md",
     "docs/your-gripper.md",
 ]
-ELSEWHERE = {"docs/compare-your-data.md", "docs/deploy.md", "docs/tutorial.md"}
+ELSEWHERE = {"docs/compare-your-data.md", "docs/deploy.md", "docs/gpu.md", "docs/tutorial.md"}
 
 
 @pytest.fixture
@@ -61,6 +61,15 @@ def test_python_blocks_run(page, name):
     code = page(name)
     assert code.strip()
     run(name, code)
+
+
+def test_python_of_the_gpu_page_runs_on_a_cpu(warp, page):
+    """A few grasps and steps of it."""
+    code = page("docs/gpu.md")
+    for shown, small in (('"cuda"', '"cpu"'), ("4096", "2"), ("150", "3")):
+        assert shown in code
+        code = code.replace(shown, small)
+    run("docs/gpu.md", code)
 
 
 def test_no_python_is_left_out():

@@ -58,13 +58,13 @@ def test_training():
     config.ppo.grasps, config.ppo.minibatch, config.ppo.hidden = 4, 24, [8]
     trainer = Trainer(config)
     before = [p.clone() for p in trainer.policy.parameters()]
-    batch = next(iter(trainer.collector()))
+    batch = next(iter(trainer.collector))
     assert batch.shape == (4, 12)
     losses = trainer.ppo.update(batch, trainer.shuffle)
     assert all(torch.isfinite(torch.tensor(value)) for value in losses.values())
     assert any(not torch.equal(a, b) for a, b in zip(before, trainer.policy.parameters(), strict=True))
     tensors, facts = trainer.state()
-    following = next(iter(trainer.collector()))
+    following = next(iter(trainer.collector))
     other = Trainer(config)
     other.restore(tensors, facts | {"frames": 48})
-    assert torch.equal(next(iter(other.collector()))["next", "observation"], following["next", "observation"])
+    assert torch.equal(next(iter(other.collector))["next", "observation"], following["next", "observation"])
