@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from forcegrasp.compare.base_fit import BaseFit
+from forcegrasp.compare.base_fit import BaseFit, rms_error
 from forcegrasp.compare.fit import Fit, Simulators, fit_exactly
 from forcegrasp.compare.floor import beyond_fit, cells, excess, numerical_error, numerical_floor
 from forcegrasp.compare.heldout import heldout_residual, log_likelihood, make_folds, rms
@@ -37,6 +37,8 @@ _HOPELESS = 0.2
 _UNSEEN = 0.5
 # A signature of an earlier round is simulated anew if it gains this share of what makes its effect worth a fit.
 _STALE = 0.3
+# An error of so many times the noise leaves nothing to look for.
+_ALL_FITTED = 1.05
 # Effects whose signatures are that parallel can't be told apart, whatever the likelihood says.
 _PARALLEL = 0.995
 # An effect with fewer parameters that gains this share of what the best one gains can't be ruled out.
@@ -250,10 +252,20 @@ class _Round:
         settled = []
         for c in near:
             progress(f"fitting {c.effect.name} {c.variant} to the end")
-            exact = fit_exactly(self.target, c.fit.problem, self.simulators, c.fit.vector)
-            settled.append(self._judge(c.effect, c.variant, exact, c.p_family, c.signature))
+            settled.append(self._judge(c.effect, c.variant, self._to_the_end(c.fit), c.p_family, c.signature))
         settled.sort(key=lambda c: -c.heldout_gain)
         return (*settled, *(c for c in ordered if c not in near))
+
+    def _to_the_end(self, rough: Fit) -> Fit:
+        problem = rough.problem
+        exact = fit_exactly(self.target, problem, self.simulators, rough.vector)
+        if rms_error(exact, self.target) <= _ALL_FITTED:
+            return exact
+        # it may have ended where an effect's size meets a step of the simulation: come from the other side
+        new = [e.effect for e in problem.entries].index(len(problem.effects) - 1)
+        values, start = exact.values, exact.vector.copy()
+        start[new] = problem.entries[new].coordinate(2 * values[new])
+        return min(exact, fit_exactly(self.target, problem, self.simulators, start), key=lambda fit: fit.cost)
 
     def _judge(
         self, effect: type[Effect], variant: str, refit: Fit, p_family: float, signature: np.ndarray
