@@ -14,7 +14,7 @@ from forcegrasp.compare.target import Target
 
 #: Number of starts.
 STARTS = 3
-# Starts see this many grasps of each object: enough to tell whether there is another optimum.
+# The further starts see this many grasps of each object: enough to tell whether there is another optimum.
 _GRASPS_PER_OBJECT = 2
 # Starts end in the same place if their costs agree to this share, or to this much per residual.
 _SAME_SHARE, _SAME_COST = 0.01, 0.002
@@ -41,22 +41,21 @@ def fit_base(
     rng: np.random.Generator,
     progress: Callable[[str], None] = lambda text: None,
 ) -> BaseFit:
-    """Fits some grasps from the nominal parameters and from random places in the bounds, then all from the best.
-
-    Most steps are made where a start is far from the optimum: there a few grasps show the way as well as all.
-    """
-    small = _Subset(target, problem, _few_grasps(target))
-    ends: list[Fit] = []
-    for number in range(1, STARTS + 1):
-        felt = guess(small.target, small.problem)
-        ends.append(small.fit(felt if number == 1 else _elsewhere(small.problem, felt, rng)))
-        progress(f"base model, start {number} of {STARTS}: {rms_error(ends[-1], small.target):.2f} × noise")
+    """Fits from the nominal parameters, and then looks from random places inside the bounds for a better optimum."""
+    first = fit_once(target, problem, simulators, guess(target, problem))
+    progress(f"base model, start 1 of {STARTS}: {rms_error(first, target):.2f} × noise")
+    few = _few_grasps(target)
+    small = _Subset(target, problem, few, first)
+    ends = [small.fit(small.known)]
+    for number in range(1, STARTS):
+        ends.append(small.fit(_elsewhere(small.problem, guess(small.target, small.problem), rng)))
+        progress(f"base model, start {number + 1} of {STARTS}: {rms_error(ends[-1], small.target):.2f} × noise")
     best = min(ends, key=lambda f: f.cost)
     errors = tuple(rms_error(f, small.target) for f in ends)
     count = small.target.mask.sum() * 4
     tolerance = max(_SAME_SHARE * best.cost, _SAME_COST * count)
-    first = fit_once(target, problem, simulators, small.enlarge(best, guess(target, problem)))
-    progress(f"base model, all grasps: {rms_error(first, target):.2f} × noise")
+    if ends[0].cost - best.cost > tolerance:  # another start found a better place
+        first = fit_once(target, problem, simulators, small.enlarge(best))
     if sum(f.cost - best.cost <= max(tolerance, _SAME_BEYOND * (best.cost - count)) for f in ends) < 2:
         spread = ", ".join(f"{error:.2f}" for error in errors)
         return BaseFit(first, errors, False, f"the starts end in different places (errors of {spread} × noise)")
@@ -100,24 +99,23 @@ def _few_grasps(target: Target) -> np.ndarray:
 
 
 class _Subset:
-    """The same problem on some of its grasps; all fits have the cheap model corrected as the first one left it."""
+    """The same problem on some of its grasps, with the cheap model corrected as in a fit of all of them."""
 
-    def __init__(self, target: Target, problem: Problem, keep: np.ndarray) -> None:
+    def __init__(self, target: Target, problem: Problem, keep: np.ndarray, fitted: Fit) -> None:
         self.target = target.subset(keep)
         self.problem = Problem(problem.gripper, self.target.grasps, problem.effects)
-        self._simulators, self._correction = Simulators(self.problem), None
+        self._simulators = Simulators(self.problem)
+        self._correction = fitted.correction[keep][:, : self._simulators.exact.mask.shape[1]]
+        self._full, self._fitted = problem, fitted
         names = [e.name for e in problem.entries]
         self._places = [names.index(e.name) for e in self.problem.entries]
+        self.known = fitted.vector[self._places]
 
     def fit(self, start: np.ndarray) -> Fit:
-        if self._correction is None:
-            fit = fit_once(self.target, self.problem, self._simulators, start)
-            self._correction = fit.correction
-            return fit
         return fit_once(self.target, self.problem, self._simulators, start, self._correction, rounds=0)
 
-    def enlarge(self, fit: Fit, vector: np.ndarray) -> np.ndarray:
-        """Coordinates for the whole problem: what these grasps don't fix is as in ``vector``."""
-        vector = vector.copy()
+    def enlarge(self, fit: Fit) -> np.ndarray:
+        """Coordinates for the whole problem: what these grasps don't fix stays as it was."""
+        vector = self._fitted.vector.copy()
         vector[self._places] = fit.vector
         return vector

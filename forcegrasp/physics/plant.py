@@ -56,6 +56,8 @@ class Plant:
         if other_collisions:
             model.opt.disableflags ^= mujoco.mjtDisableBit.mjDSBL_NATIVECCD
         self.dt = float(model.opt.timestep)  #: physics step, seconds
+        #: What the tier adds to the scene's damping, and so to any that is written, ``(degrees of freedom,)``.
+        self._more_damping = model.dof_damping - gripper.compile().dof_damping if tier != "reference" else None
         self._prepare(model)
         self.batch = batch = Batch(model, n, threads)
         self._qpos, self._ctrl, self._sensors = (batch.bind(name) for name in ("qpos", "ctrl", "sensordata"))
@@ -164,7 +166,10 @@ class Plant:
         for write in parameter.writes:
             for row in rows[write.field.split("_")[0]]:
                 column = () if write.column is None else (write.column,)
-                self._write_base(write.field, (ids, row, *column), write.sign * values)
+                more = 0.0
+                if write.field == "dof_damping" and self._more_damping is not None:
+                    more = self._more_damping[row]
+                self._write_base(write.field, (ids, row, *column), write.sign * values + more)
 
     def _write_base(self, field: str, where: tuple[Any, ...], values: np.ndarray) -> None:
         self.field(field)[where] = self.base(field)[where] = values

@@ -204,9 +204,10 @@ def test_cases_that_differ_in_sensors_share_a_simulation(fitted, monkeypatch):
     simulated = []
     simulate = Replay.simulate
     monkeypatch.setattr(Replay, "simulate", lambda self, g, *a: simulated.append(len(g)) or simulate(self, g, *a))
-    together = predict(fitted.simulators.cheap, cases)
+    replay = Replay(TIAGO, fitted.target.grasps, tier="fast")  # one that remembers nothing yet
+    together = predict(replay, cases)
     assert simulated == [3 * 6]
-    alone = [predict(fitted.simulators.cheap, [case])[0] for case in cases]
+    alone = [predict(replay, [case])[0] for case in cases]
     assert together.tobytes() == np.array(alone).tobytes()
     assert together[1] - together[0] == pytest.approx(np.broadcast_to(np.r_[0, 0, BIAS], together[0].shape), abs=1e-12)
     assert together[2][..., 2:] == pytest.approx(2 * together[0][..., 2:])

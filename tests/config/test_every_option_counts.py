@@ -344,8 +344,9 @@ def test_engine_and_device_reach_the_simulator(verb, tmp_path, monkeypatch):
     monkeypatch.setattr("forcegrasp.env.grasp_env.WarpGraspSimulator", begin)
     monkeypatch.setattr("forcegrasp.gpu.installation.find_spec", lambda name: name)
     monkeypatch.setattr("torch.cuda.is_available", lambda: True)
-    for options in (["physics.engine=warp"], ["physics.engine=warp", "physics.device=cuda"]):
-        assert main([verb, *options]) == 2
+    for device in ("cpu", "cuda"):
+        folder = f"hydra.run.dir={device}" if verb == "train" else f"out={device}{'.gif' * (verb == 'render')}"
+        assert main([verb, "physics.engine=warp", f"physics.device={device}", folder]) == 2
     assert asked == ["cpu", "cuda"]
 
 

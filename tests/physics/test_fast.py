@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
+from pathlib import Path
+
 import mujoco
 import numpy as np
 import pytest
@@ -9,6 +12,7 @@ import pytest
 from forcegrasp.physics import GraspParameters, GraspSimulator
 from forcegrasp.physics.fast import compile_fast
 from forcegrasp.physics.gripper import load_gripper
+from forcegrasp.physics.plant import Plant
 
 TIAGO = load_gripper("tiago")
 
@@ -60,3 +64,16 @@ def test_an_object_that_never_rests_keeps_the_sphere_in_its_middle():
     spec = _spec()
     spec.delete(spec.geom("floor"))
     assert compile_fast(spec, TIAGO).geom("object_pads").pos == pytest.approx(0)
+
+
+def test_a_damping_that_is_written_keeps_what_the_step_needs():
+    gripper = load_gripper(str(Path(__file__).parents[1] / "grippers" / "second.yaml"))
+    plant = Plant(dataclasses.replace(gripper, fast="sphere"), 2, "fast", threads=1)
+    reference = Plant(gripper, 2, threads=1)
+    made_up = plant.model.dof_damping - reference.model.dof_damping
+    assert made_up.max() > 0
+    for one in (plant, reference):
+        one.write(gripper.parameters["joint_damping"], np.arange(2), np.array([20.0, 50.0]))
+    fingers = reference.finger_dofs
+    difference = plant.field("dof_damping")[:, fingers] - reference.field("dof_damping")[:, fingers]
+    assert difference == pytest.approx(np.broadcast_to(made_up[fingers], (2, 2)))
