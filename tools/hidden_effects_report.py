@@ -15,18 +15,18 @@ DOCS = Path(__file__).resolve().parent.parent / "docs"
 SIZES = ("small", "medium", "large")
 
 
-#: Measured by tools/profile_diagnosis.py; write anew what it prints.
+#: Of a campaign's `processor_s`; write anew what it kept.
 COST = [
     "## What a diagnosis costs",
     "",
-    "In processor seconds, of the 24 grasps against the whole catalogue, on one thread of a crowded machine: 60 in the",
-    "median and 102 at most, of 21 sets with small effects (the campaign records it as `processor_s`;",
-    "`tools/profile_diagnosis.py SET` prints where it goes). Where `backlash` was hidden, signatures of all effects took",
-    "a quarter, the base model from three starts a third, fits with the model itself another. Later rounds simulate a",
-    "signature anew only where it may count.",
+    "In processor seconds, of the 24 grasps against the whole catalogue, on one thread of a crowded machine: 60 in",
+    "the median and 102 at most, of 21 sets with small effects (the campaign keeps it as `processor_s`;",
+    "`tools/profile_diagnosis.py SET` prints where it goes). Later rounds simulate a signature anew only where it",
+    "may count.",
     "",
-    "These 21 sets were recorded and diagnosed again after the search was made faster and the fast tier was changed: 20 were",
-    "right as before, and the one that had been missed, backlash, was missed again. The table above is of the code before.",
+    "These 21 sets were recorded and diagnosed again after the search was made faster and the fast tier was",
+    "changed: 20 were right as before, and the one that had been missed, backlash, was missed again. The table",
+    "above is of the code before.",
     "",
 ]
 
