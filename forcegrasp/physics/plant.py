@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -50,14 +51,12 @@ class Plant:
         other_collisions: bool = False,
     ) -> None:
         guard.silence_log()
-        self.gripper, self.n = gripper, n
+        self.gripper, self.n, self._tier = gripper, n, tier
         self.model = model = gripper.compile(tier)
         model.opt.timestep *= step_factor
         if other_collisions:
             model.opt.disableflags ^= mujoco.mjtDisableBit.mjDSBL_NATIVECCD
         self.dt = float(model.opt.timestep)  #: physics step, seconds
-        #: What the tier adds to the scene's damping, and so to any that is written, ``(degrees of freedom,)``.
-        self._more_damping = model.dof_damping - gripper.compile().dof_damping if tier != "reference" else None
         self._prepare(model)
         self.batch = batch = Batch(model, n, threads)
         self._qpos, self._ctrl, self._sensors = (batch.bind(name) for name in ("qpos", "ctrl", "sensordata"))
@@ -166,10 +165,17 @@ class Plant:
         for write in parameter.writes:
             for row in rows[write.field.split("_")[0]]:
                 column = () if write.column is None else (write.column,)
-                more = 0.0
-                if write.field == "dof_damping" and self._more_damping is not None:
-                    more = self._more_damping[row]
+                more = self._more_damping[row] if write.field == "dof_damping" else 0.0
                 self._write_base(write.field, (ids, row, *column), write.sign * values + more)
+
+    @functools.cached_property
+    def _more_damping(self) -> np.ndarray:
+        """What the tier adds to the scene's damping, and so to any that is written, ``(degrees of freedom,)``.
+
+        Few grippers write it, and fits make plants by the hundred: the scene is compiled again only where it counts.
+        """
+        damping = self.model.dof_damping
+        return np.zeros_like(damping) if self._tier == "reference" else damping - self.gripper.compile().dof_damping
 
     def _write_base(self, field: str, where: tuple[Any, ...], values: np.ndarray) -> None:
         self.field(field)[where] = self.base(field)[where] = values
