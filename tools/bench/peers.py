@@ -47,13 +47,8 @@ MakeEnv = Callable[[PhysicsConfig, int], "gymnasium.Env"]
 MODULES = {view: "forcegrasp.env.gymnasium_view", plain: "tools.bench.plain_grasp"}
 
 
-def gymnasium_async(case: Case, make: MakeEnv) -> Run:
-    """gymnasium's AsyncVectorEnv."""
-    from gymnasium.vector import AsyncVectorEnv, AutoresetMode
-
-    multiprocessing.set_forkserver_preload([MODULES[make]])
-    envs = AsyncVectorEnv(_makers(case, make), context="forkserver", autoreset_mode=AutoresetMode.SAME_STEP)
-    atexit.register(envs.close)
+def _closing(case: Case, envs: Any) -> Run:
+    """Vectorised environments of either library that close at full speed."""
     envs.reset()
     actions = np.full((case.grasps, 2), -1.0, np.float32)
 
@@ -63,6 +58,16 @@ def gymnasium_async(case: Case, make: MakeEnv) -> Run:
         return case.grasps * STEPS
 
     return run
+
+
+def gymnasium_async(case: Case, make: MakeEnv) -> Run:
+    """gymnasium's AsyncVectorEnv."""
+    from gymnasium.vector import AsyncVectorEnv, AutoresetMode
+
+    multiprocessing.set_forkserver_preload([MODULES[make]])
+    envs = AsyncVectorEnv(_makers(case, make), context="forkserver", autoreset_mode=AutoresetMode.SAME_STEP)
+    atexit.register(envs.close)
+    return _closing(case, envs)
 
 
 def torchrl_parallel(case: Case) -> Run:
@@ -82,16 +87,7 @@ def torchrl_parallel(case: Case) -> Run:
 
 def sb3_stepping(case: Case, make: MakeEnv) -> Run:
     """Stable-Baselines3's SubprocVecEnv."""
-    envs = sb3_envs(_makers(case, make), MODULES[make])
-    envs.reset()
-    actions = np.full((case.grasps, 2), -1.0, np.float32)
-
-    def run() -> int:
-        for _ in range(STEPS):
-            envs.step(actions)
-        return case.grasps * STEPS
-
-    return run
+    return _closing(case, sb3_envs(_makers(case, make), MODULES[make]))
 
 
 def sb3_training(case: Case, make: MakeEnv) -> Run:
