@@ -1,1 +1,1 @@
-"""Hydra configs. Defaults live in forcegrasp/config.py; a file here says only what differs."""
+"""Hydra configs. Defaults live in forcegrasp/config; a file here says only what differs."""

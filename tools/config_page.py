@@ -1,4 +1,4 @@
-"""Makes docs/configuration.md: every option of every verb, out of what forcegrasp/config.py and conf/ say.
+"""Makes docs/configuration.md: every option of every verb, out of what forcegrasp/config and conf/ say.
 
 python tools/config_page.py [--out docs/configuration.md]
 """

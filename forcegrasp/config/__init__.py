@@ -1,0 +1,57 @@
+"""Every option that a command line or YAML may set, as dataclasses: default, unit, bounds, choices and source."""
+
+from forcegrasp.config.option import validate
+from forcegrasp.config.sections import (
+    OBSERVATION_PARTS,
+    ActionConfig,
+    CollectorConfig,
+    CurriculumConfig,
+    GraspConfig,
+    LogConfig,
+    ObservationConfig,
+    PhysicsConfig,
+    PPOConfig,
+    RewardConfig,
+    SensorConfig,
+    check_deformation,
+)
+from forcegrasp.config.verbs import (
+    AddConfig,
+    CompareConfig,
+    CurvesConfig,
+    DiagnoseConfig,
+    EvaluateConfig,
+    ExportConfig,
+    FitConfig,
+    RecordConfig,
+    RenderConfig,
+    TrainConfig,
+    check_no_effects,
+)
+
+__all__ = [
+    "OBSERVATION_PARTS",
+    "ActionConfig",
+    "AddConfig",
+    "CollectorConfig",
+    "CompareConfig",
+    "CurriculumConfig",
+    "CurvesConfig",
+    "DiagnoseConfig",
+    "EvaluateConfig",
+    "ExportConfig",
+    "FitConfig",
+    "GraspConfig",
+    "LogConfig",
+    "ObservationConfig",
+    "PPOConfig",
+    "PhysicsConfig",
+    "RecordConfig",
+    "RenderConfig",
+    "RewardConfig",
+    "SensorConfig",
+    "TrainConfig",
+    "check_deformation",
+    "check_no_effects",
+    "validate",
+]

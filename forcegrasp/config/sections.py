@@ -1,0 +1,235 @@
+"""Options of what is simulated, observed, rewarded and learned. The only home of their defaults.
+
+Sources: "paper" is Lach et al. (2023), *Towards Transferring Tactile-based Continuous Force Control Policies from
+Simulation to Robot*, with its equation or table; "authors' code" is that paper's public code where the paper is silent.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from forcegrasp.config.option import option
+from forcegrasp.errors import ConfigError
+
+OBSERVATION_PARTS = ("position", "force", "force_error", "last_action", "had_contact")
+
+
+@dataclass
+class PhysicsConfig:
+    """How a grasp is simulated."""
+
+    tier: str = option(
+        "reference",
+        "reference: the paper's physics. fast: sphere for the pads' contact and 8 ms steps, within sensor noise of it",
+        choices=("reference", "fast"),
+    )
+    threads: int = option(0, "physics threads of engine mujoco; 0 uses every core", low=0, high=4096)
+    engine: str = option(
+        "mujoco",
+        "mujoco: on the CPU. warp: MuJoCo Warp, for thousands of grasps on a GPU, see docs/gpu.md",
+        choices=("mujoco", "warp"),
+    )
+    device: str = option("cpu", "where engine warp and the learner compute", choices=("cpu", "cuda"))
+
+    def check(self, path: str) -> None:
+        """Refuses a device that the engine can't use."""
+        if self.engine == "mujoco" and self.device != "cpu":
+            raise ConfigError(f"{path}device={self.device}: engine mujoco runs on the CPU; add physics=warp")
+
+
+@dataclass
+class GraspConfig:
+    """What is drawn anew for every grasp. Each range is [low, high], sampled uniformly."""
+
+    kappa: list[float] = option([0.0, 1.0], "softness of the object; 0 is hard", source="paper, Sec. 3", low=0, high=1)
+    b2: list[float] = option([-13.0, -6.0], "velocity gain of the actuators", source="paper, Sec. 3", low=-50, high=0)
+    radius_m: list[float] = option(
+        [0.015, 0.035], "object radius; the paper's w_o", unit="m", source="paper, Table 2", low=0.0121, high=0.04
+    )
+    offset_m: list[float] = option(
+        [-0.04, 0.04],
+        "object offset along the grasp axis, o_y",
+        unit="m",
+        source="paper, Table 2",
+        low=-0.045,
+        high=0.045,
+    )
+    deformation_m: float = option(
+        0.012, "largest object deformation d_p, both sides together", unit="m", source="authors' code", low=0, high=0.03
+    )
+    goal_force_min_n: float = option(0.08, "smallest goal force", unit="N", source="authors' code", low=0.01, high=5)
+    goal_force_max: float = option(
+        0.95, "largest goal force, as a fraction of the 0.30 N · f_α that the gripper reaches", low=0.01, high=1
+    )
+    steps: int = option(150, "control steps of an episode, 40 ms each", source="authors' code", low=1, high=100_000)
+
+    def check(self, path: str) -> None:
+        """Refuses objects that could be squeezed flat."""
+        check_deformation(self.deformation_m, self.radius_m, f"{path}radius_m")
+
+
+@dataclass
+class SensorConfig:
+    """What the controller can measure."""
+
+    position_std_m: float = option(
+        2.7e-5, "noise of the finger positions, σ_q", unit="m", source="paper", low=0, high=0.01
+    )
+    force_std_n: float = option(0.013, "noise of the fingertip forces, σ_f", unit="N", source="paper", low=0, high=1)
+    contact_threshold_n: float = option(
+        0.05, "force above which a finger is in contact, f_θ", unit="N", source="authors' code", low=0, high=5
+    )
+
+
+@dataclass
+class ObservationConfig:
+    """What the policy sees."""
+
+    parts: list[str] = option(
+        list(OBSERVATION_PARTS), "parts of o(t), two numbers each", source="paper, Sec. 4", choices=OBSERVATION_PARTS
+    )
+    frames: int = option(3, "observations stacked, k", source="paper, Sec. 4", low=1, high=50)
+
+
+@dataclass
+class ActionConfig:
+    """What the policy commands."""
+
+    max_delta_m: float = option(0.003, "largest position delta Δq_max", unit="m", source="paper", low=1e-5, high=0.045)
+    inductive_bias: bool = option(True, "scale actions by φ of the contact state", source="paper, eq. 7")
+    bias_one_contact: float = option(
+        0.1, "φ of a finger that waits for the other", source="paper, eq. 7", low=0, high=1
+    )
+    bias_floor: float = option(0.9, "smallest φ with both fingers in contact", source="paper, eq. 7", low=0, high=1)
+
+
+@dataclass
+class RewardConfig:
+    """r = α₁ r_force + α₂ r_obj + α₃ r_act (paper, eqs. 8-11)."""
+
+    form: str = option(
+        "paper",
+        "r_force = 1 - tanh(Σ|Δf|) (paper) or 1 - tanh(Σ|Δf| / f_goal) (goal_normalised, authors' code)",
+        source="paper, eq. 8",
+        choices=("paper", "goal_normalised"),
+    )
+    force_weight: float = option(1.0, "α₁", source="authors' code", low=0, high=1000)
+    object_weight: float = option(1.0, "α₂ once the curriculum has ended", source="paper, Table 2", low=0, high=1000)
+    action_weight: float = option(0.2, "α₃", source="authors' code", low=0, high=1000)
+    speed_threshold_m: float = option(
+        5e-5,
+        "object speed that is penalised, once the curriculum has ended",
+        unit="m per control step",
+        source="paper, Table 2",
+        low=0,
+        high=1,
+    )
+    forces: str = option(
+        "actual",
+        "forces that r_force judges: actual ones, or those measured, before noise; they differ only with a model",
+        choices=("actual", "measured"),
+    )
+
+
+@dataclass
+class CurriculumConfig:
+    """Where the annealed options start (paper, Table 2); they end at the values given in `reward` and `grasp`."""
+
+    enabled: bool = option(True, "anneal; if not, training starts at the final values")
+    end_fraction: float = option(
+        1 / 3,
+        "share of the training frames after which all is at its final value",
+        source="authors' code",
+        low=0,
+        high=1,
+    )
+    object_weight: float = option(0.0, "α₂ at the start", source="paper, Table 2", low=0, high=1000)
+    speed_threshold_m: float = option(
+        2e-4, "velocity threshold at the start", unit="m per control step", source="paper, Table 2", low=0, high=1
+    )
+    radius_m: list[float] = option(
+        [0.020, 0.025], "object radius at the start", unit="m", source="paper, Table 2", low=0.0121, high=0.04
+    )
+    offset_m: list[float] = option(
+        [0.0, 0.0], "object offset at the start", unit="m", source="paper, Table 2", low=-0.045, high=0.045
+    )
+
+
+@dataclass
+class PPOConfig:
+    """Proximal policy optimisation (Schulman et al. 2017)."""
+
+    total_frames: int = option(
+        4_500_000, "control steps to train for, over all grasps", source="authors' code", low=1, high=10**12
+    )
+    grasps: int = option(256, "grasps simulated at once; a batch is one episode of each", low=1, high=100_000)
+    epochs: int = option(5, "passes over each batch; the authors had 10", low=1, high=1000)
+    minibatch: int = option(2048, "frames per gradient step", low=1, high=10**9)
+    learning_rate: float = option(6e-4, "Adam's step size at the start", source="authors' code", low=0, high=1)
+    learning_rate_end: float = option(0.05, "what is left of it at the end, linearly, as a fraction", low=0, high=1)
+    discount: float = option(0.97, "γ; the authors had 0.99", low=0, high=1)
+    gae_lambda: float = option(0.95, "λ of the advantage estimate", source="authors' code", low=0, high=1)
+    clip: float = option(0.2, "largest change of the probability ratio", source="authors' code", low=0.001, high=1)
+    entropy_weight: float = option(0.0, "weight of the entropy bonus", source="authors' code", low=0, high=10)
+    value_weight: float = option(0.5, "weight of the value loss", source="authors' code", low=0, high=100)
+    max_grad_norm: float = option(
+        0.5, "gradients are scaled down to this norm", source="authors' code", low=0, high=1000
+    )
+    hidden: list[int] = option(
+        [50, 50], "width of each hidden layer, policy and value alike", source="authors' code", low=1, high=10_000
+    )
+    log_std: float = option(-0.5, "logarithm of the policy's initial standard deviation", low=-10, high=2)
+    initial_action: float = option(
+        -0.5, "the policy's mean action at the start: closing, lest training never meets the object", low=-1, high=1
+    )
+    mirrored: bool = option(True, "average the policy with its mirror image, so that it treats both fingers alike")
+    critic: str = option(
+        "privileged",
+        "what the value network sees while training: the policy's observation, or also the grasp's true state",
+        choices=("observation", "privileged"),
+    )
+
+
+@dataclass
+class CollectorConfig:
+    """Who simulates the grasps while training."""
+
+    kind: str = option(
+        "direct",
+        "direct: this process. ray: workers in processes of their own, on this machine or on a Ray cluster's",
+        choices=("direct", "ray"),
+    )
+    workers: int = option(
+        1, "processes, each with an equal share of ppo.grasps; physics.threads are each one's own", low=1, high=4096
+    )
+    address: str = option(
+        "local",
+        "Ray cluster to use. local: one of this machine, for this run alone. auto: the one that this machine is in",
+        choices=("local", "auto"),
+    )
+
+    def check(self, path: str) -> None:
+        """Refuses what only Ray has without it."""
+        if self.kind == "direct" and (self.workers > 1 or self.address != "local"):
+            name, value = ("workers", self.workers) if self.workers > 1 else ("address", self.address)
+            raise ConfigError(f"{path}{name}={value}: direct collection is this process alone; add collector=ray")
+
+
+@dataclass
+class LogConfig:
+    """What is written while training, and how often. Counted in batches; 0 switches a part off."""
+
+    histograms_every: int = option(5, "batches between histograms of actions and forces", low=0, high=10**9)
+    figures_every: int = option(20, "batches between figures of force traces", low=0, high=10**9)
+    video_every: int = option(40, "batches between videos; one is made at the end, too", low=0, high=10**9)
+    checkpoint_every: int = option(10, "batches between checkpoints", low=1, high=10**9)
+    keep: int = option(3, "newest checkpoints kept, beside the best by force reward", low=1, high=10**6)
+
+
+def check_deformation(deformation_m: float, radius_m: list[float], name: str) -> None:
+    """Raises ConfigError unless d_p < r for the smallest object (paper, eq. 3)."""
+    if deformation_m >= radius_m[0]:
+        raise ConfigError(
+            f"{name}={list(radius_m)}: the smallest radius must exceed grasp.deformation_m={deformation_m:g}"
+            " (paper, eq. 3): make the object larger or the deformation smaller"
+        )

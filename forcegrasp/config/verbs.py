@@ -1,0 +1,207 @@
+"""Options of each verb of the command line: sections that it shares with others, and its own."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from forcegrasp.config.option import option
+from forcegrasp.config.sections import (
+    ActionConfig,
+    CollectorConfig,
+    CurriculumConfig,
+    GraspConfig,
+    LogConfig,
+    ObservationConfig,
+    PhysicsConfig,
+    PPOConfig,
+    RewardConfig,
+    SensorConfig,
+    check_deformation,
+)
+from forcegrasp.errors import ConfigError
+
+
+@dataclass
+class TrainConfig:
+    """`forcegrasp train`."""
+
+    seed: int = option(0, "seed of everything random", low=0, high=2**31 - 1)
+    model: str = option("", "model file of forcegrasp fit or add: train with its effects, within fitted intervals")
+    physics: PhysicsConfig = field(default_factory=lambda: PhysicsConfig(tier="fast"))
+    grasp: GraspConfig = field(default_factory=GraspConfig)
+    sensors: SensorConfig = field(default_factory=SensorConfig)
+    observation: ObservationConfig = field(default_factory=ObservationConfig)
+    action: ActionConfig = field(default_factory=ActionConfig)
+    reward: RewardConfig = field(default_factory=RewardConfig)
+    curriculum: CurriculumConfig = field(default_factory=CurriculumConfig)
+    ppo: PPOConfig = field(default_factory=PPOConfig)
+    collector: CollectorConfig = field(default_factory=CollectorConfig)
+    log: LogConfig = field(default_factory=LogConfig)
+
+    def check(self, path: str) -> None:
+        """Refuses objects squeezed flat, a model on an engine without effects, and shares that workers can't have."""
+        check_no_effects(self.model, self.physics, f"{path}model={self.model}")
+        check_deformation(self.grasp.deformation_m, self.curriculum.radius_m, f"{path}curriculum.radius_m")
+        if self.collector.kind == "ray" and self.physics.device != "cpu":
+            device = f"{path}physics.device={self.physics.device}"
+            raise ConfigError(f"{device}: Ray's workers have no GPU; use collector=direct")
+        grasps, workers = self.ppo.grasps, self.collector.workers
+        if grasps % workers:
+            raise ConfigError(
+                f"{path}ppo.grasps={grasps} can't be shared equally among {path}collector.workers={workers}:"
+                f" make it {-(-grasps // workers) * workers}"
+            )
+
+
+@dataclass
+class RecordConfig:
+    """`forcegrasp record`."""
+
+    plan: str = option(
+        "rich",
+        "which grasps: rich has several speeds, pauses, reversals, partial releases, holds and off-centre objects;"
+        " close_and_hold is the paper's",
+        choices=("rich", "close_and_hold"),
+    )
+    out: str = option("", "folder for the set; must not exist or be empty; runs/record_TIME if empty")
+    effects: list[str] = option([], "effects to record with, each 'NAME [VARIANT] [PARAMETER=VALUE ...]'")
+    gripper: str = option("tiago", "gripper by name, or the path of a description")
+    model: str = option("", "model file whose base parameters and effects to record with")
+    grasps: int = option(24, "grasps in the set", low=1, high=10_000)
+    objects: int = option(4, "objects, grasped in turn; their parameters are drawn", low=1, high=1000)
+    off_nominal: float = option(
+        0.15, "largest share by which the gripper's base parameters differ from nominal", low=0, high=0.5
+    )
+    position_std_m: float = option(2.7e-5, "noise of the positions", unit="m", source="paper", low=0, high=0.01)
+    force_std_n: float = option(0.013, "noise of the forces", unit="N", source="paper", low=0, high=1)
+    samples: str = option("csv", "file format of the samples", choices=("csv", "parquet"))
+    seed: int = option(0, "seed of objects, plan and noise", low=0, high=2**31 - 1)
+
+
+@dataclass
+class CompareConfig:
+    """`forcegrasp compare`."""
+
+    data: str = option("", "folder of the measurement set")
+    model: str = option("", "model file; the gripper's base model, fitted to the set, if empty")
+    out: str = option("", "where to write report.html and compare.json; runs/compare_TIME if empty")
+    seed: int = option(0, "seed of the fit's starts", low=0, high=2**31 - 1)
+
+
+@dataclass
+class FitConfig:
+    """`forcegrasp fit`."""
+
+    data: str = option("", "folder of the measurement set")
+    out: str = option("", "model file to write; runs/fit_TIME/model.yaml if empty")
+    seed: int = option(0, "seed of the fit's starts", low=0, high=2**31 - 1)
+
+
+@dataclass
+class DiagnoseConfig:
+    """`forcegrasp diagnose`."""
+
+    data: str = option("", "folder of the measurement set")
+    model: str = option("", "model file to start from; the base model is fitted to the set if empty")
+    out: str = option("", "where to write report.html and diagnosis.json; runs/diagnose_TIME if empty")
+    effects: list[str] = option([], "effects to consider; all of the catalogue if empty")
+    seed: int = option(0, "seed of the fit's starts and of the null distribution", low=0, high=2**31 - 1)
+
+
+@dataclass
+class AddConfig:
+    """`forcegrasp add`."""
+
+    data: str = option("", "folder of the measurement set")
+    model: str = option("", "model file to add to")
+    effect: str = option("", "effect to add, see forcegrasp effects")
+    out: str = option("", "model file to write; runs/add_TIME/model.yaml if empty")
+
+
+@dataclass
+class EvaluateConfig:
+    """`forcegrasp evaluate`."""
+
+    policies: list[str] = option(
+        ["force_pi"],
+        "what to compare: controllers and shipped policies by name, or run directories",
+        source="paper, Fig. 2",
+    )
+    out: str = option("", "where to write; runs/evaluate_TIME if empty")
+    baseline: str = option("force_pi", "policy that the others are held against, if it takes part")
+    objects: str = option(
+        "", "file of objects to grasp instead of a grid of softness values; `paper` has the six of its Table 1"
+    )
+    kappas: int = option(
+        11, "softness values, evenly spaced over grasp.kappa", source="paper, Sec. 5", low=1, high=1001
+    )
+    trials: int = option(
+        50, "grasps per softness value (or object) and policy; the paper had 200 (20)", low=2, high=1_000_000
+    )
+    seed: int = option(1000, "seed of the grasps; the same grasps for every policy", low=0, high=2**31 - 1)
+    model: str = option(
+        "", "model file of forcegrasp fit or add to simulate the grasps with; virtual_robot comes with the package"
+    )
+    physics: PhysicsConfig = field(default_factory=PhysicsConfig)
+    grasp: GraspConfig = field(default_factory=GraspConfig)
+    sensors: SensorConfig = field(default_factory=SensorConfig)
+    speed_threshold_m: float = option(
+        5e-5, "object speed that counts as fast", unit="m per control step", source="paper, Table 2", low=0, high=1
+    )
+
+    def check(self, path: str) -> None:
+        """Refuses a model on an engine that knows no effects."""
+        check_no_effects(self.model, self.physics, f"{path}model={self.model}")
+
+
+@dataclass
+class CurvesConfig:
+    """`forcegrasp curves`."""
+
+    folders: list[str] = option([], "folders with runs in or below them; also given plainly, without folders=")
+    out: str = option("", "where to write curves.png and curves.json; the first folder if empty")
+
+
+@dataclass
+class ExportConfig:
+    """`forcegrasp export`."""
+
+    run: str = option("", "run directory or shipped policy; also given plainly, without run=")
+    out: str = option("", "folder to write; must not exist or be empty; runs/export_TIME if empty")
+    ceiling_n: float = option(
+        2.0, "force above which no finger is closed further; the simulated one reaches 1.5", unit="N", low=0.1, high=20
+    )
+
+
+@dataclass
+class RenderConfig:
+    """`forcegrasp render`."""
+
+    policies: list[str] = option(
+        ["force_pi"], "what to show: controllers and shipped policies by name, or run directories; policy= for one"
+    )
+    out: str = option("", "file to write, NAME.gif; runs/render_TIME.gif if empty")
+    seed: int = option(0, "seed of what is not given, and of the sensor noise", low=0, high=2**31 - 1)
+    kappa: float | None = option(None, "softness of the object; 0 is hard", source="paper, Sec. 3", low=0, high=1)
+    b2: float | None = option(None, "velocity gain of the actuators", source="paper, Sec. 3", low=-50, high=0)
+    radius_m: float | None = option(
+        None, "object radius; the paper's w_o", unit="m", source="paper, Table 2", low=0.0121, high=0.04
+    )
+    offset_m: float | None = option(
+        None, "object offset along the grasp axis, o_y", unit="m", source="paper, Table 2", low=-0.045, high=0.045
+    )
+    goal_force_n: float | None = option(None, "goal force of each finger", unit="N", low=0.01, high=5)
+    steps: int = option(150, "control steps of the grasp, 40 ms each", source="authors' code", low=1, high=1500)
+    model: str = option("", "model file of forcegrasp fit or add to simulate the grasp with")
+    physics: PhysicsConfig = field(default_factory=PhysicsConfig)
+    sensors: SensorConfig = field(default_factory=SensorConfig)
+
+    def check(self, path: str) -> None:
+        """Refuses a model on an engine that knows no effects."""
+        check_no_effects(self.model, self.physics, f"{path}model={self.model}")
+
+
+def check_no_effects(model: object, physics: PhysicsConfig, name: str = "model") -> None:
+    """Raises ConfigError if a fitted model is to be simulated by an engine that knows no effects."""
+    if model and physics.engine == "warp":
+        raise ConfigError(f"{name}: engine warp simulates the nominal gripper alone; use physics.engine=mujoco")
