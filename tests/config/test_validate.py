@@ -38,6 +38,10 @@ LISTS = selected(lambda meta, default: isinstance(default, list) and default)
 CHOICES = selected(lambda meta, default: meta["choices"])
 
 
+def test_every_option_says_what_it_means():
+    assert all(entry.metadata["doc"] for _, _, entry, _ in LEAVES)
+
+
 def with_option(verb: str, name: str, value):
     config = SCHEMAS[verb]()
     *path, last = name.split(".")

@@ -1,17 +1,15 @@
-"""Every option changes something: a tiny training or evaluation with it leaves other results behind than without it."""
+"""Every option of train, evaluate and render changes something: with it, a tiny one leaves other results behind."""
 
 from __future__ import annotations
 
 import contextlib
 import csv
-import dataclasses
 import io
 import json
 import warnings
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 from PIL import Image
 from rich.console import Console
@@ -19,19 +17,12 @@ from rich.console import Console
 from forcegrasp.cli.main import main
 from forcegrasp.cli.options import leaves
 from forcegrasp.config import (
-    AddConfig,
-    CompareConfig,
-    CurvesConfig,
-    DiagnoseConfig,
     EvaluateConfig,
-    ExportConfig,
-    FitConfig,
-    RecordConfig,
     RenderConfig,
     TrainConfig,
     validate,
 )
-from forcegrasp.errors import ConfigError, ForcegraspError
+from forcegrasp.errors import ConfigError
 from forcegrasp.evaluate.compare_policies import evaluate
 from forcegrasp.runs import checkpoint
 from forcegrasp.runs.run_dir import RunDir
@@ -145,47 +136,26 @@ EVALUATE_CASES: dict[str, Any] = {
 }
 
 
-TINY_RECORD = {"grasps": 3, "objects": 2}
-SECOND_GRIPPER = Path(__file__).parents[1] / "grippers" / "second.yaml"
-MODEL = """format: forcegrasp-model/1
-gripper: tiago
-base:
-  position_gain: {value: 80.0, low: 70.0, high: 90.0, unit: N/m}
-  velocity_gain: {value: -9.0, low: -10.0, high: -8.0, unit: N·s/m}
-effects: EFFECTS
-"""
-
-#: Option → another value than in the tiny recording.
-RECORD_CASES: dict[str, Any] = {
-    "plan": "close_and_hold",
-    "out": "elsewhere",
-    "effects": "[backlash]",
-    "gripper": SECOND_GRIPPER,
-    "model": "model.yaml",
-    "grasps": 2,
-    "objects": 1,
-    "off_nominal": 0.0,
-    "position_std_m": 1e-4,
-    "force_std_n": 0.05,
-    "samples": "parquet",
+#: Option → another value than in a rendering of 45 steps of a policy that reads everything.
+RENDER_CASES: dict[str, Any] = {
+    "policies": "[informed]",
+    "out": "elsewhere.gif",
     "seed": 1,
+    "kappa": 0.1,
+    "b2": -6.5,
+    "radius_m": 0.03,
+    "offset_m": 0.003,
+    "goal_force_n": 0.1,
+    "steps": 44,
+    "model": str(MODEL),
+    "physics.tier": "reference",
+    "physics.threads": 2,
+    "physics.engine": "warp",
+    "physics.device": "cuda",
+    "sensors.position_std_m": 0.001,
+    "sensors.force_std_n": 0.1,
+    "sensors.contact_threshold_n": 0.2,
 }
-
-#: The options of the verbs that read measurements. What they find is tested in tests/cli/test_measuring_verbs.py.
-MEASURED_CASES: dict[type, dict[str, Any]] = {
-    CompareConfig: {"data": "other", "model": "model.yaml", "out": "elsewhere", "seed": 1},
-    FitConfig: {"data": "other", "out": "elsewhere", "seed": 1},
-    DiagnoseConfig: {
-        "data": "other",
-        "model": "model.yaml",
-        "out": "elsewhere",
-        "effects": "[backlash]",
-        "seed": 1,
-    },
-    AddConfig: {"data": "other", "model": "lagging.yaml", "effect": "adhesion", "out": "elsewhere"},
-}
-MEASURED = {CompareConfig: "compare", FitConfig: "fit", DiagnoseConfig: "diagnose", AddConfig: "add"}
-NEEDED = {AddConfig: {"model": "model.yaml", "effect": "backlash"}}
 
 
 def with_options(config, values: dict[str, Any]):
@@ -371,194 +341,8 @@ def test_out_is_where_evaluate_writes(tmp_path, monkeypatch):
     assert json.loads((tmp_path / EVALUATE_CASES["out"] / "evaluation.json").read_text())["trials"] == 2
 
 
-def test_every_section_is_a_dataclass_with_documented_options():
-    for schema in (TrainConfig, EvaluateConfig, ExportConfig, RecordConfig, *MEASURED):
-        for name, entry, _ in leaves(schema):
-            assert entry.metadata["doc"], name
-        assert all(dataclasses.is_dataclass(value) or value is not None for value in vars(schema()).values())
-
-
-# --- export: what it writes is tested in tests/deploy ---------------------------------------------------------------
-
-EXPORT_CASES: dict[str, Any] = {"run": "other", "out": "elsewhere", "ceiling_n": 1.0}
-
-
-def exporting(monkeypatch, **values: Any) -> tuple:
-    """What the verb sets out to export, where to, and with which ceiling."""
-    asked = []
-
-    def stop(*arguments):
-        asked.extend(arguments)
-        raise ForcegraspError("enough")
-
-    monkeypatch.setattr("forcegrasp.runs.export.export_policy", stop)
-    monkeypatch.setattr("time.strftime", lambda *_: "NOW")
-    assert main(["export", *(f"{name}={value}" for name, value in ({"run": "one"} | values).items())]) == 2
-    return tuple(asked)
-
-
-def test_every_option_of_export_has_a_case():
-    assert list(EXPORT_CASES) == [name for name, *_ in leaves(ExportConfig)]
-
-
-@pytest.mark.parametrize("name", EXPORT_CASES)
-def test_option_of_export(name, monkeypatch):
-    plain = exporting(monkeypatch)
-    assert exporting(monkeypatch) == plain != exporting(monkeypatch, **{name: EXPORT_CASES[name]})
-
-
-# --- record, compare, fit, diagnose, add ---------------------------------------------------------------------------
-
-
-def recorded(out: Path, **values: Any) -> dict[str, str]:
-    """Files that a tiny recording leaves behind."""
-    options = [f"{name}={value}" for name, value in (TINY_RECORD | values).items()]
-    assert main(["record", f"out={out}", *options]) == 0
-    return {path.name: path.read_bytes().hex() for path in sorted(out.iterdir())}
-
-
-@pytest.fixture(scope="module")
-def plain_recording(tmp_path_factory):
-    return recorded(tmp_path_factory.mktemp("record") / "set")
-
-
-def test_every_option_of_the_measuring_verbs_has_a_case():
-    assert list(RECORD_CASES) == [name for name, *_ in leaves(RecordConfig)]
-    for schema, cases in MEASURED_CASES.items():
-        assert list(cases) == [name for name, *_ in leaves(schema)]
-
-
-def test_the_same_recording_leaves_the_same(tmp_path, plain_recording):
-    assert recorded(tmp_path / "set") == plain_recording
-
-
-@pytest.mark.parametrize("name", [name for name in RECORD_CASES if name != "out"])
-def test_option_of_record(name, tmp_path, plain_recording, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    Path("model.yaml").write_text(MODEL.replace("EFFECTS", "{}"))
-    different = recorded(tmp_path / "set", **{name: RECORD_CASES[name]})
-    said = {"meta.yaml"} if name != "seed" else set()  # which repeats the options
-    samples = [f for f in different if f not in said]
-    assert [different[f] for f in samples] != [plain_recording.get(f) for f in samples]
-
-
-def test_out_is_where_record_writes(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    recorded(Path(RECORD_CASES["out"]))
-    assert (tmp_path / "elsewhere" / "samples.csv").is_file()
-
-
-class BegunError(Exception):
-    """The expensive part would begin now; with what."""
-
-
-def begun(monkeypatch, verb: str, **values: Any) -> dict[str, Any]:
-    """What a verb sets out to compute: the arguments of the first expensive step, and where it would write."""
-    from forcegrasp.compare import workflow
-
-    def told(value: Any) -> Any:
-        match value:
-            case np.random.Generator():
-                return int(value.integers(1 << 60))
-            case workflow.Loaded():
-                return value.measured.fingerprint
-            case workflow.Model():
-                return repr((value.base, value.effects))
-            case workflow.Target():
-                return value.signals.tolist()
-            case list():
-                return [told(item) for item in value]
-            case int() | str() | type():
-                return value
-
-    def stop(*arguments, **_):
-        raise BegunError(told(list(arguments)))
-
-    def fitted(loaded, seed_or_model, *_, **__):
-        return loaded, seed_or_model, None
-
-    reached: dict[str, Any] = {}
-    monkeypatch.setattr("forcegrasp.cli.measuring.check_folder", lambda path: reached.setdefault("folder", path))
-    monkeypatch.setattr("forcegrasp.cli.measuring.check_file", lambda path: reached.setdefault("file", path))
-    monkeypatch.setattr("time.strftime", lambda *_: "NOW")
-    for name in ("fit_base", "diagnose", "add_effect"):
-        monkeypatch.setattr(workflow, name, stop)
-    if verb == "diagnose":
-        monkeypatch.setattr(workflow, "fit_model", fitted)
-    if verb != "add":
-        monkeypatch.setattr(workflow, "apply_model", fitted if verb == "diagnose" else stop)
-    with pytest.raises(BegunError) as caught:
-        main([verb, *(f"{name}={value}" for name, value in values.items())])
-    return reached | {"arguments": caught.value.args[0]}
-
-
-@pytest.fixture(scope="module")
-def sets(tmp_path_factory) -> Path:
-    folder = tmp_path_factory.mktemp("sets")
-    for seed, name in enumerate(("data", "other")):
-        recorded(folder / name, grasps=6, seed=seed)
-    (folder / "model.yaml").write_text(MODEL.replace("EFFECTS", "{}"))
-    lag = "{force_lag: {time_constant_s: 0.1}}"
-    (folder / "lagging.yaml").write_text(MODEL.replace("EFFECTS", lag))
-    return folder
-
-
-@pytest.mark.parametrize(
-    ("schema", "name"), [(schema, name) for schema, cases in MEASURED_CASES.items() for name in cases]
-)
-def test_option_of_a_measuring_verb(schema, name, sets, monkeypatch):
-    monkeypatch.chdir(sets)
-    plain = {"data": "data"} | NEEDED.get(schema, {})
-    results = [
-        begun(monkeypatch, MEASURED[schema], **plain | changed)
-        for changed in ({}, {}, {name: MEASURED_CASES[schema][name]})
-    ]
-    assert results[0] == results[1] != results[2]
-
-
-# --- curves, render ---------------------------------------------------------------------------------------------------
-
-CURVES_CASES: dict[str, Any] = {"folders": "[other]", "out": "elsewhere"}
-
-#: Option → another value than in a rendering of 45 steps of a policy that reads everything.
-RENDER_CASES: dict[str, Any] = {
-    "policies": "[informed]",
-    "out": "elsewhere.gif",
-    "seed": 1,
-    "kappa": 0.1,
-    "b2": -6.5,
-    "radius_m": 0.03,
-    "offset_m": 0.003,
-    "goal_force_n": 0.1,
-    "steps": 44,
-    "model": "model.yaml",
-    "physics.tier": "reference",
-    "physics.threads": 2,
-    "physics.engine": "warp",
-    "physics.device": "cuda",
-    "sensors.position_std_m": 0.001,
-    "sensors.force_std_n": 0.1,
-    "sensors.contact_threshold_n": 0.2,
-}
-
-
-def test_every_option_of_curves_and_render_has_a_case():
-    assert list(CURVES_CASES) == [name for name, *_ in leaves(CurvesConfig)]
+def test_every_option_of_render_has_a_case():
     assert list(RENDER_CASES) == [name for name, *_ in leaves(RenderConfig)]
-
-
-def with_curves(monkeypatch, **values: str) -> list:
-    """Which folders are read, and where the curves would be written."""
-    asked = []
-    monkeypatch.setattr("forcegrasp.evaluate.curves.learning_curves", lambda *arguments: asked.extend(arguments))
-    assert main(["curves", *(f"{name}={value}" for name, value in ({"folders": "[one,two]"} | values).items())]) == 0
-    return asked
-
-
-@pytest.mark.parametrize("name", CURVES_CASES)
-def test_option_of_curves(name, monkeypatch):
-    plain = with_curves(monkeypatch)
-    assert with_curves(monkeypatch) == plain != with_curves(monkeypatch, **{name: CURVES_CASES[name]})
 
 
 def rendered(folder: Path, **values: Any) -> tuple:
@@ -595,5 +379,4 @@ def test_the_same_rendering_shows_the_same(tmp_path, plain_rendering, run_path):
 
 @pytest.mark.parametrize("name", [name for name in RENDER_CASES if name not in ELSEWHERE])
 def test_option_of_render(name, tmp_path, plain_rendering, run_path):
-    (tmp_path / "model.yaml").write_text(MODEL.replace("EFFECTS", "{}"))
     assert rendered(tmp_path, **{"policies": [str(run_path)], name: RENDER_CASES[name]}) != plain_rendering

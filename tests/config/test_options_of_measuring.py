@@ -1,0 +1,167 @@
+"""Every option of record, compare, fit, diagnose and add changes something."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from forcegrasp.cli.main import main
+from forcegrasp.cli.options import leaves
+from forcegrasp.config import (
+    AddConfig,
+    CompareConfig,
+    DiagnoseConfig,
+    FitConfig,
+    RecordConfig,
+)
+
+TINY_RECORD = {"grasps": 3, "objects": 2}
+SECOND_GRIPPER = Path(__file__).parents[1] / "grippers" / "second.yaml"
+MODEL = """format: forcegrasp-model/1
+gripper: tiago
+base:
+  position_gain: {value: 80.0, low: 70.0, high: 90.0, unit: N/m}
+  velocity_gain: {value: -9.0, low: -10.0, high: -8.0, unit: N·s/m}
+effects: EFFECTS
+"""
+
+#: Option → another value than in the tiny recording.
+RECORD_CASES: dict[str, Any] = {
+    "plan": "close_and_hold",
+    "out": "elsewhere",
+    "effects": "[backlash]",
+    "gripper": SECOND_GRIPPER,
+    "model": "model.yaml",
+    "grasps": 2,
+    "objects": 1,
+    "off_nominal": 0.0,
+    "position_std_m": 1e-4,
+    "force_std_n": 0.05,
+    "samples": "parquet",
+    "seed": 1,
+}
+
+#: The options of the verbs that read measurements. What they find is tested in tests/cli/test_measuring_verbs.py.
+MEASURED_CASES: dict[type, dict[str, Any]] = {
+    CompareConfig: {"data": "other", "model": "model.yaml", "out": "elsewhere", "seed": 1},
+    FitConfig: {"data": "other", "out": "elsewhere", "seed": 1},
+    DiagnoseConfig: {
+        "data": "other",
+        "model": "model.yaml",
+        "out": "elsewhere",
+        "effects": "[backlash]",
+        "seed": 1,
+    },
+    AddConfig: {"data": "other", "model": "lagging.yaml", "effect": "adhesion", "out": "elsewhere"},
+}
+MEASURED = {CompareConfig: "compare", FitConfig: "fit", DiagnoseConfig: "diagnose", AddConfig: "add"}
+NEEDED = {AddConfig: {"model": "model.yaml", "effect": "backlash"}}
+
+
+def recorded(out: Path, **values: Any) -> dict[str, str]:
+    """Files that a tiny recording leaves behind."""
+    options = [f"{name}={value}" for name, value in (TINY_RECORD | values).items()]
+    assert main(["record", f"out={out}", *options]) == 0
+    return {path.name: path.read_bytes().hex() for path in sorted(out.iterdir())}
+
+
+@pytest.fixture(scope="module")
+def plain_recording(tmp_path_factory):
+    return recorded(tmp_path_factory.mktemp("record") / "set")
+
+
+def test_every_option_of_the_measuring_verbs_has_a_case():
+    assert list(RECORD_CASES) == [name for name, *_ in leaves(RecordConfig)]
+    for schema, cases in MEASURED_CASES.items():
+        assert list(cases) == [name for name, *_ in leaves(schema)]
+
+
+def test_the_same_recording_leaves_the_same(tmp_path, plain_recording):
+    assert recorded(tmp_path / "set") == plain_recording
+
+
+@pytest.mark.parametrize("name", [name for name in RECORD_CASES if name != "out"])
+def test_option_of_record(name, tmp_path, plain_recording, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("model.yaml").write_text(MODEL.replace("EFFECTS", "{}"))
+    different = recorded(tmp_path / "set", **{name: RECORD_CASES[name]})
+    said = {"meta.yaml"} if name != "seed" else set()  # which repeats the options
+    samples = [f for f in different if f not in said]
+    assert [different[f] for f in samples] != [plain_recording.get(f) for f in samples]
+
+
+def test_out_is_where_record_writes(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    recorded(Path(RECORD_CASES["out"]))
+    assert (tmp_path / "elsewhere" / "samples.csv").is_file()
+
+
+class BegunError(Exception):
+    """The expensive part would begin now; with what."""
+
+
+def begun(monkeypatch, verb: str, **values: Any) -> dict[str, Any]:
+    """What a verb sets out to compute: the arguments of the first expensive step, and where it would write."""
+    from forcegrasp.compare import workflow
+
+    def told(value: Any) -> Any:
+        match value:
+            case np.random.Generator():
+                return int(value.integers(1 << 60))
+            case workflow.Loaded():
+                return value.measured.fingerprint
+            case workflow.Model():
+                return repr((value.base, value.effects))
+            case workflow.Target():
+                return value.signals.tolist()
+            case list():
+                return [told(item) for item in value]
+            case int() | str() | type():
+                return value
+
+    def stop(*arguments, **_):
+        raise BegunError(told(list(arguments)))
+
+    def fitted(loaded, seed_or_model, *_, **__):
+        return loaded, seed_or_model, None
+
+    reached: dict[str, Any] = {}
+    monkeypatch.setattr("forcegrasp.cli.measuring.check_folder", lambda path: reached.setdefault("folder", path))
+    monkeypatch.setattr("forcegrasp.cli.measuring.check_file", lambda path: reached.setdefault("file", path))
+    monkeypatch.setattr("time.strftime", lambda *_: "NOW")
+    for name in ("fit_base", "diagnose", "add_effect"):
+        monkeypatch.setattr(workflow, name, stop)
+    if verb == "diagnose":
+        monkeypatch.setattr(workflow, "fit_model", fitted)
+    if verb != "add":
+        monkeypatch.setattr(workflow, "apply_model", fitted if verb == "diagnose" else stop)
+    with pytest.raises(BegunError) as caught:
+        main([verb, *(f"{name}={value}" for name, value in values.items())])
+    return reached | {"arguments": caught.value.args[0]}
+
+
+@pytest.fixture(scope="module")
+def sets(tmp_path_factory) -> Path:
+    folder = tmp_path_factory.mktemp("sets")
+    for seed, name in enumerate(("data", "other")):
+        recorded(folder / name, grasps=6, seed=seed)
+    (folder / "model.yaml").write_text(MODEL.replace("EFFECTS", "{}"))
+    lag = "{force_lag: {time_constant_s: 0.1}}"
+    (folder / "lagging.yaml").write_text(MODEL.replace("EFFECTS", lag))
+    return folder
+
+
+@pytest.mark.parametrize(
+    ("schema", "name"), [(schema, name) for schema, cases in MEASURED_CASES.items() for name in cases]
+)
+def test_option_of_a_measuring_verb(schema, name, sets, monkeypatch):
+    monkeypatch.chdir(sets)
+    plain = {"data": "data"} | NEEDED.get(schema, {})
+    results = [
+        begun(monkeypatch, MEASURED[schema], **plain | changed)
+        for changed in ({}, {}, {name: MEASURED_CASES[schema][name]})
+    ]
+    assert results[0] == results[1] != results[2]
