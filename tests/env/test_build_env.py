@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
+from functools import partial
 
 import numpy as np
 import pytest
 import torch
 from tensordict import TensorDict
-from torchrl.envs import TransformedEnv
+from torchrl.envs import ParallelEnv, SerialEnv, TransformedEnv
 from torchrl.envs.utils import check_env_specs
 
 from forcegrasp.config import (
@@ -211,14 +212,18 @@ def test_partial_reset_starts_memory_anew():
         assert torch.equal(reset[key][others], state[key][others]), key
 
 
-def test_a_batch_is_its_grasps_one_by_one(draw):
-    grasps, sequence = draw(N, radius_m=[0.03, 0.035]), actions()
-    together = play(build(sampler=FixedGrasps(grasps), sensors=EXACT), sequence).get("next")
-    for i in (0, N - 1):
-        alone = play(build(1, sampler=FixedGrasps(grasps[i]), sensors=EXACT), sequence[:, i : i + 1]).get("next")
-        for key in ("observation", "joint_position", "force", "object_position", "had_contact"):
-            assert torch.equal(alone.get(key)[0], together.get(key)[i]), key
-        torch.testing.assert_close(alone.get("reward")[0], together.get("reward")[i])
+@pytest.mark.parametrize("apart", [SerialEnv, partial(ParallelEnv, mp_start_method="fork")], ids=["serial", "parallel"])
+def test_a_batch_is_its_grasps_one_by_one(draw, apart):
+    grasps, sequence = draw(3, radius_m=[0.03, 0.035]), actions(n=3)
+    together = play(build(3, sampler=FixedGrasps(grasps), sensors=EXACT), sequence)
+    workers = apart(3, [partial(build, 1, sampler=FixedGrasps(grasp), sensors=EXACT) for grasp in grasps])
+    try:
+        alone = play(workers, sequence[:, :, None]).squeeze(2)
+    finally:
+        workers.close()
+    assert together.get(("next", "had_contact")).all(1).any()
+    for key in together.keys(include_nested=True, leaves_only=True):
+        assert torch.equal(alone.get(key), together.get(key)), key
 
 
 def test_same_seed_same_rollout():
