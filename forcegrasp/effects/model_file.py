@@ -19,6 +19,7 @@ from forcegrasp import plain_yaml
 from forcegrasp.effects import Effect, get_effect
 from forcegrasp.errors import ConfigError, closest
 from forcegrasp.physics.gripper import Gripper, load_gripper
+from forcegrasp.whole_file import write_whole
 
 FORMAT = "forcegrasp-model/1"
 #: Name of the model that comes with the package.
@@ -65,7 +66,7 @@ class Model:
 
 
 def write_model(model: Model, path: Path) -> None:
-    """Writes a model as YAML.
+    """Writes a model as YAML, whole or not at all.
 
     Raises:
       ConfigError: if the file can't be written.
@@ -96,7 +97,7 @@ def write_model(model: Model, path: Path) -> None:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         text = head + yaml.dump(content, sort_keys=False, allow_unicode=True, width=120, Dumper=_Flat)
-        path.write_text(text, encoding="utf-8")
+        write_whole(path, text.encode())
     except OSError as error:
         raise ConfigError(f"{path}: could not write the model ({error.strerror})") from error
 

@@ -28,7 +28,7 @@ from forcegrasp.effects.model_file import Model, write_model
 from forcegrasp.effects.variation import read_tiago_model
 from forcegrasp.errors import CheckpointError, ConfigError
 from forcegrasp.runs import checkpoint
-from forcegrasp.runs.whole_file import write_whole
+from forcegrasp.whole_file import write_whole
 
 _PACKAGES = ("torch", "torchrl", "tensordict", "mujoco", "gymnasium", "hydra-core", "numpy")
 
@@ -87,9 +87,7 @@ class RunDir:
             return None
         copy = self.path / "model.yaml"
         if not copy.exists():
-            part = copy.with_suffix(".part")
-            write_model(read_tiago_model(config.model), part)
-            os.replace(part, copy)
+            write_model(read_tiago_model(config.model), copy)
         return read_tiago_model(copy)
 
     @classmethod
