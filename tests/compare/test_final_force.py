@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 from pathlib import Path
 
@@ -10,6 +11,7 @@ import pytest
 
 from forcegrasp.compare.final_force import TableAnalysis, analyse_table
 from forcegrasp.compare.final_force_causes import CAUSES, MENU, causes_of
+from forcegrasp.compare.final_force_output import draw
 from forcegrasp.compare.report import write_report
 from forcegrasp.effects import catalogue
 from forcegrasp.measure.schema import FinalForceTable
@@ -278,6 +280,10 @@ _SIZES: dict[str, list[tuple[str, tuple[float, ...]]]] = {
     "force_deadzone": [("subtract", (0.08,)), ("gate", (0.08,))],
     "quantisation": [("", (0.0, 0.01))],
 }
+
+
+def test_a_dollar_in_a_name_is_no_mathematics():
+    draw(analyse({"a$b_{$c": 200 * DELTA_M, "d": 300 * DELTA_M})).savefig(io.BytesIO())
 
 
 def simulated_onsets(again_and_again: bool) -> dict[str, float]:

@@ -149,6 +149,13 @@ def test_figure_shows_a_line_per_group_and_a_band_where_there_are_seeds(tmp_path
         assert len(set(picture.convert("L").tobytes())) > 50
 
 
+def test_a_dollar_in_a_name_is_no_mathematics(tmp_path):
+    write_run(tmp_path / "run", 0, line(0), command="a$b_{$c")
+    report, _ = report_of(tmp_path, out=tmp_path)
+    assert list(report["groups"]) == ["a$b_{$c"]
+    assert (tmp_path / "curves.png").is_file()
+
+
 def test_runs_that_a_training_wrote_can_be_drawn(tmp_path):
     from forcegrasp.runs.run_dir import RunDir
 

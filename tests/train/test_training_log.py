@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import re
+import threading
 import warnings
 
 import numpy as np
@@ -165,6 +166,27 @@ def test_returns_are_the_sum_of_the_reward_terms(run, metrics, config):
         assert row["episode/return"] == pytest.approx(config.grasp.steps * step, rel=1e-4)
         assert row["episode/force_reward_paper"] == pytest.approx(50 * row["reward/force_paper"], rel=1e-4)
         assert row["episode/fast_steps"] == pytest.approx(-50 * row["reward/object"], rel=1e-4)
+
+
+def test_a_full_disk_is_not_told_by_tensorboards_thread(tiny, tmp_path, monkeypatch):
+    """The batch that follows tells it in one line; a traceback of the thread would only hide that."""
+    told = []
+    monkeypatch.setattr(threading, "excepthook", lambda facts: told.append(facts.exc_type))
+
+    def fail_with(error: Exception) -> None:
+        def work():
+            raise error
+
+        thread = threading.Thread(target=work)
+        thread.start()
+        thread.join()
+
+    run = RunDir.create(tmp_path / "run", config := tiny(), [])
+    with TrainingLog(run, config, 0):
+        fail_with(OSError(28, "No space left on device"))
+        fail_with(ZeroDivisionError())
+    fail_with(OSError(28, "No space left on device"))
+    assert told == [ZeroDivisionError, OSError]
 
 
 def test_a_resumed_run_hides_what_it_repeats(tiny, tmp_path):
