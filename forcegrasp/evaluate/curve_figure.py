@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from forcegrasp.evaluate.curves import CURVES, Group
+from forcegrasp.evaluate.curve_groups import CURVES, Group
 from forcegrasp.evaluate.plots import PALETTE
 
 

@@ -17,7 +17,10 @@ from scipy import stats
 
 from forcegrasp.config import TrainConfig
 from forcegrasp.errors import CheckpointError
-from forcegrasp.evaluate.curves import CURVES, learning_curves
+from forcegrasp.evaluate.curve_figure import draw_curves
+from forcegrasp.evaluate.curve_groups import CURVES, group_runs
+from forcegrasp.evaluate.curves import learning_curves
+from forcegrasp.runs.history import find_histories
 
 REWARD = "episode/force_reward_normalised"
 
@@ -130,10 +133,6 @@ def test_of_twins_the_longer_one_counts(tmp_path):
 
 
 def test_figure_shows_a_line_per_group_and_a_band_where_there_are_seeds(tmp_path):
-    from forcegrasp.evaluate.curve_figure import draw_curves
-    from forcegrasp.evaluate.curves import group_runs
-    from forcegrasp.runs.history import find_histories
-
     for seed in range(2):
         write_run(tmp_path / f"ib{seed}", seed, line(seed))
     write_run(tmp_path / "no_ib", 0, line(5), command="no_ib", action__inductive_bias=False)
