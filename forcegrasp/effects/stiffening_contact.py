@@ -34,6 +34,7 @@ class StiffeningContact(Effect):
     def reset(self, which: np.ndarray) -> None:
         if not hasattr(self, "_touch"):
             self._touch, self._push = Touch(len(self.values)), np.zeros((len(self.values), 2))
+            self._strongest = np.full((len(self.values), 2), np.inf)
         self._touch.reset(which)
         self._push[which] = 0.0
 
@@ -41,10 +42,13 @@ class StiffeningContact(Effect):
         solimp, rows = plant.field("geom_solimp"), self.rows[which]
         for geom in plant.object_geoms:
             solimp[rows, geom, 4] += self["extra_power"][which, 0]
+        # no motor can press harder; a long time step that overshoots must not be thrown back with more
+        gain = plant.field("actuator_gainprm")[np.ix_(rows, plant.actuators, [0])][..., 0]
+        self._strongest[which] = gain * plant.gripper.open_m
 
     def act(self) -> None:
         depth = np.maximum(self._touch.depth(self.plant, self.rows, self.pad_force), 0.0)
-        self._push = self["cubic_n"] * (depth / DEPTH_M) ** 3
+        self._push = np.minimum(self["cubic_n"] * (depth / DEPTH_M) ** 3, self._strongest)
         self.plant.finger_push_n[self.rows] += self._push  # towards opening, away from the object
         self.plant.object_push_n[self.rows] += self._push[:, 0] - self._push[:, 1]
 

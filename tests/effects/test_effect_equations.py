@@ -9,6 +9,7 @@ import pytest
 from scipy.signal import lfilter
 
 from forcegrasp.effects import Effect, catalogue, get_effect
+from forcegrasp.physics.plant import write_base
 
 from .rollouts import FORCE_SCALE, START_M, make_plant, path, play, rollout, start
 
@@ -346,6 +347,18 @@ def test_stiffening_spring_shares_the_load(cubic):
     assert spring == pytest.approx(cubic * ((TOUCH_M - plant.position) / 1e-3) ** 3, rel=0.08)
     assert plant.force == pytest.approx(GAIN * (plant.position - 0.0215) * FORCE_SCALE, rel=0.03)
     assert np.all(spring > 0.1 * plant.pad_force)
+
+
+def test_stiffening_spring_throws_no_finger_out():
+    """As hard as it may be, on a small object that turns away from the pads, with 8 ms steps."""
+    plant = make_plant(1, [(get_effect("stiffening_contact"), (1.033, 4.623), "", [0])], "fast")
+    base = {"position_gain": 105.5, "velocity_gain": -26.45, "rho_m": 0.01612, "radius_m": 0.008184}
+    values = {name: np.array([value]) for name, value in (base | {"force_scale": 16.62, "offset_m": 0.02111}).items()}
+    plant.reset(np.arange(1), write_base(plant, np.arange(1), values))
+    for _ in range(150):
+        plant.advance(np.maximum(plant.measured_position - 0.003, 0.0), round(0.04 / plant.dt))
+    assert not plant.warnings().any()
+    assert (plant.position < 0.05).all()
 
 
 def test_adhesion_is_full_in_contact_and_fades_over_its_distance():
