@@ -46,7 +46,7 @@ class Step:
 
 def interrupt(folder: Path) -> None:
     """Takes a run's last checkpoints away, as if it had ended before them."""
-    first, *later = sorted((folder / "run" / "checkpoints").iterdir())
+    first, *later = sorted((folder / "run" / "checkpoints").glob("frames_*"))
     if not later:
         raise RuntimeError(f"{first} is the only checkpoint")
     for checkpoint in later:
