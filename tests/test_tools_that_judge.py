@@ -79,8 +79,9 @@ def test_smoke_test_needs_a_run_to_interrupt(smoke, tmp_path):
     checkpoints = tmp_path / "run" / "checkpoints"
     checkpoints.mkdir(parents=True)
     for name in ("8", "16", "24"):
-        (checkpoints / f"{int(name):012d}.safetensors").touch()
+        (checkpoints / f"frames_{int(name):012d}.safetensors").touch()
+    (checkpoints / "best.safetensors").touch()
     smoke["interrupt"](tmp_path)
-    assert [path.name for path in checkpoints.iterdir()] == ["000000000008.safetensors"]
+    assert {path.name for path in checkpoints.iterdir()} == {"best.safetensors", "frames_000000000008.safetensors"}
     with pytest.raises(RuntimeError, match="only checkpoint"):
         smoke["interrupt"](tmp_path)
