@@ -43,7 +43,7 @@ class StiffeningContact(Effect):
         for geom in plant.object_geoms:
             solimp[rows, geom, 4] += self["extra_power"][which, 0]
         # no motor can press harder; a long time step that overshoots must not be thrown back with more
-        gain = plant.field("actuator_gainprm")[np.ix_(rows, plant.actuators, [0])][..., 0]
+        gain = plant.field("actuator_gainprm")[rows][:, plant.actuators, 0]
         self._strongest[which] = gain * plant.gripper.open_m
 
     def act(self) -> None:

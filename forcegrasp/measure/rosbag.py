@@ -16,6 +16,8 @@ grasps:                    # times in seconds since the first message of the bag
 Every other signal gives its newest reading at or before that time. Nothing is interpolated.
 """
 
+# pyright: reportMissingImports=false
+
 from __future__ import annotations
 
 import re

@@ -4,6 +4,8 @@ Both have the same problem, curriculum and number of frames to anneal it over; t
 mean of the episodes of a batch, actions explored.
 """
 
+# pyright: reportMissingImports=false
+
 from __future__ import annotations
 
 from collections.abc import Callable

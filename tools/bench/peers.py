@@ -4,6 +4,8 @@ As in levels.py, a function prepares a peer and returns what runs it. Processes 
 imported what they need, the quickest and leanest way to start them.
 """
 
+# pyright: reportMissingImports=false
+
 from __future__ import annotations
 
 import atexit
