@@ -163,8 +163,8 @@ class PPOConfig:
         4_500_000, "control steps to train for, over all grasps", source="authors' code", low=1, high=10**12
     )
     grasps: int = option(256, "grasps simulated at once; a batch is one episode of each", low=1, high=100_000)
-    epochs: int = option(5, "passes over each batch; the authors had 10", low=1, high=1000)
-    minibatch: int = option(2048, "frames per gradient step", low=1, high=10**9)
+    epochs: int = option(2, "passes over each batch; the authors had 10", low=1, high=1000)
+    minibatch: int = option(512, "frames per gradient step; the authors had 64", low=1, high=10**9)
     learning_rate: float = option(6e-4, "Adam's step size at the start", source="authors' code", low=0, high=1)
     learning_rate_end: float = option(0.05, "what is left of it at the end, linearly, as a fraction", low=0, high=1)
     discount: float = option(0.97, "γ; the authors had 0.99", low=0, high=1)
