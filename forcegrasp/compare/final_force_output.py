@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from forcegrasp.compare.figures import plain
 from forcegrasp.compare.final_force_causes import CAUSES, MENU, NO_TRACE, Onset, grasps_for
 from forcegrasp.compare.report import Picture, Section, Table, Text
 from forcegrasp.physics.parameters import FORCE_SCALE_RANGE
@@ -279,7 +280,7 @@ def draw(analysis: TableAnalysis) -> Figure:
     for k, (name, rows) in enumerate(analysis.rows.items()):
         colour, base, fit = _COLOURS[k % len(_COLOURS)], law.fits[name], best.fits[name]
         x = np.linspace(0.0, rows.delta_m.max(), 301)
-        label = name.replace("$", r"\$")  # no mathematics in it
+        label = plain(name, len(name))
         above.plot(1e3 * rows.delta_m, rows.force_n, "o", color=colour, label=label)
         above.plot(1e3 * x, base.predict(x), "--", color=colour, lw=1)
         below.plot(1e3 * rows.delta_m, base.residual, "x--", color=colour, lw=0.7, ms=5)

@@ -261,6 +261,11 @@ def test_analysis_is_the_same_every_time(real):
     assert again.lines() == real.lines()
 
 
+def test_a_dollar_in_a_name_is_no_mathematics():
+    draw(analyse({"a$b_{$c": 200 * DELTA_M, "d": 300 * DELTA_M})).savefig(picture := io.BytesIO())
+    assert picture.getvalue()
+
+
 def test_sections_make_a_report(real, tmp_path):
     html = write_report(tmp_path / "r.html", "t", "lead", real.sections(), {}).read_text(encoding="utf-8")
     assert "dead zone" in html
@@ -280,10 +285,6 @@ _SIZES: dict[str, list[tuple[str, tuple[float, ...]]]] = {
     "force_deadzone": [("subtract", (0.08,)), ("gate", (0.08,))],
     "quantisation": [("", (0.0, 0.01))],
 }
-
-
-def test_a_dollar_in_a_name_is_no_mathematics():
-    draw(analyse({"a$b_{$c": 200 * DELTA_M, "d": 300 * DELTA_M})).savefig(io.BytesIO())
 
 
 def simulated_onsets(again_and_again: bool) -> dict[str, float]:
