@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from forcegrasp.effects import STAGES, Effect, catalogue, get_effect
-from forcegrasp.physics.gripper import load_gripper
+from forcegrasp.physics.gripper_file import load_gripper
 from forcegrasp.physics.plant import Plant, write_base
 
 PERIOD_S, JUMP = 0.04, 9.0

@@ -22,7 +22,8 @@ from rich.table import Table
 from forcegrasp.config import GraspConfig
 from forcegrasp.physics import GraspSampler
 from forcegrasp.physics.fast import SPHERE
-from forcegrasp.physics.gripper import Gripper, load_gripper
+from forcegrasp.physics.gripper import Gripper
+from forcegrasp.physics.gripper_file import load_gripper
 from forcegrasp.physics.model import CONTROL_PERIOD_S
 from forcegrasp.physics.plant import Plant, write_base
 

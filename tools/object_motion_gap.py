@@ -18,7 +18,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from forcegrasp.effects import catalogue
-from forcegrasp.physics.gripper import load_gripper
+from forcegrasp.physics.gripper_file import load_gripper
 from forcegrasp.physics.parameters import MAX_FORCE_N, force_scale_of_kappa, rho_of_kappa
 from forcegrasp.physics.plant import Plant, write_base
 

@@ -13,7 +13,8 @@ from scipy.stats import t as student
 from forcegrasp.calibration.power_grasp import speed
 from forcegrasp.calibration.rig import FINAL_S, MAX_DELTA_M, SAMPLE_S, close, parameter_of
 from forcegrasp.errors import ConfigError, MeasurementError
-from forcegrasp.physics.gripper import Gripper, load_gripper
+from forcegrasp.physics.gripper import Gripper
+from forcegrasp.physics.gripper_file import load_gripper
 from forcegrasp.physics.model import CONTROL_PERIOD_S
 
 # Values of the parameter that are simulated, to interpolate between: 25 of b₂ come within 1 µm of a simulation.
@@ -170,9 +171,9 @@ def _free_closing(time_s: np.ndarray, position_m: np.ndarray, gripper: Gripper) 
     if not (np.diff(time) > 0).all():
         row = int(np.flatnonzero(np.diff(time) <= 0)[0]) + 1
         raise MeasurementError(f"power grasp: time must rise from sample to sample; at sample {row} it does not")
-    if np.abs(position).max() > 2 * gripper.open_m:
+    if np.abs(position).max() > 2 * gripper.stroke:
         raise MeasurementError(
-            f"power grasp: a finger at {np.abs(position).max():g}, but {gripper.name} opens to {gripper.open_m:g} m:"
+            f"power grasp: a finger at {np.abs(position).max():g}, but {gripper.name} opens to {gripper.stroke:g} m:"
             " give metres from closed"
         )
     end = position[-3:].mean()

@@ -9,7 +9,9 @@ import mujoco
 import numpy as np
 
 from forcegrasp.errors import ConfigError, PhysicsError, closest
-from forcegrasp.physics.gripper import BaseParameter, Gripper, load_gripper
+from forcegrasp.physics.gripper import Gripper
+from forcegrasp.physics.gripper_file import load_gripper
+from forcegrasp.physics.gripper_parts import BaseParameter
 from forcegrasp.physics.model import CONTROL_PERIOD_S
 from forcegrasp.physics.plant import Plant, write_base
 
@@ -92,7 +94,7 @@ def close(
     for name, value, low, high in (("period_s", period_s, 0.001, 1.0), ("seconds", seconds, FINAL_S, _MOST_S / n)):
         if not low <= value <= high:
             raise ConfigError(f"{name}={value:g}: must lie in [{low:g}, {high:g}]")
-    start = columns.pop("start_m", np.full(n, gripper.open_m))
+    start = columns.pop("start_m", np.full(n, gripper.stroke))
     plant = Plant(gripper, n, tier, threads)
     if not touching:
         plant.base("opt.disableflags")[:] |= _NO_CONTACT
@@ -107,7 +109,7 @@ def _record(plant: Plant, delta: np.ndarray, seconds: float, period_s: float) ->
     command = plant.measured_position
     for step in range(max(1, round(seconds / plant.dt))):
         if step % steps == 0:
-            command = np.clip(plant.measured_position - delta[:, None], 0.0, plant.gripper.open_m)
+            command = np.clip(plant.measured_position - delta[:, None], 0.0, plant.gripper.stroke)
         plant.advance(command)
         if (step + 1) % stride == 0:
             position.append(plant.measured_position)
@@ -139,7 +141,7 @@ def _columns(gripper: Gripper, given: Mapping[str, Values]) -> dict[str, np.ndar
 
 def _bounds(gripper: Gripper, name: str) -> tuple[float, float]:
     if name in ("delta_m", "start_m"):
-        return 1e-6 if name == "delta_m" else 0.0, gripper.open_m
+        return 1e-6 if name == "delta_m" else 0.0, gripper.stroke
     parameter = parameter_of(gripper, name)
     return parameter.low, parameter.high
 

@@ -11,7 +11,8 @@ from forcegrasp.calibration.rig import MAX_DELTA_M, Closing, Values, close, colu
 from forcegrasp.calibration.stiffness import RADIUS_M, kappa_values
 from forcegrasp.compare.final_force_shapes import BIAS, bootstrap, fit_shape
 from forcegrasp.errors import ConfigError, MeasurementError
-from forcegrasp.physics.gripper import Gripper, load_gripper
+from forcegrasp.physics.gripper import Gripper
+from forcegrasp.physics.gripper_file import load_gripper
 
 #: The paper's commands: from 0.3 mm in steps of 0.3 mm up to Δq_max. Metres.
 DELTAS_M = np.arange(1, 11) * MAX_DELTA_M / 10
@@ -89,7 +90,7 @@ def staircase(
         seconds,
         columns,
         gripper=gripper,
-        start_m=np.clip(near, 0.0, gripper.open_m),
+        start_m=np.clip(near, 0.0, gripper.stroke),
         **more,
     )
     _demand_settled(closing, seconds)

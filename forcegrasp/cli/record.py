@@ -27,7 +27,7 @@ def main(arguments: list[str]) -> int:
     from forcegrasp.effects.model_file import read_model
     from forcegrasp.measure import write_set
     from forcegrasp.measure.record import parse_effect, record
-    from forcegrasp.physics.gripper import load_gripper
+    from forcegrasp.physics.gripper_file import load_gripper
 
     out = default_out("record", config.out)
     effects, known = [parse_effect(text) for text in config.effects], {}

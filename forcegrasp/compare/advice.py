@@ -48,11 +48,11 @@ def advise(diagnosis: Diagnosis) -> Advice | None:
     gripper = problem.gripper
     kinds = [kind for kind in (*MENU, OFF_CENTRE) if kind != "close and hold"]
     time = np.arange(SAMPLES) * PERIOD_S
-    room = 0.5 * min(gripper.open_m - radius, radius / 3, gripper.open_m / 8)
+    room = 0.5 * min(gripper.stroke - radius, radius / 3, gripper.stroke / 8)
     grasps, offsets = [], np.array([room if kind == OFF_CENTRE else 0.0 for kind in kinds])
     for kind, offset in zip(kinds, offsets, strict=True):
-        command = make_command(kind, radius, gripper.open_m, gripper.open_m / 15)
-        rest = np.full((SAMPLES, 2), gripper.open_m)
+        command = make_command(kind, radius, gripper.stroke, gripper.stroke / 15)
+        rest = np.full((SAMPLES, 2), gripper.stroke)
         name = target.grasps[model_grasp].object
         grasps.append(MeasuredGrasp(kind, name, "", radius, offset, None, time, command, rest, 0 * rest, None))
     moved = []

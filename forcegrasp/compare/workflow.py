@@ -25,7 +25,8 @@ from forcegrasp.effects.model_file import Fitted, FoundEffect, Model
 from forcegrasp.effects.quantisation import Quantisation
 from forcegrasp.errors import ConfigError, MeasurementError
 from forcegrasp.measure import FinalForceTable, MeasurementSet, check_set, check_table, read_set
-from forcegrasp.physics.gripper import Gripper, load_gripper
+from forcegrasp.physics.gripper import Gripper
+from forcegrasp.physics.gripper_file import load_gripper
 
 #: A diagnosis needs so many grasps: with fewer, nothing can be held out.
 LEAST_GRASPS = 6
@@ -55,8 +56,8 @@ def load(path: Path) -> Loaded[MeasurementSet] | Loaded[FinalForceTable]:
     measured = read_set(path)
     gripper = load_gripper(measured.gripper, measured.path)
     if isinstance(measured, FinalForceTable):
-        return Loaded(measured, gripper, check_table(measured, gripper.open_m))
-    return Loaded(measured, gripper, check_set(measured, gripper.open_m))
+        return Loaded(measured, gripper, check_table(measured, gripper.stroke))
+    return Loaded(measured, gripper, check_set(measured, gripper.stroke))
 
 
 def fit_model(loaded: Loaded[MeasurementSet], seed: int, progress: Progress) -> tuple[Target, Simulators, BaseFit]:

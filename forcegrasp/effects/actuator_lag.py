@@ -19,9 +19,10 @@ class ActuatorLag(Effect):
     separates = "fast steps: a lagged response has no corner"
     parameters = (Parameter("time_constant_s", "time constant τ", "s", 0.0, 0.5, 0.05, trials=(0.01, 0.04, 0.12)),)
 
+    def start(self) -> None:
+        self._held = np.zeros((len(self.values), self.motors))
+
     def reset(self, which: np.ndarray) -> None:
-        if not hasattr(self, "_held"):
-            self._held = np.zeros((len(self.values), 2))
         self._held[which] = np.nan
 
     def command(self, command: np.ndarray, fresh: np.ndarray) -> np.ndarray:

@@ -19,14 +19,15 @@ class Adhesion(Effect):
     look_alikes = ("backlash", "force_deadzone", "force_bias")
     separates = "full releases, slow enough to be sampled"
     parameters = (
-        Parameter("force_n", "adhesive force F_a", "N", 0.0, 0.5, 0.03, trials=(0.005, 0.02, 0.06)),
+        Parameter("force_n", "adhesive force F_a", "N", 0.0, 0.5, 0.03, trials=(0.005, 0.02, 0.06), follows="force"),
         Parameter("distance_m", "tear-off distance d", "m", 0.0, 0.002, 2e-4, null=2e-4, trials=(2e-4,)),
     )
     order = 2
 
+    def start(self) -> None:
+        self._touch, self._bonded = Touch(len(self.values)), np.zeros((len(self.values), 2), bool)
+
     def reset(self, which: np.ndarray) -> None:
-        if not hasattr(self, "_touch"):
-            self._touch, self._bonded = Touch(len(self.values)), np.zeros((len(self.values), 2), bool)
         self._touch.reset(which)
         self._bonded[which] = False
 

@@ -22,12 +22,17 @@ class Backlash(Effect):
     source = "play operator (Krasnosel'skii and Pokrovskii 1989)"
     look_alikes = ("force_deadzone", "adhesion", "coulomb_friction")
     separates = "pauses, reversals and partial releases in contact, at several speeds"
-    parameters = (Parameter("gap_m", "lost motion g", "m", 0.0, 0.006, 0.0006, trials=(1e-4, 3e-4, 1e-3, 2e-3)),)
+    parameters = (
+        Parameter(
+            "gap_m", "lost motion g", "m", 0.0, 0.006, 0.0006, trials=(1e-4, 3e-4, 1e-3, 2e-3), follows="position"
+        ),
+    )
     variants = ("play", "loose", "command")
 
+    def start(self) -> None:
+        self._pad = np.zeros((len(self.values), self.motors))
+
     def reset(self, which: np.ndarray) -> None:
-        if not hasattr(self, "_pad"):
-            self._pad = np.zeros((len(self.values), 2))
         self._pad[which] = np.nan
 
     def command(self, command: np.ndarray, fresh: np.ndarray) -> np.ndarray:
@@ -39,8 +44,8 @@ class Backlash(Effect):
         motor = self.position
         pad = self._follow(motor)
         if self.variant == "loose":
-            self._pad = pad = np.where(self.pad_force > 0, motor + self["gap_m"] / 2, pad)
-        self.plant.pad_shift_m[self.rows] += pad - motor
+            self._pad = pad = np.where(self.plant.presses(self.rows), motor + self["gap_m"] / 2, pad)
+        self.plant.pad_shift_m[self.rows] += self.plant.to_sides(pad - motor)
 
     def _follow(self, motor: np.ndarray) -> np.ndarray:
         half = self["gap_m"] / 2

@@ -29,13 +29,17 @@ class Parameter:
     null: float = 0.0  #: value at which the effect is not there at all; may be infinite
     logarithmic: bool = False  #: fitted by its logarithm
     trials: tuple[float, ...] = ()  #: sizes that a diagnosis tries
+    #: What its sizes are proportional to, from gripper to gripper: the motors' "position" or "effort", a contact's
+    #: "force", or its inverse, "compliance"; empty if they are alike for all.
+    follows: str = ""
 
 
 class Effect:
     """One physical effect on some rows (simulated grasps) of a plant. Subclasses override the hooks of their stage.
 
     Hooks are called once per physics step with the rows of this effect only, and return what replaces their argument.
-    Arrays are float64 of shape ``(rows, 2)``, left and right finger, SI units; forces that press are positive.
+    Arrays are float64, SI units, one column for each motor (positions, commands), for each force channel (readings), or
+    for each side (pads, contact forces): left and right. Forces that press are positive.
 
     Args:
       values: parameter values, ``(rows, len(parameters))``.
@@ -60,6 +64,15 @@ class Effect:
     variants: ClassVar[tuple[str, ...]] = ("",)
     #: Position among the effects of the same stage; smaller acts first.
     order: ClassVar[int] = 0
+    #: "motor" or "channel" if there is a parameter for each of them, left and right; `alone` stands for these words in
+    #: the name of the only one.
+    per: ClassVar[str] = ""
+    alone: ClassVar[str] = ""
+    least_channels: ClassVar[int] = 0  #: force readings that the gripper must have for it to make a difference
+    # of the gripper, see for_gripper
+    motors: ClassVar[int] = 2
+    channels: ClassVar[int] = 2
+    position_scale: ClassVar[float] = 1.0
 
     plant: Plant  #: what it acts on, once attached
 
@@ -75,16 +88,17 @@ class Effect:
         self.rows = np.arange(len(self.values))
         #: Rows whose readings are new, ``(rows, 1)``; when others are reset, a row is read again where it stands.
         self.new_reading = np.ones((len(self.values), 1), bool)
+        self.start()
         self.reset(self.rows)
 
     def __getitem__(self, parameter: str) -> np.ndarray:
-        """A parameter as a column ``(rows, 1)``, to combine with arrays of both fingers."""
-        index = [p.name for p in self.parameters].index(parameter)
+        """A parameter as a column ``(rows, 1)``; by the name it has in the class that defines it, whatever the gripper."""
+        index = self.index(parameter)
         return self.values[:, index : index + 1]
 
     def longest(self, parameter: str) -> float:
         """The largest value that a parameter will have: what it has, unless it is drawn anew at resets."""
-        index = [p.name for p in self.parameters].index(parameter)
+        index = self.index(parameter)
         return float(max(self.values[:, index].max(initial=0.0), self.largest[index]))
 
     def attach(self, plant: Plant, rows: np.ndarray) -> Effect:
@@ -94,18 +108,18 @@ class Effect:
 
     @property
     def position(self) -> np.ndarray:
-        """True finger positions of the effect's rows, metres, ``(rows, 2)``."""
+        """True positions of the motors, m or rad, ``(rows, motors)``."""
         return self.plant.position[self.rows]
 
     @property
     def encoder(self) -> np.ndarray:
-        """What the gripper's own driver reads as positions, metres, ``(rows, 2)``; as recorded, if it was."""
+        """What the gripper's own driver reads as positions, m or rad, ``(rows, motors)``; as recorded, if it was."""
         known = self.plant.recorded_position
         return (self.plant.measured_position if known is None else known)[self.rows]
 
     @property
     def velocity(self) -> np.ndarray:
-        """True finger velocities of the effect's rows, m/s, ``(rows, 2)``; positive opens."""
+        """True velocities of the motors, m/s or rad/s, ``(rows, motors)``; positive opens."""
         return self.plant.velocity[self.rows]
 
     @property
@@ -115,6 +129,9 @@ class Effect:
 
     # --- hooks -------------------------------------------------------------------------------------------------
 
+    def start(self) -> None:
+        """Makes its memory, once, before the first reset."""
+
     def reset(self, which: np.ndarray) -> None:
         """Forgets all memory of these of its rows (indices into the effect's own rows)."""
 
@@ -122,11 +139,11 @@ class Effect:
         """Changes MuJoCo's per-simulation fields for these of its rows, in which they are those of the base model."""
 
     def command(self, command: np.ndarray, fresh: np.ndarray) -> np.ndarray:
-        """Commanded positions on their way to the actuator, metres. ``fresh`` ``(rows,)``: this is a new command."""
+        """Commanded positions on their way to the motors, m or rad. ``fresh`` ``(rows,)``: this is a new command."""
         return command
 
     def act(self) -> None:
-        """Adds to the plant's ``friction_n``, ``pad_shift_m``, ``finger_push_n`` or ``object_push_n`` of this step."""
+        """Adds to the plant's ``friction``, ``pad_shift_m``, ``finger_push_n`` or ``object_push_n`` of this step."""
 
     def interaction(self, force: np.ndarray) -> np.ndarray:
         """True force between pads and object, before any scale, newtons."""
@@ -137,7 +154,7 @@ class Effect:
         return force
 
     def read_position(self, position: np.ndarray) -> np.ndarray:
-        """What the encoders say, metres."""
+        """What the encoders say, m or rad."""
         return position
 
     # --- what the class knows about itself -----------------------------------------------------------------------
@@ -146,6 +163,11 @@ class Effect:
     def rank(self) -> tuple[int, int]:
         """Where it stands in the order in which effects act."""
         return STAGES.index(self.stage), self.order
+
+    @classmethod
+    def index(cls, parameter: str) -> int:
+        """Which of the parameters has that name in the class that defines the effect."""
+        return [p.name for p in cls.parameters].index(parameter)
 
     @classmethod
     def null_values(cls) -> np.ndarray:
@@ -186,16 +208,17 @@ def first_order_weight(dt: float, time_constant: np.ndarray | float) -> np.ndarr
 
 
 class DelayLine:
-    """Delays a signal ``(rows, 2)`` by a real number of steps, mixing the two nearest samples.
+    """Delays a signal ``(rows, width)`` by a real number of steps, mixing the two nearest samples.
 
     Args:
       rows: number of rows.
+      width: numbers in each.
       longest: longest delay that any of them will have, in steps.
     """
 
-    def __init__(self, rows: int, longest: float) -> None:
+    def __init__(self, rows: int, width: int, longest: float) -> None:
         self._length = int(longest) + 2
-        self._memory = np.full((self._length, rows, 2), math.nan)
+        self._memory = np.full((self._length, rows, width), math.nan)
         self._whole, self._now, self._rows = np.zeros(rows, int), np.zeros(rows, int), np.arange(rows)
         self._part = np.zeros((rows, 1))
 
@@ -209,7 +232,7 @@ class DelayLine:
         """Takes this step's value and returns the delayed one.
 
         Args:
-          signal: the value, ``(rows, 2)``.
+          signal: the value, ``(rows, width)``.
           past: stands for what came before the first value after a reset; by default that value itself.
           new: False where it is the last step's value once more, ``(rows,)`` or for all.
         """

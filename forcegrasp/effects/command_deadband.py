@@ -23,14 +23,22 @@ class CommandDeadband(Effect):
     separates = "slow ramps with small increments: stairs follow the commands and not the force"
     parameters = (
         Parameter(
-            "threshold_m", "largest change that is dropped", "m", 0.0, 0.005, 0.0003, trials=(1e-4, 3e-4, 8e-4, 2e-3)
+            "threshold_m",
+            "largest change that is dropped",
+            "m",
+            0.0,
+            0.005,
+            0.0003,
+            trials=(1e-4, 3e-4, 8e-4, 2e-3),
+            follows="position",
         ),
     )
     variants = ("position", "held")
 
+    def start(self) -> None:
+        self._held = np.zeros((len(self.values), self.motors))
+
     def reset(self, which: np.ndarray) -> None:
-        if not hasattr(self, "_held"):
-            self._held = np.zeros((len(self.values), 2))
         self._held[which] = np.nan
 
     def command(self, command: np.ndarray, fresh: np.ndarray) -> np.ndarray:

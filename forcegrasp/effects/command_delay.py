@@ -20,9 +20,10 @@ class CommandDelay(Effect):
     parameters = (Parameter("delay_s", "time until a command acts", "s", 0.0, 0.4, 0.06, trials=(0.015, 0.05, 0.12)),)
     order = 1  # after a dead band, which is the driver's
 
+    def start(self) -> None:
+        self._line = DelayLine(len(self.values), self.motors, self.longest("delay_s") / self.dt)
+
     def reset(self, which: np.ndarray) -> None:
-        if not hasattr(self, "_line"):
-            self._line = DelayLine(len(self.values), self.longest("delay_s") / self.dt)
         self._line.reset(which, self["delay_s"][which, 0] / self.dt)
 
     def command(self, command: np.ndarray, fresh: np.ndarray) -> np.ndarray:

@@ -15,7 +15,9 @@ class CoulombFriction(Effect):
     source = "MuJoCo's `frictionloss`, with a stiff constraint lest it creeps"
     look_alikes = ("stiction", "backlash", "command_deadband")
     separates = "reversals in free air, where force and play take no part"
-    parameters = (Parameter("force_n", "friction F_c", "N", 0.0, 0.5, 0.03, trials=(0.005, 0.02, 0.06)),)
+    parameters = (
+        Parameter("force_n", "friction F_c", "N", 0.0, 0.5, 0.03, trials=(0.005, 0.02, 0.06), follows="effort"),
+    )
 
     def act(self) -> None:
-        self.plant.friction_n[self.rows] += self["force_n"]
+        self.plant.friction[self.rows] += self["force_n"]

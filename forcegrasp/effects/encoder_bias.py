@@ -21,11 +21,12 @@ class EncoderBias(Effect):
     look_alikes = ("coulomb_friction", "finger_compliance")
     separates = "approaching one command from both sides: a bias does not flip"
     parameters = (
-        Parameter("left_m", "offset of the left encoder", "m", -0.01, 0.01, 0.0003),
-        Parameter("right_m", "offset of the right encoder", "m", -0.01, 0.01, -0.0002),
+        Parameter("left_m", "offset of the left encoder", "m", -0.01, 0.01, 0.0003, follows="position"),
+        Parameter("right_m", "offset of the right encoder", "m", -0.01, 0.01, -0.0002, follows="position"),
     )
     variants = ("reading", "loop")
     order = 9
+    per, alone = "motor", "offset"
 
     @classmethod
     def trials(cls) -> np.ndarray:

@@ -21,13 +21,23 @@ class FingerCompliance(Effect):
     look_alikes = ("stiffening_contact", "viscoelastic_contact", "encoder_bias")
     separates = "objects of several softnesses: the finger's deflection is the same for all at one force"
     parameters = (
-        Parameter("compliance_m_n", "deflection per force c", "m/N", 0.0, 0.02, 0.001, trials=(3e-4, 1e-3, 3e-3)),
+        Parameter(
+            "compliance_m_n",
+            "deflection per force c",
+            "m/N",
+            0.0,
+            0.02,
+            0.001,
+            trials=(3e-4, 1e-3, 3e-3),
+            follows="compliance",
+        ),
     )
     order = 1
 
+    def start(self) -> None:
+        self._deflection = np.zeros((len(self.values), 2))
+
     def reset(self, which: np.ndarray) -> None:
-        if not hasattr(self, "_deflection"):
-            self._deflection = np.zeros((len(self.values), 2))
         self._deflection[which] = 0
 
     def act(self) -> None:

@@ -18,10 +18,12 @@ class ForceBias(Effect):
     look_alikes = ("force_drift", "adhesion", "force_deadzone")
     separates = "free motion before contact gives it directly"
     parameters = (
-        Parameter("left_n", "offset of the left sensor", "N", -2.0, 2.0, 0.06),
-        Parameter("right_n", "offset of the right sensor", "N", -2.0, 2.0, 0.04),
+        Parameter("left_n", "offset of the left sensor", "N", -2.0, 2.0, 0.06, follows="force"),
+        Parameter("right_n", "offset of the right sensor", "N", -2.0, 2.0, 0.04, follows="force"),
     )
     order = 7
+    per, alone = "channel", "offset"
+    least_channels = 1
 
     @classmethod
     def trials(cls) -> np.ndarray:

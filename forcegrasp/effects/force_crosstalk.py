@@ -18,6 +18,7 @@ class ForceCrosstalk(Effect):
     look_alikes = ("force_gain_asymmetry",)
     separates = "off-centre objects, where only one finger touches; with both in contact it is a gain and can't be told"
     parameters = (Parameter("share", "share c", "1", -0.5, 0.5, 0.08, trials=(0.05,)),)
+    least_channels = 2
 
     def read_force(self, force: np.ndarray) -> np.ndarray:
         return np.where(self["share"] == 0, force, force + self["share"] * force[:, ::-1])

@@ -20,9 +20,14 @@ class ForceDeadzone(Effect):
     source = "preloaded tactile skins, thresholded drivers"
     look_alikes = ("backlash", "adhesion")
     separates = "partial releases: the zone is crossed at one force, a gap at one travel"
-    parameters = (Parameter("threshold_n", "threshold z", "N", 0.0, 2.0, 0.08, trials=(0.02, 0.05, 0.1, 0.2, 0.4)),)
+    parameters = (
+        Parameter(
+            "threshold_n", "threshold z", "N", 0.0, 2.0, 0.08, trials=(0.02, 0.05, 0.1, 0.2, 0.4), follows="force"
+        ),
+    )
     variants = ("subtract", "gate")
     order = 5
+    least_channels = 1
 
     def read_force(self, force: np.ndarray) -> np.ndarray:
         threshold = self["threshold_n"]

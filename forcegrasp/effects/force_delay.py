@@ -19,10 +19,12 @@ class ForceDelay(Effect):
     separates = "fast steps and first contact: a delayed force keeps its corner"
     parameters = (Parameter("delay_s", "age of a reading", "s", 0.0, 0.5, 0.08, trials=(0.01, 0.03, 0.08, 0.2)),)
     order = 4
+    least_channels = 1
+
+    def start(self) -> None:
+        self._line = DelayLine(len(self.values), self.channels, self.longest("delay_s") / self.dt)
 
     def reset(self, which: np.ndarray) -> None:
-        if not hasattr(self, "_line"):
-            self._line = DelayLine(len(self.values), self.longest("delay_s") / self.dt)
         self._line.reset(which, self["delay_s"][which, 0] / self.dt)
 
     def read_force(self, force: np.ndarray) -> np.ndarray:

@@ -18,18 +18,21 @@ class ForceDrift(Effect):
     look_alikes = ("force_bias", "viscoelastic_contact")
     separates = "free motion after a long hold: drift stays, relaxation does not"
     parameters = (
-        Parameter("left_n_s", "slope of the left sensor", "N/s", -1.0, 1.0, 0.02),
-        Parameter("right_n_s", "slope of the right sensor", "N/s", -1.0, 1.0, -0.015),
+        Parameter("left_n_s", "slope of the left sensor", "N/s", -1.0, 1.0, 0.02, follows="force"),
+        Parameter("right_n_s", "slope of the right sensor", "N/s", -1.0, 1.0, -0.015, follows="force"),
     )
     order = 6
+    per, alone = "channel", "slope"
+    least_channels = 1
 
     @classmethod
     def trials(cls) -> np.ndarray:
         return np.array([[0.02, 0.0], [0.0, 0.02]])
 
+    def start(self) -> None:
+        self._time = np.zeros((len(self.values), 1))
+
     def reset(self, which: np.ndarray) -> None:
-        if not hasattr(self, "_time"):
-            self._time = np.zeros((len(self.values), 1))
         self._time[which] = -self.dt  # so that the first reading is at 0
 
     def read_force(self, force: np.ndarray) -> np.ndarray:

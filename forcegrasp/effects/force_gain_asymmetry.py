@@ -19,6 +19,7 @@ class ForceGainAsymmetry(Effect):
     separates = "long holds, where both fingers press alike"
     parameters = (Parameter("share", "share a", "1", -0.9, 0.9, 0.1, trials=(0.05,)),)
     order = 2
+    least_channels = 2
 
     def read_force(self, force: np.ndarray) -> np.ndarray:
         return force * (1 + self["share"] * np.array([1.0, -1.0]))

@@ -21,18 +21,20 @@ class ForceHysteresis(Effect):
     look_alikes = ("backlash", "force_lag", "viscoelastic_contact")
     separates = "loading and unloading at several speeds: lag shrinks when slow, hysteresis does not"
     parameters = (
-        Parameter("width_n", "width of the play w", "N", 0.0, 1.0, 0.04),
+        Parameter("width_n", "width of the play w", "N", 0.0, 1.0, 0.04, follows="force"),
         Parameter("share", "excess while unloading h", "1", 0.0, 2.0, 0.15),
     )
     order = 1
+    least_channels = 1
 
     @classmethod
     def trials(cls) -> np.ndarray:
         return np.array([[0.03, 0.0], [0.1, 0.0], [0.0, 0.1], [0.0, 0.3]])
 
+    def start(self) -> None:
+        self._play, self._read = np.zeros((2, len(self.values), self.channels))
+
     def reset(self, which: np.ndarray) -> None:
-        if not hasattr(self, "_play"):
-            self._play, self._read = np.zeros((2, len(self.values), 2))
         self._play[which] = self._read[which] = 0
 
     def read_force(self, force: np.ndarray) -> np.ndarray:

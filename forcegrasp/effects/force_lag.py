@@ -19,10 +19,12 @@ class ForceLag(Effect):
     separates = "fast steps and first contact: a lagged force has no corner"
     parameters = (Parameter("time_constant_s", "time constant τ", "s", 0.0, 1.0, 0.08, trials=(0.01, 0.03, 0.1, 0.3)),)
     order = 3
+    least_channels = 1
+
+    def start(self) -> None:
+        self._held = np.zeros((len(self.values), self.channels))
 
     def reset(self, which: np.ndarray) -> None:
-        if not hasattr(self, "_held"):
-            self._held = np.zeros((len(self.values), 2))
         self._held[which] = np.nan
 
     def read_force(self, force: np.ndarray) -> np.ndarray:

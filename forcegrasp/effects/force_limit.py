@@ -29,6 +29,7 @@ class ForceLimit(Effect):
             null=np.inf,
             logarithmic=True,
             trials=(0.05, 0.1, 0.2, 0.4, 0.8),
+            follows="effort",
         ),
     )
     order = 2

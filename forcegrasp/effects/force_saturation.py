@@ -28,9 +28,11 @@ class ForceSaturation(Effect):
             null=np.inf,
             logarithmic=True,
             trials=tuple(np.geomspace(0.08, 5, 14)),
+            follows="force",
         ),
     )
     order = 8
+    least_channels = 1
 
     def read_force(self, force: np.ndarray) -> np.ndarray:
         return np.clip(force, -self["level_n"], self["level_n"])

@@ -18,7 +18,8 @@ import yaml
 from forcegrasp import plain_yaml
 from forcegrasp.effects import Effect, get_effect
 from forcegrasp.errors import ConfigError, closest
-from forcegrasp.physics.gripper import Gripper, load_gripper
+from forcegrasp.physics.gripper import Gripper
+from forcegrasp.physics.gripper_file import load_gripper
 from forcegrasp.whole_file import write_whole
 
 FORMAT = "forcegrasp-model/1"

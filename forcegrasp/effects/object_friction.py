@@ -18,7 +18,7 @@ class ObjectFriction(Effect):
     source = "MuJoCo's `frictionloss` on the object, with a stiff constraint"
     look_alikes = ("backlash", "force_gain_asymmetry")
     separates = "off-centre objects, where one finger touches first and pushes"
-    parameters = (Parameter("force_n", "friction F_t", "N", 0.0, 5.0, 0.1, trials=(0.02, 0.06, 0.2)),)
+    parameters = (Parameter("force_n", "friction F_t", "N", 0.0, 5.0, 0.1, trials=(0.02, 0.06, 0.2), follows="force"),)
 
     def change_model(self, plant: Plant, which: np.ndarray) -> None:
         rows, dof = self.rows[which], plant.object_dof

@@ -18,8 +18,8 @@ class Quantisation(Effect):
     look_alikes = ()
     separates = "counting the distinct values tells it from everything else"
     parameters = (
-        Parameter("position_step_m", "step of the positions, if any", "m", 0.0, 0.005, 1e-4),
-        Parameter("force_step_n", "step of the forces, if any", "N", 0.0, 1.0, 0.04),
+        Parameter("position_step_m", "step of the positions, if any", "m", 0.0, 0.005, 1e-4, follows="position"),
+        Parameter("force_step_n", "step of the forces, if any", "N", 0.0, 1.0, 0.04, follows="force"),
     )
     order = 10
 

@@ -28,13 +28,15 @@ class RateLimit(Effect):
             null=np.inf,
             logarithmic=True,
             trials=(0.004, 0.01, 0.025, 0.06, 0.15, 0.4),
+            follows="position",
         ),
     )
     order = 2
 
+    def start(self) -> None:
+        self._held = np.zeros((len(self.values), self.motors))
+
     def reset(self, which: np.ndarray) -> None:
-        if not hasattr(self, "_held"):
-            self._held = np.zeros((len(self.values), 2))
         self._held[which] = np.nan
 
     def command(self, command: np.ndarray, fresh: np.ndarray) -> np.ndarray:

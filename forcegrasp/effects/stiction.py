@@ -21,12 +21,14 @@ class Stiction(Effect):
     look_alikes = ("coulomb_friction", "command_deadband", "backlash")
     separates = "slow ramps: stick and slip instead of steady sliding"
     parameters = (
-        Parameter("breakaway_n", "breakaway force F_s", "N", 0.0, 0.5, 0.05, trials=(0.02, 0.06, 0.15)),
+        Parameter(
+            "breakaway_n", "breakaway force F_s", "N", 0.0, 0.5, 0.05, trials=(0.02, 0.06, 0.15), follows="effort"
+        ),
         Parameter("kinetic_share", "share r that is left while sliding", "1", 0.0, 1.0, 0.4, null=0.4, trials=(0.4,)),
     )
     order = 1
 
     def act(self) -> None:
         share = self["kinetic_share"]
-        stuck = np.exp(-((self.velocity / STRIBECK_M_S) ** 2))
-        self.plant.friction_n[self.rows] += self["breakaway_n"] * (share + (1 - share) * stuck)
+        stuck = np.exp(-((self.velocity / (STRIBECK_M_S * self.position_scale)) ** 2))
+        self.plant.friction[self.rows] += self["breakaway_n"] * (share + (1 - share) * stuck)

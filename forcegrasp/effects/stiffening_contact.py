@@ -24,17 +24,18 @@ class StiffeningContact(Effect):
     separates = "slow ramps to high force on soft objects"
     parameters = (
         Parameter("extra_power", "Δp, added to the scene's power", "1", 0.0, 8.0, 1.5),
-        Parameter("cubic_n", "force F₁ of the spring at a depth δ of 1 mm", "N", 0.0, 5.0, 0.05),
+        Parameter("cubic_n", "force F₁ of the spring at a depth δ of 1 mm", "N", 0.0, 5.0, 0.05, follows="force"),
     )
 
     @classmethod
     def trials(cls) -> np.ndarray:
         return np.array([[0.5, 0.0], [2.0, 0.0], [5.0, 0.0], [0.0, 0.01], [0.0, 0.04], [0.0, 0.15]])
 
+    def start(self) -> None:
+        self._touch, self._push = Touch(len(self.values)), np.zeros((len(self.values), 2))
+        self._strongest = np.full((len(self.values), 2), np.inf)
+
     def reset(self, which: np.ndarray) -> None:
-        if not hasattr(self, "_touch"):
-            self._touch, self._push = Touch(len(self.values)), np.zeros((len(self.values), 2))
-            self._strongest = np.full((len(self.values), 2), np.inf)
         self._touch.reset(which)
         self._push[which] = 0.0
 
@@ -43,8 +44,7 @@ class StiffeningContact(Effect):
         for geom in plant.object_geoms:
             solimp[rows, geom, 4] += self["extra_power"][which, 0]
         # no motor can press harder; a long time step that overshoots must not be thrown back with more
-        gain = plant.field("actuator_gainprm")[rows][:, plant.actuators, 0]
-        self._strongest[which] = gain * plant.gripper.open_m
+        self._strongest[which] = plant.strongest_press(rows)
 
     def act(self) -> None:
         depth = np.maximum(self._touch.depth(self.plant, self.rows, self.pad_force), 0.0)

@@ -29,6 +29,8 @@ class Touch:
           force: forces of the contact itself, newtons, ``(rows, 2)``.
         """
         # how far a pad stands from the object's middle; the right finger stands on its positive side
-        reach = plant.position[rows] + plant.pad_shift_m[rows] + plant.object_position[rows, None] * np.array([1, -1])
+        reach = (
+            plant.pad_position[rows] + plant.pad_shift_m[rows] + plant.object_position[rows, None] * np.array([1, -1])
+        )
         self._surface = np.where((force > 0) & np.isinf(self._surface), reach, self._surface)
         return self._surface - reach

@@ -19,7 +19,9 @@ class ViscoelasticContact(Effect):
     look_alikes = ("finger_compliance", "force_drift", "force_lag")
     separates = "long holds: force and position relax together, and only in contact"
     parameters = (
-        Parameter("stiffness_n_m", "stiffness k of the branch", "N/m", 0.0, 2000.0, 80.0, trials=(20.0, 80.0)),
+        Parameter(
+            "stiffness_n_m", "stiffness k of the branch", "N/m", 0.0, 2000.0, 80.0, trials=(20.0, 80.0), follows="force"
+        ),
         Parameter(
             "time_constant_s",
             "time constant τ",
@@ -34,9 +36,10 @@ class ViscoelasticContact(Effect):
     )
     order = 1
 
+    def start(self) -> None:
+        self._touch, self._relaxed, self._push = Touch(len(self.values)), *np.zeros((2, len(self.values), 2))
+
     def reset(self, which: np.ndarray) -> None:
-        if not hasattr(self, "_touch"):
-            self._touch, self._relaxed, self._push = Touch(len(self.values)), *np.zeros((2, len(self.values), 2))
         self._touch.reset(which)
         self._relaxed[which] = self._push[which] = 0.0
 

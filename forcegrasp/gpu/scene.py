@@ -12,7 +12,7 @@ import warp as wp
 from torch import Tensor
 
 from forcegrasp.gpu.floor import GAP_M, exact_contacts
-from forcegrasp.physics.gripper import load_gripper
+from forcegrasp.physics.gripper_file import load_gripper
 from forcegrasp.physics.inertia import inertia_of_radius
 from forcegrasp.physics.model import CONTROL_PERIOD_S
 from forcegrasp.physics.parameters import GraspParameters

@@ -13,7 +13,8 @@ from forcegrasp.errors import ConfigError, closest
 from forcegrasp.measure.plans import PERIOD_S, SAMPLES, make_plan
 from forcegrasp.measure.replay import EffectOn, Replay
 from forcegrasp.measure.schema import MeasuredGrasp, MeasurementSet, fingerprint_of_set
-from forcegrasp.physics.gripper import BaseParameter, Gripper
+from forcegrasp.physics.gripper import Gripper
+from forcegrasp.physics.gripper_parts import BaseParameter
 
 # Objects' radii, as shares of the open finger's position: both fingers reach them, and they fit in.
 _RADII = (0.4, 0.75)
@@ -64,13 +65,13 @@ def record(
         if p.scope == "gripper"
     }
     of_objects = {p.name: _draw(p, objects, rng) for p in parameters if p.scope == "object" and p.name != "radius_m"}
-    radii = rng.uniform(*_RADII, objects) * gripper.open_m
-    planned = make_plan(plan, radii, grasps, gripper.open_m, rng)
+    radii = rng.uniform(*_RADII, objects) * gripper.stroke
+    planned = make_plan(plan, radii, grasps, gripper.stroke, rng)
     thing = np.array([p.object for p in planned])
     base = {name: np.full(grasps, value) for name, value in of_gripper.items()}
     base |= {name: values[thing] for name, values in of_objects.items()}
     base |= {"radius_m": radii[thing], "offset_m": np.array([p.offset_m for p in planned])}
-    time, rest = np.arange(SAMPLES) * PERIOD_S, np.full((SAMPLES, 2), gripper.open_m)
+    time, rest = np.arange(SAMPLES) * PERIOD_S, np.full((SAMPLES, 2), gripper.stroke)
     bare = [
         MeasuredGrasp(
             f"g{index:03}", f"object_{p.object + 1}", "simulated", float(radii[p.object]), p.offset_m, None,

@@ -98,7 +98,7 @@ class Replay:
             self._fresh[start, index] = True
         #: Motions of all grasps that may be asked for again, by what was simulated; see :meth:`remember`.
         self.remembered: dict[bytes, Motion] = {}
-        self.start_m = np.stack([start_position(g, gripper.open_m) for g in self.grasps])
+        self.start_m = np.stack([start_position(g, gripper.stroke) for g in self.grasps])
 
     def remember(self, key: bytes, motion: Motion, rows: np.ndarray) -> None:
         """Keeps these rows of a motion under a name; the ones kept longest ago are forgotten."""

@@ -6,13 +6,12 @@ engine's time. The step is up to four times as large, and what a larger step doe
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import mujoco
 import numpy as np
 
-if TYPE_CHECKING:
-    from forcegrasp.physics.gripper import Gripper
+from forcegrasp.physics.gripper_parts import Motor
 
 #: Name of the sphere, after that of the object's geom.
 SPHERE = "{}_pads"
@@ -25,24 +24,28 @@ _LARGEST_PHASE = 0.05
 _AT_REST, _SETTLING_S = 1e-3, 0.5
 
 
-def compile_fast(spec: mujoco.MjSpec, gripper: Gripper, largest: int = 4) -> mujoco.MjModel:
+def compile_fast(
+    spec: mujoco.MjSpec, motors: Sequence[Motor], object_geom: str, axis: int, largest: int = 4
+) -> mujoco.MjModel:
     """Returns the fast model of a scene, whose spec is changed.
 
     Args:
       spec: the scene.
-      gripper: its description.
+      motors: its servos.
+      object_geom: the object.
+      axis: of the grasp: 0, 1, 2 for x, y, z.
       largest: how many times as large the step may be, a power of 2.
 
     Raises:
       ValueError: if MuJoCo refuses the scene.
     """
     reference = spec.compile()
-    _touch_a_sphere(spec, reference, gripper)
+    _touch_a_sphere(spec, reference, object_geom, axis)
     model = spec.compile()
-    fingers = [model.actuator(name).id for name in gripper.actuators]
-    dofs = [model.joint(name).dofadr[0] for name in gripper.joints]
-    stiffness = model.actuator_gainprm[fingers, 0]
-    factor = _step_factor(model, gripper, stiffness / reference.dof_M0[dofs], largest)
+    drives = [model.actuator(motor.actuator).id for motor in motors]
+    dofs = [model.joint(motor.joint).dofadr[0] for motor in motors]
+    stiffness = model.actuator_gainprm[drives, 0]
+    factor = _step_factor(model, object_geom, stiffness / reference.dof_M0[dofs], largest)
     larger = (factor - 1) * model.opt.timestep
     model.opt.timestep *= factor
     # A step applies a command to all of it, on average half a step early. What the servo gains by that, stiffness
@@ -51,8 +54,8 @@ def compile_fast(spec: mujoco.MjSpec, gripper: Gripper, largest: int = 4) -> muj
     return model
 
 
-def _step_factor(model: mujoco.MjModel, gripper: Gripper, frequency_squared: np.ndarray, largest: int) -> int:
-    constant, _ = model.geom(gripper.object_geom).solref
+def _step_factor(model: mujoco.MjModel, object_geom: str, frequency_squared: np.ndarray, largest: int) -> int:
+    constant, _ = model.geom(object_geom).solref
     factor = largest
     while factor > 1:
         step = factor * model.opt.timestep
@@ -62,15 +65,15 @@ def _step_factor(model: mujoco.MjModel, gripper: Gripper, frequency_squared: np.
     return factor
 
 
-def _touch_a_sphere(spec: mujoco.MjSpec, reference: mujoco.MjModel, gripper: Gripper) -> None:
-    real = spec.geom(gripper.object_geom)
+def _touch_a_sphere(spec: mujoco.MjSpec, reference: mujoco.MjModel, object_geom: str, axis: int) -> None:
+    real = spec.geom(object_geom)
     for ground in (real, *spec.worldbody.geoms):
         ground.contype, ground.conaffinity = _GROUND, _GROUND
     sphere = real.parent.add_geom(
-        name=SPHERE.format(gripper.object_geom),
+        name=SPHERE.format(object_geom),
         type=mujoco.mjtGeom.mjGEOM_SPHERE,
-        size=[real.size[gripper.axis if real.type == mujoco.mjtGeom.mjGEOM_BOX else 0], 0, 0],
-        pos=real.pos - _sinks(reference, gripper),
+        size=[real.size[axis if real.type == mujoco.mjtGeom.mjGEOM_BOX else 0], 0, 0],
+        pos=real.pos - _sinks(reference, object_geom),
         mass=0,
         contype=_PADS,
         conaffinity=_PADS,
@@ -80,7 +83,7 @@ def _touch_a_sphere(spec: mujoco.MjSpec, reference: mujoco.MjModel, gripper: Gri
         setattr(sphere, name, getattr(real, name))
 
 
-def _sinks(reference: mujoco.MjModel, gripper: Gripper) -> np.ndarray:
+def _sinks(reference: mujoco.MjModel, object_geom: str) -> np.ndarray:
     """How far an object sinks into soft ground, in its own frame, metres, ``(3,)``; 0 if it doesn't come to rest.
 
     Along a cylinder that makes no difference to the pads; a sphere has to stay between them.
@@ -89,7 +92,7 @@ def _sinks(reference: mujoco.MjModel, gripper: Gripper) -> np.ndarray:
     if reference.nkey:
         mujoco.mj_resetDataKeyframe(reference, data, 0)
     mujoco.mj_forward(reference, data)
-    body = reference.geom(gripper.object_geom).bodyid[0]
+    body = reference.geom(object_geom).bodyid[0]
     before, turned = data.xpos[body].copy(), data.xmat[body].reshape(3, 3).copy()
     mujoco.mj_step(reference, data, round(_SETTLING_S / reference.opt.timestep))
     first, count = reference.body_dofadr[body], reference.body_dofnum[body]

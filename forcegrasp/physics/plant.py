@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import mujoco
@@ -12,8 +13,10 @@ from mujoco.batch import Batch
 
 from forcegrasp.physics import guard
 from forcegrasp.physics.fast import SPHERE
-from forcegrasp.physics.gripper import BaseParameter, Gripper
+from forcegrasp.physics.gripper import SIDES, Gripper, own_sensor
+from forcegrasp.physics.gripper_parts import BaseParameter, Finger
 from forcegrasp.physics.inertia import inertia_of_radius
+from forcegrasp.physics.opening import command_law
 
 if TYPE_CHECKING:
     from forcegrasp.effects.base import Effect
@@ -60,53 +63,67 @@ class Plant:
         self._prepare(model)
         self.batch = batch = Batch(model, n, threads)
         self._qpos, self._ctrl, self._sensors = (batch.bind(name) for name in ("qpos", "ctrl", "sensordata"))
-        joints = [model.joint(name) for name in gripper.joints]
-        #: degrees of freedom of the fingers (left, right) and of the object along the grasp axis
-        self.finger_dofs = [joint.dofadr[0] for joint in joints]
-        thing = model.joint(gripper.object_joint)
-        is_free = thing.type[0] == mujoco.mjtJoint.mjJNT_FREE
-        self._object_qpos = thing.qposadr[0] + (gripper.axis if is_free else 0)
+        self.motors, self.channels = len(gripper.motors), len(gripper.forces)  #: how many there are
+        joints = [model.joint(motor.joint) for motor in gripper.motors]
+        #: degrees of freedom of the motors (left, right, or the one), and of the object along the grasp axis
+        self.motor_dofs = [joint.dofadr[0] for joint in joints]
+        object_joint = model.joint(gripper.object_joint)
+        is_free = object_joint.type[0] == mujoco.mjtJoint.mjJNT_FREE
+        self._object_qpos = object_joint.qposadr[0] + (gripper.axis if is_free else 0)
         self._object_origin = model.qpos0[self._object_qpos]  # the middle of the grasp is where the scene puts it
-        self.object_dof = thing.dofadr[0] + (gripper.axis if is_free else 0)
-        self.actuators = [model.actuator(name).id for name in gripper.actuators]
-        # where fingers stand in the engine's arrays: slices, for they are read and written in every step
-        self._finger_q = _pair(*(joint.qposadr[0] for joint in joints))
-        self._finger_v, self._drives = _pair(*self.finger_dofs), _pair(*self.actuators)
-        self._finger_velocity = batch.bind("qvel")[:, self._finger_v]
+        self.object_dof = object_joint.dofadr[0] + (gripper.axis if is_free else 0)
+        #: degrees of freedom of everything but the object
+        self.gripper_dofs = [i for i in range(model.nv) if model.dof_jntid[i] != object_joint.id]
+        self.actuators = [model.actuator(motor.actuator).id for motor in gripper.motors]
+        # where motors stand in the engine's arrays: slices, for they are read and written in every step
+        self._motor_q = _slice(*(joint.qposadr[0] for joint in joints))
+        self._motor_v, self._drives = _slice(*self.motor_dofs), _slice(*self.actuators)
+        self._motor_velocity = batch.bind("qvel")[:, self._motor_v]
         self._object_body = model.geom(gripper.object_geom).bodyid[0]
         #: geoms of the object
         self.object_geoms = np.flatnonzero(model.geom_bodyid == self._object_body)
-        #: What moves with a finger's pads, in the frame of the finger's body: field of positions → indices.
-        self._pads = [
-            {
-                "geom_pos": np.flatnonzero(model.geom_bodyid == joint.bodyid[0]),
-                "site_pos": np.flatnonzero(model.site_bodyid == joint.bodyid[0]),
-                "body_pos": np.flatnonzero(model.body_parentid == joint.bodyid[0]),
-            }
-            for joint in joints
-        ]
-        self._readings = [slice(s.adr[0], s.adr[0] + s.dim[0]) for s in map(model.sensor, gripper.force_sensors)]
-        self._sign = 1.0 if gripper.open > gripper.closed else -1.0
-        self._origin = gripper.closed
+        self._pads = [_Pads.find(model, finger.body) for finger in gripper.fingers]
+        self._signs = np.array([motor.sign for motor in gripper.motors])
+        self._origins = np.array([motor.closed for motor in gripper.motors])
+        self._command_scale, self._command_zero = command_law(gripper.motors, model)
+        #: Which motor moves each side, and how far its pads go per unit of it; 0 for a side that stands still.
+        self._mover = np.array([max(finger.motor, 0) for finger in gripper.fingers])
+        self.travel = np.where([f.motor >= 0 for f in gripper.fingers], gripper.opening.travel, 0.0)
+        self._readings = [_reading(model, *pair) for pair in zip(SIDES, gripper.fingers, strict=True)]
+        self._efforts = self._effort_readings(model)
+        self._felt = [i for i, finger in enumerate(gripper.fingers) if finger.force_sensor]
         self._fields: dict[str, np.ndarray] = {}
         self._base: dict[str, np.ndarray] = {}
-        self._rubbing: np.ndarray | None = None  # which fingers' friction was stiffened, ``(n, 2)``
+        self._friction_active: np.ndarray | None = None  # which motors' friction was stiffened, ``(n, motors)``
         self._effects: list[Effect] = []
         self._hooked: dict[str, list[Effect]] = {}
         self.force_scale = np.ones(n)  #: f_α, factor from the force sensors to the reading, ``(n,)``
-        #: What effects add to in each step: friction on the fingers, displacement of the pads towards opening, forces
-        #: on the fingers (positive opens) and on the object; ``(n, 2)`` and ``(n,)``.
-        self.friction_n, self.pad_shift_m, self.finger_push_n = (np.zeros((n, 2)) for _ in range(3))
+        #: What effects add to in each step: friction of the motors ``(n, motors)``, displacement of the pads towards
+        #: opening (metres) and forces on them (newtons, positive opens), ``(n, 2)``, and forces on the object ``(n,)``.
+        self.friction = np.zeros((n, self.motors))
+        self.pad_shift_m, self.finger_push_n = np.zeros((2, n, 2))
         self.object_push_n = np.zeros(n)
-        self.position = np.zeros((n, 2))  #: finger positions (left, right), metres; 0 is closed
-        #: Sum of each finger's force sensor at the last physics step, before f_α, newtons, ``(n, 2)``.
+        self.position = np.zeros((n, self.motors))  #: of the motors (left, right, or the one), m or rad; 0 is closed
+        #: Sum of each finger's contact forces at the last physics step, before f_α, newtons, ``(n, 2)``.
         self.pad_force = np.zeros((n, 2))
         #: True fingertip forces (left, right): the interaction with the object times f_α, newtons, ``(n, 2)``.
         self.force = np.zeros((n, 2))
-        self.measured_force = np.zeros((n, 2))  #: what the force sensors say, newtons
-        self.measured_position = np.zeros((n, 2))  #: what the encoders say, metres
-        #: What the encoders said when a real gripper was recorded, metres, ``(n, 2)``; None if only simulated.
+        self.measured_force = np.zeros((n, self.channels))  #: what the force sensors say, newtons
+        self.measured_position = np.zeros((n, self.motors))  #: what the encoders say, m or rad
+        #: What the encoders said when a real gripper was recorded, m or rad, ``(n, motors)``; None if only simulated.
         self.recorded_position: np.ndarray | None = None
+
+    def _effort_readings(self, model: mujoco.MjModel) -> tuple[list[int], np.ndarray]:
+        """Where the motors' efforts are read, and the fingertip newtons of each, pressing positive, per unit of it."""
+        if self.gripper.force != "motor":
+            return [], np.empty(0)
+        addresses = [model.sensor(own_sensor(motor.actuator)).adr[0] for motor in self.gripper.motors]
+        factors = np.empty(self.motors)
+        for index, motor in enumerate(self.gripper.motors):
+            drive = model.actuator(motor.actuator)
+            length_per_position = self._command_scale[index] * drive.gainprm[0] / -drive.biasprm[1]
+            factors[index] = -length_per_position / self.travel[self._moved_by(index)].sum()
+        return addresses, factors
 
     def _prepare(self, model: mujoco.MjModel) -> None:
         """Undoes the compiler's shortcuts past fields that effects change; what is simulated stays the same."""
@@ -117,7 +134,7 @@ class Plant:
             frames.mjSAMEFRAME_BODY.value: frames.mjSAMEFRAME_BODYROT.value,
             frames.mjSAMEFRAME_INERTIA.value: frames.mjSAMEFRAME_INERTIAROT.value,
         }
-        bodies = [model.joint(name).bodyid[0] for name in self.gripper.joints]
+        bodies = [model.body(finger.body).id for finger in self.gripper.fingers]
         #: Pads in the very frame of their body, whose own position would not be read: field, index, what it must be.
         self._pad_frames = [
             (f"{kind}_sameframe", index, only_rotation[same])
@@ -127,8 +144,8 @@ class Plant:
             )
             if body in bodies and same in only_rotation
         ]
-        for name in self.gripper.actuators:  # without a limit, a range would not be read
-            actuator = model.actuator(name).id
+        for motor in self.gripper.motors:  # without a limit, a range would not be read
+            actuator = model.actuator(motor.actuator).id
             if not model.actuator_forcelimited[actuator]:
                 model.actuator_forcelimited[actuator] = 1
                 model.actuator_forcerange[actuator] = -np.inf, np.inf
@@ -137,13 +154,40 @@ class Plant:
 
     @property
     def velocity(self) -> np.ndarray:
-        """Finger velocities, m/s, ``(n, 2)``; positive opens."""
-        return self._finger_velocity * self._sign
+        """Velocities of the motors, m/s or rad/s, ``(n, motors)``; positive opens."""
+        return self._motor_velocity * self._signs
+
+    @property
+    def pad_position(self) -> np.ndarray:
+        """How far each side's pads stand from where they are when closed, metres, ``(n, 2)``; 0 if they never move."""
+        return self.to_sides(self.position)
+
+    def to_sides(self, of_motors: np.ndarray) -> np.ndarray:
+        """Displacements of motors ``(..., motors)`` as displacements of the pads they move, metres, ``(..., 2)``."""
+        return of_motors if self.gripper.is_direct else of_motors[..., self._mover] * self.travel
 
     @property
     def object_position(self) -> np.ndarray:
         """Object position along the grasp axis from where the scene puts it, metres, ``(n,)``."""
         return self._qpos[:, self._object_qpos] - self._object_origin
+
+    def presses(self, rows: np.ndarray) -> np.ndarray:
+        """Which motors' pads an object pushes against, ``(len(rows), motors)``."""
+        touched = self.pad_force[rows] > 0
+        if self.gripper.is_direct:
+            return touched
+        return np.stack([touched[:, self._moved_by(motor)].any(axis=1) for motor in range(self.motors)], axis=1)
+
+    def strongest_press(self, rows: np.ndarray) -> np.ndarray:
+        """Most that each side could be pressed with: its servo at full stroke, newtons, ``(len(rows), 2)``."""
+        gain = self.field("actuator_gainprm")[rows][:, self.actuators, 0]
+        if self.gripper.is_direct:
+            return gain * self.gripper.stroke
+        reach = [self.travel[self._moved_by(motor)].sum() for motor in range(self.motors)]
+        return (gain * self.gripper.stroke / reach)[:, self._mover]
+
+    def _moved_by(self, motor: int) -> np.ndarray:
+        return (self._mover == motor) & (self.travel != 0)
 
     # --- parameters ----------------------------------------------------------------------------------------------
 
@@ -161,7 +205,7 @@ class Plant:
 
     def write(self, parameter: BaseParameter, ids: np.ndarray, values: np.ndarray) -> None:
         """Writes a base parameter of these rows into the fields that follow it. ``values``: ``(len(ids),)``."""
-        rows = {"actuator": self.actuators, "dof": self.finger_dofs, "geom": self.object_geoms}
+        rows = {"actuator": self.actuators, "dof": self.gripper_dofs, "geom": self.object_geoms}
         for write in parameter.writes:
             for row in rows[write.field.split("_")[0]]:
                 column = () if write.column is None else (write.column,)
@@ -203,17 +247,17 @@ class Plant:
         hooks = ("change_model", "command", "act", "interaction", "read_force", "read_position")
         self._hooked = {hook: [e for e in self._effects if hook in e.hooks()] for hook in hooks}
 
-    def reset(self, ids: np.ndarray, offset_m: np.ndarray, position_m: np.ndarray | None = None) -> None:
+    def reset(self, ids: np.ndarray, offset_m: np.ndarray, position: np.ndarray | None = None) -> None:
         """Starts grasps anew, after their parameters were written.
 
         Args:
           ids: the rows, ascending.
           offset_m: where their objects stand along the grasp axis, ``(len(ids),)``.
-          position_m: where the fingers stand, ``(len(ids), 2)``; as in the scene by default.
+          position: where the motors stand, m or rad, ``(len(ids), motors)``; as in the scene by default.
         """
         for name, field in self._fields.items():  # whatever effects made of it
             field[ids] = self._base[name][ids]
-        self._rubbing = None
+        self._friction_active = None
         for effect in self._effects:
             which = np.flatnonzero(np.isin(effect.rows, ids))
             effect.reset(which)
@@ -224,9 +268,9 @@ class Plant:
             self.batch.expand(name)[ids, index] = frame
         keyframe = {"keyframe": 0} if self.model.nkey else {}
         self.batch.reset(ids, stage=mujoco.mjtStage.mjSTAGE_NONE.value, **keyframe)
+        if position is not None:
+            self._place(ids, position)
         self._qpos[ids, self._object_qpos] = self._object_origin + offset_m
-        if position_m is not None:
-            self._qpos[ids, self._finger_q] = position_m * self._sign + self._origin
         self.batch.forward(ids)
         for effect in self._effects:  # all rows are read, but only these anew
             effect.new_reading[:] = np.isin(effect.rows, ids)[:, None]
@@ -234,50 +278,72 @@ class Plant:
         for effect in self._effects:
             effect.new_reading[:] = True
 
+    def _place(self, ids: np.ndarray, position: np.ndarray) -> None:
+        """Puts motors somewhere, and with them whatever they move."""
+        law = self.gripper.opening
+        for dof in self.gripper_dofs if law.qpos.size else ():
+            address = self.model.jnt_qposadr[self.model.dof_jntid[dof]]
+            mover = self._mover[1] if dof in self._dofs_of_right else self._mover[0]
+            self._qpos[ids, address] = np.interp(position[:, mover], law.position, law.qpos[:, address])
+        self._qpos[ids, self._motor_q] = position * self._signs + self._origins
+
+    @functools.cached_property
+    def _dofs_of_right(self) -> set[int]:
+        """Degrees of freedom between the world and the right side's pads."""
+        found: set[int] = set()
+        body = int(self.model.body(self.gripper.fingers[1].body).id)
+        while body:
+            first = int(self.model.body_dofadr[body])
+            found |= set(range(first, first + int(self.model.body_dofnum[body]))) if first >= 0 else set()
+            body = int(self.model.body_parentid[body])
+        return found
+
     # --- time ----------------------------------------------------------------------------------------------------
 
-    def advance(self, command_m: np.ndarray, steps: int = 1, fresh: np.ndarray | bool = True) -> None:
+    def advance(self, command: np.ndarray, steps: int = 1, fresh: np.ndarray | bool = True) -> None:
         """Holds a command for some physics steps.
 
         Args:
-          command_m: commanded positions, metres, ``(n, 2)``.
+          command: commanded positions, m or rad, ``(n, motors)``.
           steps: number of physics steps.
           fresh: whether the command is a new one, ``(n,)`` or for all.
         """
         if not self._effects:
-            self._send(command_m)
+            self._send(command)
             self.batch.step(nstep=steps)
             self._read()
             return
         fresh = np.broadcast_to(fresh, (self.n,))
         for _ in range(steps):
-            self._send(self._through_command(command_m, fresh))
+            self._send(self._through_command(command, fresh))
             self._apply_actions()
             self.batch.step(nstep=1)
             self._read()
             fresh = np.zeros(self.n, bool)
 
-    def play(self, commands_m: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def play(self, commands: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Holds each command for one physics step, as :meth:`advance` does, in one call of the engine.
 
         Afterwards only a reset makes sense: what is read is not brought up to date.
 
         Args:
-          commands_m: commanded positions, metres, ``(n, steps, 2)``.
+          commands: commanded positions, m or rad, ``(n, steps, motors)``.
 
         Returns:
-          Finger positions and forces after each step, ``(n, steps, 2)``, and object positions, ``(n, steps)``.
+          Positions ``(n, steps, motors)``, force readings ``(n, steps, channels)`` and object positions ``(n, steps)``
+          after each step.
 
         Raises:
           RuntimeError: if there are effects that act in every step; see :attr:`acts_in_steps`.
         """
         if self.acts_in_steps:
             raise RuntimeError("effects act in every step: advance step by step")
-        control = np.repeat(self._ctrl[:, None], commands_m.shape[1], axis=1)
-        control[..., self._drives] = commands_m * self._sign + self._origin
-        record = self.batch.rollout(commands_m.shape[1], control, record=["qpos", "sensordata"])
-        force = self._pads_of(record["sensordata"]) * self.force_scale[:, None, None]
-        return self._fingers_of(record["qpos"]), force, record["qpos"][..., self._object_qpos] - self._object_origin
+        control = np.repeat(self._ctrl[:, None], commands.shape[1], axis=1)
+        control[..., self._drives] = commands * self._command_scale + self._command_zero
+        record = self.batch.rollout(commands.shape[1], control, record=["qpos", "sensordata"])
+        sensors, scale = record["sensordata"], self.force_scale[:, None, None]
+        force = self._channels_of(sensors, self._pads_of(sensors) * scale, scale)
+        return self._motors_of(record["qpos"]), force, record["qpos"][..., self._object_qpos] - self._object_origin
 
     @property
     def acts_in_steps(self) -> bool:
@@ -288,22 +354,29 @@ class Plant:
         """MuJoCo's warning counters, ``(n, kinds)``; all 0 in a sound simulation."""
         return self.batch.warning[..., 1]
 
-    def _fingers_of(self, qpos: np.ndarray) -> np.ndarray:
-        return (qpos[..., self._finger_q] - self._origin) * self._sign
+    def _motors_of(self, qpos: np.ndarray) -> np.ndarray:
+        return (qpos[..., self._motor_q] - self._origins) * self._signs
+
+    def _channels_of(self, sensors: np.ndarray, force: np.ndarray, scale: np.ndarray) -> np.ndarray:
+        """What the force channels transduce, newtons, ``(..., channels)``: forces of fingers, or efforts of motors."""
+        addresses, factors = self._efforts
+        if addresses:
+            return sensors[..., addresses] * factors * scale
+        return force.copy() if len(self._felt) == 2 else force[..., self._felt]
 
     def _pads_of(self, sensors: np.ndarray) -> np.ndarray:
         # contiguous, lest the order of the sum depend on n
         sums = [np.ascontiguousarray(sensors[..., part]).sum(axis=-1) for part in self._readings]
         return np.stack(sums, axis=-1)
 
-    def _send(self, command_m: np.ndarray) -> None:
-        self._ctrl[:, self._drives] = command_m * self._sign + self._origin
+    def _send(self, command: np.ndarray) -> None:
+        self._ctrl[:, self._drives] = command * self._command_scale + self._command_zero
 
-    def _through_command(self, command_m: np.ndarray, fresh: np.ndarray) -> np.ndarray:
+    def _through_command(self, command: np.ndarray, fresh: np.ndarray) -> np.ndarray:
         effects = self._hooked["command"]
         if not effects:
-            return command_m
-        command = np.array(command_m, float)
+            return command
+        command = np.array(command, float)
         for effect in effects:
             command[effect.rows] = effect.command(command[effect.rows], fresh[effect.rows])
         return command
@@ -312,25 +385,32 @@ class Plant:
         effects = self._hooked["act"]
         if not effects:
             return
-        for total in (self.friction_n, self.pad_shift_m, self.finger_push_n, self.object_push_n):
+        for total in (self.friction, self.pad_shift_m, self.finger_push_n, self.object_push_n):
             total[:] = 0
         for effect in effects:
             effect.act()
         self._write_friction()
         self._write_pad_shift()
         push = self.batch.bind("qfrc_applied")
-        push[:, self._finger_v] = self.finger_push_n * self._sign
+        push[:, self._motor_v] = self._to_motors(self.finger_push_n) * self._signs
         push[:, self.object_dof] = self.object_push_n
 
+    def _to_motors(self, push_n: np.ndarray) -> np.ndarray:
+        """Forces on the pads as what they do to the motors that move them, N or N·m, ``(n, motors)``."""
+        if self.gripper.is_direct:
+            return push_n
+        work = push_n * self.travel
+        return np.stack([work[:, self._moved_by(motor)].sum(axis=1) for motor in range(self.motors)], axis=1)
+
     def _write_friction(self) -> None:
-        if not self.friction_n.any() and "dof_frictionloss" not in self._fields:
+        if not self.friction.any() and "dof_frictionloss" not in self._fields:
             return
-        base = self.base("dof_frictionloss")[:, self._finger_v]
-        loss = self.field("dof_frictionloss")[:, self._finger_v] = base + self.friction_n
-        rubbing = loss > base
-        if self._rubbing is None or not np.array_equal(rubbing, self._rubbing):
-            self._rubbing = rubbing
-            for dof in self.finger_dofs:
+        base = self.base("dof_frictionloss")[:, self._motor_v]
+        loss = self.field("dof_frictionloss")[:, self._motor_v] = base + self.friction
+        active = loss > base
+        if self._friction_active is None or not np.array_equal(active, self._friction_active):
+            self._friction_active = active
+            for dof in self.motor_dofs:
                 self.stiffen_friction(dof)
 
     def stiffen_friction(self, dof: int, rows: np.ndarray | slice = slice(None)) -> None:
@@ -342,27 +422,62 @@ class Plant:
     def _write_pad_shift(self) -> None:
         if not self.pad_shift_m.any() and "geom_pos" not in self._fields:
             return
-        for side, name in enumerate(self.gripper.joints):
-            joint = self.model.joint(name)
-            shift = self.pad_shift_m[:, side : side + 1] * (self._sign * joint.axis)
-            for field, indices in self._pads[side].items():
+        for side, pads in enumerate(self._pads):
+            shift = self.pad_shift_m[:, side : side + 1] * self._outward(side)
+            for field, indices in pads.moved.items():
                 for index in indices:
                     self.field(field)[:, index] = getattr(self.model, field)[index] + shift
 
+    def _outward(self, side: int) -> np.ndarray:
+        """Direction in which a side's pads open, in the frame of their body, ``(3,)`` or ``(n, 3)``."""
+        finger = self.gripper.fingers[side]
+        if self.gripper.is_direct:
+            return self._signs[finger.motor] * self.model.joint(finger.joint).axis
+        turned = self.batch.bind("xmat")[:, self._pads[side].body].reshape(-1, 3, 3)
+        return turned[:, self.gripper.axis] * (-1.0, 1.0)[side]  # the world's axis, seen from the body
+
     def _read(self) -> None:
-        self.position, self.pad_force = self._fingers_of(self._qpos), self._pads_of(self._sensors)
+        self.position, self.pad_force = self._motors_of(self._qpos), self._pads_of(self._sensors)
         force = self.pad_force.copy()
         for effect in self._hooked.get("interaction", ()):
             force[effect.rows] = effect.interaction(force[effect.rows])
-        self.force = force * self.force_scale[:, None]
-        self.measured_force, self.measured_position = self.force.copy(), self.position.copy()
+        scale = self.force_scale[:, None]
+        self.force = force * scale
+        self.measured_force = self._channels_of(self._sensors, self.force, scale)
+        self.measured_position = self.position.copy()
         for hook, reading in (("read_force", self.measured_force), ("read_position", self.measured_position)):
             for effect in self._hooked.get(hook, ()):
                 reading[effect.rows] = getattr(effect, hook)(reading[effect.rows])
 
 
-def _pair(one: int, other: int) -> slice:
-    """The slice that holds these two indices, in this order."""
+@dataclass(frozen=True)
+class _Pads:
+    """What moves with a side's pads, in the frame of their body."""
+
+    body: int
+    moved: dict[str, np.ndarray]  #: field of positions → indices
+
+    @classmethod
+    def find(cls, model: mujoco.MjModel, name: str) -> _Pads:
+        body = int(model.body(name).id)
+        moved = {
+            "geom_pos": np.flatnonzero(model.geom_bodyid == body),
+            "site_pos": np.flatnonzero(model.site_bodyid == body),
+            "body_pos": np.flatnonzero(model.body_parentid == body),
+        }
+        return cls(body, moved)
+
+
+def _reading(model: mujoco.MjModel, side: str, finger: Finger) -> slice:
+    """Where the numbers stand whose sum is a side's force; of sensors that were added, the normal forces alone."""
+    sensor = model.sensor(finger.force_sensor or own_sensor(side))
+    return slice(sensor.adr[0], sensor.adr[0] + sensor.dim[0], 1 if finger.force_sensor else 3)
+
+
+def _slice(one: int, other: int | None = None) -> slice:
+    """The slice that holds these indices, in this order."""
+    if other is None:
+        return slice(int(one), int(one) + 1)
     step = int(other - one)
     end = int(other) + (1 if step > 0 else -1)
     return slice(int(one), None if end < 0 else end, step)

@@ -7,30 +7,41 @@ import dataclasses
 import numpy as np
 
 from forcegrasp.config import GraspConfig, check_deformation
-from forcegrasp.physics.parameters import MAX_FORCE_N, GraspParameters, force_scale_of_kappa
-
-#: Finger position when fully open, q_max. Metres (paper, Sec. 3).
-OPEN_M = 0.045
+from forcegrasp.physics.gripper import Gripper
+from forcegrasp.physics.parameters import GraspParameters
 
 
-def offset_limit_m(radius_m: np.ndarray | float, deformation_m: float) -> np.ndarray:
-    """Largest \\|o_y\\| that paper eqs. 1 and 2 allow an object of this radius. Metres, shape ``(n,)``.
+def offset_limits_m(
+    gripper: Gripper, radius_m: np.ndarray | float, deformation_m: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Where an object of this radius may stand along the grasp axis: lowest and highest o_y, metres, each ``(n,)``.
 
-    Eq. 1 keeps the object inside the open gripper, \\|o_y\\| + r < q_max; eq. 2 lets both fingers reach it,
-    r − d_p > \\|o_y\\|. Both are strict, hence the last bit taken off.
+    Eq. 1 of the paper keeps the object inside the open gripper, \\|o_y\\| + r < q_max; eq. 2 lets both fingers reach it,
+    r − d_p > \\|o_y\\|. Both are strict, hence the last bit taken off. A finger that stands still reaches nothing: the
+    object has to be beside it, and the other finger brings it there.
     """
-    return np.nextafter(np.minimum(OPEN_M - radius_m, radius_m - deformation_m), 0.0)
+    radius = np.asarray(radius_m, float)
+    left, right = gripper.opening.faces_m
+    reached = radius - deformation_m
+    moves = [finger.motor >= 0 for finger in gripper.fingers]
+    high = np.minimum(right - radius, reached) if moves[0] else right - radius
+    low = -np.minimum(left - radius, reached) if moves[1] else radius - left
+    return np.nextafter(low, np.inf), np.nextafter(high, -np.inf)
 
 
 class GraspSampler:
     """Draws grasps from the ranges of a :class:`GraspConfig`; the ranges may be changed between draws.
 
+    Args:
+      config: the ranges, complete: see :func:`~forcegrasp.physics.completion.complete`.
+      gripper: whose objects they are.
+
     Raises:
       ConfigError: if the smallest object could be squeezed flat (paper, eq. 3: d_p < r).
     """
 
-    def __init__(self, config: GraspConfig) -> None:
-        self.config = config
+    def __init__(self, config: GraspConfig, gripper: Gripper) -> None:
+        self.config, self.gripper = config, gripper
         self.set_ranges(config.radius_m, config.offset_m)
 
     def set_ranges(self, radius_m: list[float], offset_m: list[float]) -> None:
@@ -40,16 +51,16 @@ class GraspSampler:
 
     def __call__(self, rng: np.random.Generator, ids: np.ndarray) -> GraspParameters:
         """Draws one grasp for each of ``ids`` (which only give the number)."""
-        config, n = self.config, len(ids)
+        config, n, training = self.config, len(ids), self.gripper.training
         kappa = rng.uniform(*config.kappa, size=n)
         b2 = rng.uniform(*config.b2, size=n)
         radius = rng.uniform(*config.radius_m, size=n)
-        limit = offset_limit_m(radius, config.deformation_m)
-        bounds: list[np.ndarray] = [np.clip(bound, -limit, limit) for bound in config.offset_m]
+        lowest, highest = offset_limits_m(self.gripper, radius, config.deformation_m)
+        bounds: list[np.ndarray] = [np.clip(bound, lowest, highest) for bound in config.offset_m]
         offset = rng.uniform(bounds[0], bounds[1])
-        lowest = config.goal_force_min_n
-        highest = config.goal_force_max * MAX_FORCE_N * force_scale_of_kappa(kappa)
-        goal = rng.uniform(np.minimum(lowest, highest), highest)
+        smallest = config.goal_force_min_n
+        largest = config.goal_force_max * training.max_force_n * training.force_scale(kappa)
+        goal = rng.uniform(np.minimum(smallest, largest), largest)
         return GraspParameters(kappa, b2, radius, offset, goal)
 
 

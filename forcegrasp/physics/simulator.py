@@ -9,11 +9,9 @@ import mujoco
 import numpy as np
 
 from forcegrasp.physics import guard
-from forcegrasp.physics.gripper import load_gripper
-from forcegrasp.physics.model import CONTROL_PERIOD_S
+from forcegrasp.physics.gripper import Gripper
 from forcegrasp.physics.parameters import GraspParameters
 from forcegrasp.physics.plant import Plant, write_base
-from forcegrasp.physics.sampling import OPEN_M
 
 
 class Variation(Protocol):
@@ -29,11 +27,12 @@ class Variation(Protocol):
 
 
 class GraspSimulator:
-    """Simulates ``n`` grasps of TIAGo's gripper, each with its own parameters, 25 control steps per second.
+    """Simulates ``n`` grasps of a gripper, each with its own parameters, one control step at a time.
 
     Results do not depend on the number of threads, on ``n``, or on what a slot simulated before, to the last bit.
 
     Args:
+      gripper: what is simulated.
       n: number of grasps.
       tier: physics tier, ``"reference"`` or ``"fast"``, see :meth:`~forcegrasp.physics.gripper.Gripper.compile`.
       threads: threads of the engine; 0 uses every core.
@@ -43,15 +42,19 @@ class GraspSimulator:
       ConfigError: if there is no such tier.
     """
 
-    def __init__(self, n: int, tier: str = "reference", threads: int = 0, variation: Variation | None = None) -> None:
-        self.plant = plant = Plant(load_gripper("tiago"), n, tier, threads)
+    def __init__(
+        self, gripper: Gripper, n: int, tier: str = "reference", threads: int = 0, variation: Variation | None = None
+    ) -> None:
+        self.gripper = gripper
+        self.plant = plant = Plant(gripper, n, tier, threads)
         self.model = plant.model
         self.n = n
         self.steps = np.zeros(n, dtype=np.int64)  #: control steps since the grasp was reset, ``(n,)``
-        self.parameters = GraspParameters(*np.broadcast_to(np.array([[0.5], [-9.0], [0.025], [0.0], [0.1]]), (5, n)))
-        self.commanded_position = np.full((n, 2), OPEN_M)  #: q_des of the last step, metres, ``(n, 2)``
+        self.parameters = nominal_grasps(gripper, n)
+        #: q_des of the last step, m or rad, ``(n, motors)``
+        self.commanded_position = np.full((n, plant.motors), gripper.stroke)
         self.object_speed = np.zeros(n)  #: |o_y(t) − o_y(t−1)|, metres per control step, ``(n,)``
-        self._substeps = round(CONTROL_PERIOD_S / plant.dt)
+        self._substeps = max(1, round(gripper.period_s / plant.dt))
         self._variation = variation
         if variation is not None:
             variation.attach(plant)
@@ -59,7 +62,7 @@ class GraspSimulator:
 
     @property
     def joint_position(self) -> np.ndarray:
-        """Finger positions (left, right), metres, ``(n, 2)``; 0 is closed, 0.045 open."""
+        """Positions of the motors (left, right, or the one), m or rad, ``(n, motors)``; 0 is closed."""
         return self.plant.position.copy()
 
     @property
@@ -78,12 +81,12 @@ class GraspSimulator:
 
     @property
     def measured_position(self) -> np.ndarray:
-        """What the encoders say, before noise, metres, ``(n, 2)``; the positions themselves if nothing changes them."""
+        """What the encoders say, before noise, ``(n, motors)``; the positions themselves if nothing changes them."""
         return self.plant.measured_position
 
     @property
     def measured_force(self) -> np.ndarray:
-        """What the force sensors say, before noise, newtons, ``(n, 2)``; the true ones if nothing changes them."""
+        """What the force readings say, before noise, newtons, ``(n, channels)``."""
         return self.plant.measured_force
 
     def reset(
@@ -102,28 +105,23 @@ class GraspSimulator:
         if len(ids) == 0:
             return
         drawn = {} if self._variation is None else self._variation.draw(rng or np.random.default_rng(0), ids)
-        if "velocity_gain" in drawn:
-            parameters = dataclasses.replace(parameters, b2=drawn["velocity_gain"])
+        training = self.gripper.training
+        if training.servo_gain in drawn:
+            parameters = dataclasses.replace(parameters, b2=drawn[training.servo_gain])
         merged = self.parameters.as_array()
         merged[ids] = parameters.as_array()
         self.parameters = GraspParameters.from_array(merged)
-        base = drawn | {
-            "velocity_gain": parameters.b2,
-            "rho_m": parameters.rho_m,
-            "force_scale": parameters.force_scale,
-            "radius_m": parameters.radius_m,
-            "offset_m": parameters.offset_m,
-        }
+        base = drawn | base_parameters(self.gripper, parameters)
         self.plant.reset(ids, write_base(self.plant, ids, base))
-        self.commanded_position[ids] = OPEN_M
+        self.commanded_position[ids] = self.gripper.stroke
         self.object_speed[ids] = 0.0
         self.steps[ids] = 0
 
     def step(self, joint_delta: np.ndarray) -> None:
-        """Commands ``q_des = q + u`` to both fingers and simulates one control step (paper, eq. 4); q as read.
+        """Commands ``q_des = q + u`` to the motors and simulates one control step (paper, eq. 4); q as read.
 
         Args:
-          joint_delta: u = Δq_des, metres, ``(n, 2)``; negative closes.
+          joint_delta: u = Δq_des, m or rad, ``(n, motors)``; negative closes.
 
         Raises:
           PhysicsError: if a grasp diverged.
@@ -131,13 +129,13 @@ class GraspSimulator:
         self.command(self.measured_position + joint_delta)
 
     def command(self, position: np.ndarray) -> None:
-        """Holds a commanded position (metres, ``(n, 2)``, clipped to the joint range) for one control step.
+        """Holds a commanded position (m or rad, ``(n, motors)``, clipped to the stroke) for one control step.
 
         Raises:
           PhysicsError: if a grasp diverged.
         """
         before = self.object_position
-        np.clip(position, 0.0, OPEN_M, out=self.commanded_position)
+        np.clip(position, 0.0, self.gripper.stroke, out=self.commanded_position)
         self.plant.advance(self.commanded_position, self._substeps)
         guard.check(self.plant.warnings(), self.parameters, self.steps)
         self.steps += 1
@@ -149,3 +147,20 @@ class GraspSimulator:
         data = self.plant.batch.get_data(grasp)
         mujoco.mj_forward(model, data)
         return model, data
+
+
+def nominal_grasps(gripper: Gripper, n: int) -> GraspParameters:
+    """``n`` equal grasps: an object of middling softness and the description's radius in the middle."""
+    training, nominal = gripper.training, gripper.parameters
+    gain = nominal[training.servo_gain].nominal if training.servo_gain else 0.0
+    force = training.max_force_n * float(training.force_scale(0.5)) / 2
+    row = np.array([[0.5], [gain], [nominal["radius_m"].nominal], [0.0], [force]])
+    return GraspParameters(*np.broadcast_to(row, (5, n)))
+
+
+def base_parameters(gripper: Gripper, grasps: GraspParameters) -> dict[str, np.ndarray]:
+    """What grasps mean for a gripper: base parameter → ``(n,)``."""
+    training = gripper.training
+    base = {training.servo_gain: grasps.b2} if training.servo_gain else {}
+    base |= {name: np.asarray(training.at(name, grasps.kappa)) for name in training.softness}
+    return base | {"radius_m": grasps.radius_m, "offset_m": grasps.offset_m}

@@ -9,7 +9,7 @@ from forcegrasp.calibration import close, closing_speed, fit_power_grasp, power_
 from forcegrasp.calibration.stiffness import kappa_values
 from forcegrasp.errors import ConfigError, ForcegraspError, MeasurementError
 from forcegrasp.physics import GraspParameters, GraspSimulator
-from forcegrasp.physics.gripper import load_gripper
+from forcegrasp.physics.gripper_file import load_gripper
 
 SIGMA_Q_M = 2.7e-5  # paper, appendix
 

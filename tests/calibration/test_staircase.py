@@ -9,7 +9,7 @@ from scipy.stats import linregress
 from forcegrasp.calibration import match_force_scale, regress, staircase
 from forcegrasp.calibration.staircase import DELTAS_M
 from forcegrasp.errors import ConfigError, MeasurementError
-from forcegrasp.physics.gripper import load_gripper
+from forcegrasp.physics.gripper_file import load_gripper
 from forcegrasp.physics.parameters import force_scale_of_kappa, kappa_of_force_scale
 
 KAPPA = np.array([0.0, 0.4, 1.0])

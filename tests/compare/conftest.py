@@ -19,7 +19,7 @@ from forcegrasp.compare.target import make_target
 from forcegrasp.compare.workflow import Added, Loaded, model_of
 from forcegrasp.effects import get_effect
 from forcegrasp.measure import MeasuredGrasp, MeasurementSet
-from forcegrasp.physics.gripper import load_gripper
+from forcegrasp.physics.gripper_file import load_gripper
 
 #: A name that does harm wherever it is not escaped.
 NASTY = "<script>alert(1)</script> $\\frac{1}{0}$ & [red]"

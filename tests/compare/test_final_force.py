@@ -15,7 +15,7 @@ from forcegrasp.compare.final_force_output import draw
 from forcegrasp.compare.report import write_report
 from forcegrasp.effects import catalogue
 from forcegrasp.measure.schema import FinalForceTable
-from forcegrasp.physics.gripper import load_gripper
+from forcegrasp.physics.gripper_file import load_gripper
 from forcegrasp.physics.plant import Plant, write_base
 
 GRIPPER = load_gripper("tiago")

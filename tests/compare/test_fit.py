@@ -24,7 +24,7 @@ from forcegrasp.compare.target import Target, make_target
 from forcegrasp.effects import get_effect
 from forcegrasp.measure import MeasuredGrasp, MeasurementSet
 from forcegrasp.measure.replay import Replay
-from forcegrasp.physics.gripper import load_gripper
+from forcegrasp.physics.gripper_file import load_gripper
 
 TIAGO = load_gripper("tiago")
 SIGMA = np.array([2.7e-5, 2.7e-5, 0.013, 0.013])

@@ -16,7 +16,7 @@ from forcegrasp.compare.problem import Problem
 from forcegrasp.compare.target import PHASES, Target
 from forcegrasp.effects import get_effect
 from forcegrasp.measure import MeasuredGrasp
-from forcegrasp.physics.gripper import load_gripper
+from forcegrasp.physics.gripper_file import load_gripper
 
 G, S = 8, 150
 ONES = np.ones(4)

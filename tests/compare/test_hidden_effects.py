@@ -76,7 +76,7 @@ def test_spoilt_sets_do_not_pass(tmp_path, spoil):
     loaded = respoil(recorded(tmp_path, {"force_lag": "medium"}), spoil)
     refusal = ""
     try:
-        check_set(loaded.measured, loaded.gripper.open_m)
+        check_set(loaded.measured, loaded.gripper.stroke)
     except MeasurementError as error:
         refusal = str(error)
     if refusal:

@@ -10,7 +10,7 @@ from forcegrasp.compare import workflow
 from forcegrasp.effects.model_file import read_model, write_model
 from forcegrasp.measure import write_set
 from forcegrasp.measure.record import parse_effect, record
-from forcegrasp.physics.gripper import load_gripper
+from forcegrasp.physics.gripper_file import load_gripper
 
 SECOND = Path(__file__).parent.parent / "grippers" / "second.yaml"
 

@@ -8,7 +8,7 @@ import pytest
 from forcegrasp.compare.problem import Problem
 from forcegrasp.effects import catalogue, get_effect
 from forcegrasp.measure import MeasuredGrasp
-from forcegrasp.physics.gripper import load_gripper
+from forcegrasp.physics.gripper_file import load_gripper
 
 TIAGO = load_gripper("tiago")
 

@@ -19,7 +19,7 @@ from doc_pages import PAGES, blocks, program, unpack
 
 from forcegrasp.deploy import Contract, controller
 from forcegrasp.errors import ConfigError
-from forcegrasp.physics.gripper import load_gripper
+from forcegrasp.physics.gripper_file import load_gripper
 
 #: Pages whose Python runs here as it stands; the others have tests of their own.
 RUN = [
@@ -111,7 +111,7 @@ def test_effect_of_the_page_is_found_once_it_is_installed(page, tmp_path):
 def test_gripper_of_the_page_does_what_the_page_says(page):
     page("docs/your-gripper.md")
     gripper = load_gripper("my_gripper.yaml", Path())
-    assert gripper.open_m == 0.04
+    assert gripper.stroke == 0.04
 
 
 @pytest.mark.parametrize(

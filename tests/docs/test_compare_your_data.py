@@ -19,7 +19,7 @@ from forcegrasp.cli.main import main
 from forcegrasp.errors import MeasurementError
 from forcegrasp.measure import check_set, read_set, write_set
 from forcegrasp.measure.record import record
-from forcegrasp.physics.gripper import load_gripper
+from forcegrasp.physics.gripper_file import load_gripper
 
 #: In the command that has the first → the second: a small set, few rivals, hardly any training.
 SMALLER = {

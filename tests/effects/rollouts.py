@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from forcegrasp.effects import Effect
-from forcegrasp.physics.gripper import load_gripper
+from forcegrasp.physics.gripper_file import load_gripper
 from forcegrasp.physics.plant import Plant, write_base
 
 PERIOD_S = 0.04

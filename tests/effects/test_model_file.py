@@ -12,7 +12,7 @@ import pytest
 from forcegrasp.effects import catalogue, get_effect
 from forcegrasp.effects.model_file import Fitted, FoundEffect, Model, read_model, write_model
 from forcegrasp.errors import ConfigError
-from forcegrasp.physics.gripper import load_gripper
+from forcegrasp.physics.gripper_file import load_gripper
 
 SECOND = Path(__file__).parents[1] / "grippers" / "second.yaml"
 GOOD = """\

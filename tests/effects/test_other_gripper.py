@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from forcegrasp.effects import Effect, catalogue, get_effect
-from forcegrasp.physics.gripper import load_gripper
+from forcegrasp.physics.gripper_file import load_gripper
 from forcegrasp.physics.plant import Plant, write_base
 
 SECOND = Path(__file__).parents[1] / "grippers" / "second.yaml"

@@ -99,7 +99,7 @@ def test_effect_of_another_package_is_found_listed_and_used(tmp_path):
 import numpy as np
 from forcegrasp.cli.main import main
 from forcegrasp.effects import catalogue, get_effect
-from forcegrasp.physics.gripper import load_gripper
+from forcegrasp.physics.gripper_file import load_gripper
 from forcegrasp.physics.plant import Plant
 names = list(catalogue())
 assert len(names) > 20 and "force_doubled" in names, names

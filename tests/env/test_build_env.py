@@ -27,7 +27,7 @@ from forcegrasp.env import build_env, seed_env
 from forcegrasp.env.reward import normalised_force_reward
 from forcegrasp.errors import ConfigError
 from forcegrasp.physics import FixedGrasps
-from forcegrasp.physics.gripper import load_gripper
+from forcegrasp.physics.gripper_file import load_gripper
 
 FAST = PhysicsConfig(tier="fast", threads=1)
 #: Large objects, which both fingers meet within 25 steps.

@@ -16,7 +16,7 @@ from forcegrasp.env import GraspEnv
 from forcegrasp.env.grasp_env import OBSERVATIONS
 from forcegrasp.errors import ConfigError
 from forcegrasp.physics import FixedGrasps, GraspSimulator
-from forcegrasp.physics.gripper import load_gripper
+from forcegrasp.physics.gripper_file import load_gripper
 
 FAST = PhysicsConfig(tier="fast", threads=1)
 #: Large objects, which both fingers meet within 20 steps.

@@ -10,7 +10,7 @@ import pytest
 
 from forcegrasp.effects.base import Effect
 from forcegrasp.effects.registry import catalogue
-from forcegrasp.physics.gripper import load_gripper
+from forcegrasp.physics.gripper_file import load_gripper
 from forcegrasp.physics.plant import Plant, write_base
 
 SECOND = Path(__file__).with_name("second.yaml")

@@ -15,7 +15,8 @@ from forcegrasp.measure import check_set, read_set, write_set
 from forcegrasp.measure.plans import PERIOD_S, PLANS, SAMPLES
 from forcegrasp.measure.record import Recorded, parse_effect, record
 from forcegrasp.measure.replay import EffectOn, Replay
-from forcegrasp.physics.gripper import Gripper, load_gripper
+from forcegrasp.physics.gripper import Gripper
+from forcegrasp.physics.gripper_file import load_gripper
 
 TIAGO = load_gripper("tiago")
 SECOND = load_gripper(str(Path(__file__).parents[1] / "grippers" / "second.yaml"))

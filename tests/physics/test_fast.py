@@ -11,7 +11,7 @@ import pytest
 
 from forcegrasp.physics import GraspParameters, GraspSimulator
 from forcegrasp.physics.fast import compile_fast
-from forcegrasp.physics.gripper import load_gripper
+from forcegrasp.physics.gripper_file import load_gripper
 from forcegrasp.physics.plant import Plant
 
 TIAGO = load_gripper("tiago")

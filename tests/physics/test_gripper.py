@@ -11,7 +11,8 @@ import pytest
 import yaml
 
 from forcegrasp.errors import ConfigError
-from forcegrasp.physics.gripper import Gripper, load_gripper
+from forcegrasp.physics.gripper import Gripper
+from forcegrasp.physics.gripper_file import load_gripper
 from forcegrasp.physics.plant import Plant, write_base
 
 SECOND = Path(__file__).parents[1] / "grippers" / "second.yaml"
@@ -47,7 +48,7 @@ def _plant(gripper: Gripper, n: int, tier: str = "reference", **base: list[float
     """Open fingers around objects of these base parameters."""
     plant, ids = Plant(gripper, n, tier, threads=1), np.arange(n)
     offset = write_base(plant, ids, {name: np.array(values) for name, values in base.items()})
-    plant.reset(ids, offset, np.full((n, 2), gripper.open_m))
+    plant.reset(ids, offset, np.full((n, 2), gripper.stroke))
     return plant
 
 
@@ -65,12 +66,12 @@ def _close(plant: Plant, seconds: float = 1.0) -> np.ndarray:
 def test_closes_on_the_object_with_sane_forces(name):
     gripper = load_gripper(name)
     plant = _plant(gripper, 1)
-    assert plant.position[0] == pytest.approx([gripper.open_m] * 2)
+    assert plant.position[0] == pytest.approx([gripper.stroke] * 2)
     start = plant.velocity.copy()
     seen = _close(plant, 0.04)
     assert (start == 0).all()
     assert (plant.velocity < 0).all()
-    assert (seen[-1, 0, :2] < gripper.open_m - 1e-5).all()
+    assert (seen[-1, 0, :2] < gripper.stroke - 1e-5).all()
     seen = _close(plant, 4.0)
     radius = gripper.parameters["radius_m"].nominal
     assert seen[-1, 0, :2] == pytest.approx([radius] * 2, abs=0.006)

@@ -11,7 +11,7 @@ import pytest
 from forcegrasp.errors import ConfigError
 from forcegrasp.physics import GraspSimulator
 from forcegrasp.physics.fast import compile_fast
-from forcegrasp.physics.gripper import load_gripper
+from forcegrasp.physics.gripper_file import load_gripper
 from forcegrasp.physics.model import build_model
 
 TIERS = ("reference", "fast")

@@ -7,7 +7,8 @@ import os
 import pytest
 
 from forcegrasp.errors import ConfigError
-from forcegrasp.physics.gripper import load_gripper, shipped_folder
+from forcegrasp.physics.gripper import shipped_folder
+from forcegrasp.physics.gripper_file import load_gripper
 from forcegrasp.physics.scene_file import check_scene
 
 

@@ -9,7 +9,8 @@ import numpy as np
 
 from forcegrasp.effects.base import Effect
 from forcegrasp.effects.registry import catalogue
-from forcegrasp.physics.gripper import Gripper, load_gripper
+from forcegrasp.physics.gripper import Gripper
+from forcegrasp.physics.gripper_file import load_gripper
 from forcegrasp.physics.guard import silence_log
 from forcegrasp.physics.model import CONTROL_PERIOD_S
 from forcegrasp.physics.plant import Plant, write_base
@@ -45,7 +46,7 @@ def trials(count: int, seed: int) -> Iterator[Trial]:
 def draw(gripper: Gripper, rows: int, rng: np.random.Generator) -> dict[str, np.ndarray]:
     """Base parameters within their bounds, each ``(rows,)``; objects stand between the open fingers."""
     drawn = {name: rng.uniform(p.low, p.high, rows) for name, p in gripper.parameters.items()}
-    room = np.maximum(gripper.open_m - drawn["radius_m"], 0)
+    room = np.maximum(gripper.stroke - drawn["radius_m"], 0)
     drawn["offset_m"] = np.clip(drawn["offset_m"], -room, room)
     return drawn
 
@@ -73,7 +74,7 @@ def grasp(plant: Plant, rng: np.random.Generator) -> list[list[str]]:
     style = STYLES[rng.integers(len(STYLES), size=plant.n)]
     for _ in range(STEPS):
         share = np.clip(style[:, :1] + style[:, 1:] * rng.uniform(-1, 1, (plant.n, 2)), -1, 1)
-        command = np.clip(plant.measured_position + DELTA_M * share, 0, plant.gripper.open_m)
+        command = np.clip(plant.measured_position + DELTA_M * share, 0, plant.gripper.stroke)
         plant.advance(command, round(CONTROL_PERIOD_S / plant.dt))
     warnings = plant.warnings()
     return [[mujoco.mjtWarning(int(kind)).name for kind in np.flatnonzero(counts)] for counts in warnings]

@@ -6,7 +6,8 @@ from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 
-from forcegrasp.physics.gripper import load_gripper, shipped_folder
+from forcegrasp.physics.gripper import shipped_folder
+from forcegrasp.physics.gripper_file import load_gripper
 from tools.reliability.attacks.attack import Attack, not_files, replace
 
 

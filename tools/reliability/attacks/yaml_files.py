@@ -13,7 +13,8 @@ from forcegrasp.config import GraspConfig
 from forcegrasp.effects.model_file import read_model
 from forcegrasp.evaluate.grids import read_objects
 from forcegrasp.measure import read_set
-from forcegrasp.physics.gripper import load_gripper, shipped_folder
+from forcegrasp.physics.gripper import shipped_folder
+from forcegrasp.physics.gripper_file import load_gripper
 from forcegrasp.runs.history import find_histories
 from forcegrasp.runs.run_dir import RunDir
 from tools.reliability.attacks.attack import MARK, Attack, not_files, replace

@@ -1,0 +1,105 @@
+"""What a gripper is made of: motors, fingers, what is read and commanded, what a fit or a training may change."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class FieldWrite:
+    """One column of a per-simulation MuJoCo field that follows a parameter."""
+
+    field: str
+    column: int | None
+    sign: float
+
+
+@dataclass(frozen=True)
+class BaseParameter:
+    """What a fit may change about the gripper or an object; never called a missing effect."""
+
+    name: str
+    nominal: float
+    low: float
+    high: float
+    unit: str
+    scope: str  #: one value for the "gripper", per "object" or per "grasp"
+    writes: tuple[FieldWrite, ...]
+
+    @property
+    def logarithmic(self) -> bool:
+        """Whether it is fitted by its logarithm: it is positive and spans more than a factor of 5."""
+        return self.low > 0 and self.high / self.low > 5
+
+
+@dataclass(frozen=True)
+class Channel:
+    """One number that is commanded or read at every sample."""
+
+    name: str  #: in tables and arrays: position_l, force
+    column: str  #: in files: q_l_m, f_n
+    unit: str  #: m, rad or N
+
+
+@dataclass(frozen=True)
+class Motor:
+    """A position servo, and the joint on which its encoder sits. Its position is 0 closed and grows while opening."""
+
+    actuator: str
+    joint: str
+    closed: float  #: joint value where the position is 0, m or rad
+    open: float
+    unit: str  #: of the joint: "m" or "rad"
+
+    @property
+    def sign(self) -> float:
+        """1 if the joint grows while opening, else −1."""
+        return 1.0 if self.open > self.closed else -1.0
+
+    @property
+    def stroke(self) -> float:
+        """Position when fully open, m or rad."""
+        return abs(self.open - self.closed)
+
+
+@dataclass(frozen=True)
+class Finger:
+    """One side of the grasp: the body whose geoms, and those of the bodies on it, touch the object."""
+
+    body: str
+    joint: str  #: that moves it; empty if it stands still
+    motor: int  #: index of the motor that moves it; −1 if it stands still
+    force_sensor: str  #: empty if it has none
+
+
+@dataclass(frozen=True)
+class Training:
+    """What a training draws and how its sensors are, unless its options say otherwise."""
+
+    radius_m: tuple[float, float]  #: object radii
+    start_radius_m: tuple[float, float]  #: the same at the start of the curriculum
+    offset_m: tuple[float, float]  #: where objects stand along the grasp axis
+    start_offset_m: tuple[float, float]
+    deformation_m: float  #: largest deformation of an object, both sides together
+    goal_force_min_n: float
+    max_force_n: float  #: static force of a finger at the largest command step, before any force scale
+    softness: dict[str, tuple[float, float]]  #: parameter → its values at κ = 0 (hard) and κ = 1 (soft); linear between
+    servo_gain: str  #: base parameter that is drawn with every grasp; empty if none is
+    servo_gain_range: tuple[float, float]
+    position_std: float  #: noise of the encoders, unit of the motors
+    force_std_n: float
+    contact_threshold_n: float  #: force above which a finger counts as touching
+    assumed_stiffness: float  #: k of the hand-written controller, N per unit of the motors
+    closing_step: float  #: its command step while it closes, unit of the motors
+
+    def at(self, parameter: str, kappa: np.ndarray | float) -> np.ndarray | float:
+        """A parameter that follows the softness κ; linear in it, from the smaller of its two values up."""
+        hard, soft = self.softness[parameter]
+        low, high, share = (hard, soft, kappa) if hard <= soft else (soft, hard, 1 - kappa)
+        return low + share * (high - low)
+
+    def force_scale(self, kappa: np.ndarray | float) -> np.ndarray | float:
+        """f_α of an object of softness κ; 1 where it does not depend on it."""
+        return self.at("force_scale", kappa) if "force_scale" in self.softness else 1.0 + 0.0 * kappa
