@@ -65,12 +65,20 @@ def _run(overrides: list[str]) -> int:
 def _check(config) -> None:
     """Refuses a model that can't be read, and an engine or Ray where it can't run, before anything is written."""
     from forcegrasp.gpu import check_engine
+    from forcegrasp.gpu.installation import check_gripper_for_warp
+    from forcegrasp.physics import load_gripper
+    from forcegrasp.physics.gripper import NO_FORCES
 
     check_engine(config.physics)
+    gripper = load_gripper(config.gripper)
+    if not gripper.forces:
+        raise ConfigError(f"gripper={config.gripper}: {NO_FORCES}")
+    if config.physics.engine == "warp":
+        check_gripper_for_warp(gripper)
     if config.model:
-        from forcegrasp.effects.variation import read_tiago_model
+        from forcegrasp.effects.variation import read_model_of
 
-        read_tiago_model(config.model)
+        read_model_of(gripper, config.model)
     if config.collector.kind == "ray":
         from forcegrasp.train.cluster import find_ray
 

@@ -1,6 +1,6 @@
 """Every option that a command line or YAML may set, as dataclasses: default, unit, bounds, choices and source."""
 
-from forcegrasp.config.option import validate
+from forcegrasp.config.option import is_left_out, validate
 from forcegrasp.config.sections import (
     OBSERVATION_PARTS,
     ActionConfig,
@@ -53,5 +53,6 @@ __all__ = [
     "TrainConfig",
     "check_deformation",
     "check_no_effects",
+    "is_left_out",
     "validate",
 ]

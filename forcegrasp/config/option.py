@@ -19,12 +19,34 @@ def option(
     low: float = -math.inf,
     high: float = math.inf,
     choices: tuple[str, ...] = (),
+    of_gripper: str = "",
 ) -> Any:
-    """A dataclass field that also says what it means, and what it may be. ``low`` and ``high`` are inclusive."""
+    """A dataclass field that also says what it means, and what it may be. ``low`` and ``high`` are inclusive.
+
+    ``of_gripper`` names what of the gripper's description stands in where the option is left out.
+    """
     meta = {"doc": doc, "unit": unit, "source": source, "low": low, "high": high, "choices": choices}
+    meta["of_gripper"] = of_gripper
     if isinstance(default, list):
         return field(default_factory=lambda: list(cast("list[Any]", default)), metadata=meta)
     return field(default=default, metadata=meta)
+
+
+def of_gripper(default: Any, entry: str, doc: str, **more: Any) -> Any:
+    """An :func:`option` that is left to the gripper's description unless it is given.
+
+    Args:
+      default: ``[]`` for a range, NaN for a number: what stands for "left out".
+      entry: of :class:`~forcegrasp.physics.gripper_parts.Training`, or of the gripper itself.
+      doc: what it means.
+      more: as for :func:`option`.
+    """
+    return option(default, doc, of_gripper=entry, **more)
+
+
+def is_left_out(value: Any) -> bool:
+    """Whether a value stands for one that the gripper's description has."""
+    return value == [] or (isinstance(value, float) and math.isnan(value))
 
 
 _ITEM_TYPES = {"list[float]": (int, float), "list[int]": (int,), "list[str]": (str,)}
@@ -43,6 +65,8 @@ def validate(config: Any, path: str = "") -> None:
             validate(value, f"{name}.")
             continue
         meta, listed = entry.metadata, isinstance(value, list)
+        if meta["of_gripper"] and is_left_out(value):
+            continue
         is_range = str(entry.type) == "list[float]"
         if is_range and (len(value) != 2 or value[0] > value[1]):
             raise ConfigError(f"{name}={value}: must be [low, high] with low ≤ high ({meta['doc']})")

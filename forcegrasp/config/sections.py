@@ -6,9 +6,10 @@ Simulation to Robot*, with its equation or table; "authors' code" is that paper'
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
-from forcegrasp.config.option import option
+from forcegrasp.config.option import is_left_out, of_gripper, option
 from forcegrasp.errors import ConfigError
 
 OBSERVATION_PARTS = ("position", "force", "force_error", "last_action", "had_contact")
@@ -42,26 +43,26 @@ class GraspConfig:
     """What is drawn anew for every grasp. Each range is [low, high], sampled uniformly."""
 
     kappa: list[float] = option([0.0, 1.0], "softness of the object; 0 is hard", source="paper, Sec. 3", low=0, high=1)
-    b2: list[float] = option([-13.0, -6.0], "velocity gain of the actuators", source="paper, Sec. 3", low=-50, high=0)
-    radius_m: list[float] = option(
-        [0.015, 0.035], "object radius; the paper's w_o", unit="m", source="paper, Table 2", low=0.0121, high=0.04
+    b2: list[float] = of_gripper(
+        [], "servo_gain_range", "servo gain that is drawn; the paper's velocity gain b₂", source="paper, Sec. 3"
     )
-    offset_m: list[float] = option(
-        [-0.04, 0.04],
-        "object offset along the grasp axis, o_y",
-        unit="m",
-        source="paper, Table 2",
-        low=-0.045,
-        high=0.045,
+    radius_m: list[float] = of_gripper(
+        [], "radius_m", "object radius; the paper's w_o", unit="m", source="paper, Table 2", low=1e-4, high=1
     )
-    deformation_m: float = option(
-        0.012, "largest object deformation d_p, both sides together", unit="m", source="authors' code", low=0, high=0.03
+    offset_m: list[float] = of_gripper(
+        [], "offset_m", "object offset along the grasp axis, o_y", unit="m", source="paper, Table 2", low=-1, high=1
     )
-    goal_force_min_n: float = option(0.08, "smallest goal force", unit="N", source="authors' code", low=0.01, high=5)
+    deformation_m: float = of_gripper(
+        math.nan, "deformation_m", "largest object deformation d_p, both sides together", unit="m",
+        source="authors' code", low=0, high=1,
+    )
+    goal_force_min_n: float = of_gripper(
+        math.nan, "goal_force_min_n", "smallest goal force", unit="N", source="authors' code", low=1e-4, high=1e4
+    )
     goal_force_max: float = option(
-        0.95, "largest goal force, as a fraction of the 0.30 N · f_α that the gripper reaches", low=0.01, high=1
+        0.95, "largest goal force, as a fraction of what the gripper reaches with its largest command step", low=0.01, high=1
     )
-    steps: int = option(150, "control steps of an episode, 40 ms each", source="authors' code", low=1, high=100_000)
+    steps: int = option(150, "control steps of an episode", source="authors' code", low=1, high=100_000)
 
     def check(self, path: str) -> None:
         """Refuses objects that could be squeezed flat."""
@@ -72,12 +73,15 @@ class GraspConfig:
 class SensorConfig:
     """What the controller can measure."""
 
-    position_std_m: float = option(
-        2.7e-5, "noise of the finger positions, σ_q", unit="m", source="paper", low=0, high=0.01
+    position_std_m: float = of_gripper(
+        math.nan, "position_std", "noise of the positions, σ_q", unit="m, or rad", source="paper", low=0, high=10
     )
-    force_std_n: float = option(0.013, "noise of the fingertip forces, σ_f", unit="N", source="paper", low=0, high=1)
-    contact_threshold_n: float = option(
-        0.05, "force above which a finger is in contact, f_θ", unit="N", source="authors' code", low=0, high=5
+    force_std_n: float = of_gripper(
+        math.nan, "force_std_n", "noise of the forces, σ_f", unit="N", source="paper", low=0, high=1000
+    )
+    contact_threshold_n: float = of_gripper(
+        math.nan, "contact_threshold_n", "force above which a finger is in contact, f_θ", unit="N",
+        source="authors' code", low=0, high=1000,
     )
 
 
@@ -86,7 +90,7 @@ class ObservationConfig:
     """What the policy sees."""
 
     parts: list[str] = option(
-        list(OBSERVATION_PARTS), "parts of o(t), two numbers each", source="paper, Sec. 4", choices=OBSERVATION_PARTS
+        list(OBSERVATION_PARTS), "parts of o(t): a number per motor or per force reading each", source="paper, Sec. 4", choices=OBSERVATION_PARTS
     )
     frames: int = option(3, "observations stacked, k", source="paper, Sec. 4", low=1, high=50)
 
@@ -95,7 +99,9 @@ class ObservationConfig:
 class ActionConfig:
     """What the policy commands."""
 
-    max_delta_m: float = option(0.003, "largest position delta Δq_max", unit="m", source="paper", low=1e-5, high=0.045)
+    max_delta_m: float = of_gripper(
+        math.nan, "max_step", "largest position delta Δq_max", unit="m, or rad", source="paper", low=1e-6, high=10
+    )
     inductive_bias: bool = option(True, "scale actions by φ of the contact state", source="paper, eq. 7")
     bias_one_contact: float = option(
         0.1, "φ of a finger that waits for the other", source="paper, eq. 7", low=0, high=1
@@ -147,11 +153,11 @@ class CurriculumConfig:
     speed_threshold_m: float = option(
         2e-4, "velocity threshold at the start", unit="m per control step", source="paper, Table 2", low=0, high=1
     )
-    radius_m: list[float] = option(
-        [0.020, 0.025], "object radius at the start", unit="m", source="paper, Table 2", low=0.0121, high=0.04
+    radius_m: list[float] = of_gripper(
+        [], "start_radius_m", "object radius at the start", unit="m", source="paper, Table 2", low=1e-4, high=1
     )
-    offset_m: list[float] = option(
-        [0.0, 0.0], "object offset at the start", unit="m", source="paper, Table 2", low=-0.045, high=0.045
+    offset_m: list[float] = of_gripper(
+        [], "start_offset_m", "object offset at the start", unit="m", source="paper, Table 2", low=-1, high=1
     )
 
 
@@ -182,7 +188,9 @@ class PPOConfig:
     initial_action: float = option(
         -0.5, "the policy's mean action at the start: closing, lest training never meets the object", low=-1, high=1
     )
-    mirrored: bool = option(True, "average the policy with its mirror image, so that it treats both fingers alike")
+    mirrored: bool = option(
+        True, "average the policy with its mirror image where the gripper is its own, so that it treats both fingers alike"
+    )
     critic: str = option(
         "privileged",
         "what the value network sees while training: the policy's observation, or also the grasp's true state",
@@ -227,7 +235,9 @@ class LogConfig:
 
 
 def check_deformation(deformation_m: float, radius_m: list[float], name: str) -> None:
-    """Raises ConfigError unless d_p < r for the smallest object (paper, eq. 3)."""
+    """Raises ConfigError unless d_p < r for the smallest object (paper, eq. 3); says nothing of what is left out."""
+    if is_left_out(radius_m) or is_left_out(deformation_m):
+        return
     if deformation_m >= radius_m[0]:
         raise ConfigError(
             f"{name}={list(radius_m)}: the smallest radius must exceed grasp.deformation_m={deformation_m:g}"

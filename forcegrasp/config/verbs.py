@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
-from forcegrasp.config.option import option
+from forcegrasp.assets import DEFAULT_GRIPPER
+from forcegrasp.config.option import of_gripper, option
 from forcegrasp.config.sections import (
     ActionConfig,
     CollectorConfig,
@@ -26,6 +28,7 @@ class TrainConfig:
     """`forcegrasp train`."""
 
     seed: int = option(0, "seed of everything random", low=0, high=2**31 - 1)
+    gripper: str = option(DEFAULT_GRIPPER, "gripper by name, or the path of a description")
     model: str = option("", "model file of forcegrasp fit or add: train with its effects, within fitted intervals")
     physics: PhysicsConfig = field(default_factory=lambda: PhysicsConfig(tier="fast"))
     grasp: GraspConfig = field(default_factory=GraspConfig)
@@ -65,15 +68,19 @@ class RecordConfig:
     )
     out: str = option("", "folder for the set; must not exist or be empty; runs/record_TIME if empty")
     effects: list[str] = option([], "effects to record with, each 'NAME [VARIANT] [PARAMETER=VALUE ...]'")
-    gripper: str = option("tiago", "gripper by name, or the path of a description")
+    gripper: str = option(DEFAULT_GRIPPER, "gripper by name, or the path of a description")
     model: str = option("", "model file whose base parameters and effects to record with")
     grasps: int = option(24, "grasps in the set", low=1, high=10_000)
     objects: int = option(4, "objects, grasped in turn; their parameters are drawn", low=1, high=1000)
     off_nominal: float = option(
         0.15, "largest share by which the gripper's base parameters differ from nominal", low=0, high=0.5
     )
-    position_std_m: float = option(2.7e-5, "noise of the positions", unit="m", source="paper", low=0, high=0.01)
-    force_std_n: float = option(0.013, "noise of the forces", unit="N", source="paper", low=0, high=1)
+    position_std_m: float = of_gripper(
+        math.nan, "position_std", "noise of the positions", unit="m, or rad", source="paper", low=0, high=10
+    )
+    force_std_n: float = of_gripper(
+        math.nan, "force_std_n", "noise of the forces", unit="N", source="paper", low=0, high=1000
+    )
     samples: str = option("csv", "file format of the samples", choices=("csv", "parquet"))
     seed: int = option(0, "seed of objects, plan and noise", low=0, high=2**31 - 1)
 
@@ -138,6 +145,7 @@ class EvaluateConfig:
     trials: int = option(
         50, "grasps per softness value (or object) and policy; the paper had 200 (20)", low=2, high=1_000_000
     )
+    gripper: str = option(DEFAULT_GRIPPER, "gripper by name, or the path of a description")
     seed: int = option(1000, "seed of the grasps; the same grasps for every policy", low=0, high=2**31 - 1)
     model: str = option(
         "", "model file of forcegrasp fit or add to simulate the grasps with; virtual_robot comes with the package"
@@ -181,17 +189,18 @@ class RenderConfig:
         ["force_pi"], "what to show: controllers and shipped policies by name, or run directories; policy= for one"
     )
     out: str = option("", "file to write, NAME.gif; runs/render_TIME.gif if empty")
+    gripper: str = option(DEFAULT_GRIPPER, "gripper by name, or the path of a description")
     seed: int = option(0, "seed of what is not given, and of the sensor noise", low=0, high=2**31 - 1)
     kappa: float | None = option(None, "softness of the object; 0 is hard", source="paper, Sec. 3", low=0, high=1)
-    b2: float | None = option(None, "velocity gain of the actuators", source="paper, Sec. 3", low=-50, high=0)
+    b2: float | None = option(None, "servo gain that training draws; the paper's velocity gain b₂", source="paper, Sec. 3")
     radius_m: float | None = option(
-        None, "object radius; the paper's w_o", unit="m", source="paper, Table 2", low=0.0121, high=0.04
+        None, "object radius; the paper's w_o", unit="m", source="paper, Table 2", low=1e-4, high=1
     )
     offset_m: float | None = option(
-        None, "object offset along the grasp axis, o_y", unit="m", source="paper, Table 2", low=-0.045, high=0.045
+        None, "object offset along the grasp axis, o_y", unit="m", source="paper, Table 2", low=-1, high=1
     )
-    goal_force_n: float | None = option(None, "goal force of each finger", unit="N", low=0.01, high=5)
-    steps: int = option(150, "control steps of the grasp, 40 ms each", source="authors' code", low=1, high=1500)
+    goal_force_n: float | None = option(None, "goal force of each finger", unit="N", low=1e-4, high=1e4)
+    steps: int = option(150, "control steps of the grasp", source="authors' code", low=1, high=1500)
     model: str = option("", "model file of forcegrasp fit or add to simulate the grasp with")
     physics: PhysicsConfig = field(default_factory=PhysicsConfig)
     sensors: SensorConfig = field(default_factory=SensorConfig)

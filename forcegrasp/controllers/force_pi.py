@@ -8,51 +8,58 @@ from tensordict.nn import TensorDictModuleBase
 from torchrl.data import Unbounded
 from torchrl.envs.transforms import TensorDictPrimer
 
-from forcegrasp.physics.model import CONTROL_PERIOD_S
+from forcegrasp.physics.gripper import Gripper
+from forcegrasp.physics.gripper_file import default_gripper
 
 
 class ForcePI(TensorDictModuleBase):
     """Closes, waits for both fingers to touch, then controls force with a PI law. Same interface as a policy.
 
-    A finger that has not touched closes at full speed; one that has waits for the other; once both have, the force
-    errors divided by the assumed stiffness k enter a PI law and both fingers get half of its position delta:
-    Δq = −½ Σ_i (K_p e_i + K_i I_i), e_i = Δf_i / k, where the one integral I runs on over both fingers' errors.
+    A finger that has not touched closes at full speed; one that has waits for the other; once all have, the force
+    errors divided by the assumed stiffness k enter a PI law and all motors get the same position delta:
+    Δq = −(1/F) Σ_i (K_p e_i + K_i I_i), e_i = Δf_i / k, over F force readings, where the one integral I runs on over all
+    of them. Where readings and motors are not one to one, motors close until every reading has shown contact.
 
-    The integral lives in the tensordict (``force_integral``, metre seconds, ``(*B, 1)``); an environment carries it
-    once :meth:`make_tensordict_primer` is appended to it.
+    The integral lives in the tensordict (``force_integral``, metre (or radian) seconds, ``(*B, 1)``); an environment
+    carries it once :meth:`make_tensordict_primer` is appended to it.
 
     Args:
-      max_delta_m: Δq_max that the environment scales actions by, metres.
-      stiffness: k, newtons per metre.
+      gripper: gives the assumed stiffness k, the closing step, Δq_max and the control period, see
+        :class:`~forcegrasp.physics.gripper_parts.Training`.
+      max_delta: Δq_max that the environment scales actions by, m or rad; the gripper's own by default.
+      stiffness: k instead, N/m or N/rad.
       kp, ki: K_p (1) and K_i (1/s).
-      closing_m: position delta while closing, metres per step: 0.02 m/s · 40 ms · 5 (authors' code).
     """
 
     def __init__(
         self,
-        max_delta_m: float = 0.003,
-        stiffness: float = 160.0,
+        gripper: Gripper | None = None,
+        max_delta: float | None = None,
+        stiffness: float | None = None,
         kp: float = 0.18,
         ki: float = 1.13,
-        closing_m: float = 0.004,
     ) -> None:
         super().__init__()
+        gripper = gripper or default_gripper()
         self.in_keys = ["had_contact", "force_error", "force_integral"]
         # tensordict's own annotation knows no nested keys
         self.out_keys = ["action", ("next", "force_integral")]  # pyright: ignore[reportAttributeAccessIssue]
-        self.max_delta_m, self.stiffness, self.kp, self.ki, self.closing_m = max_delta_m, stiffness, kp, ki, closing_m
+        self.motors, self.period_s = len(gripper.motors), gripper.period_s
+        self.max_delta = gripper.max_step if max_delta is None else max_delta
+        self.stiffness = gripper.training.assumed_stiffness if stiffness is None else stiffness
+        self.kp, self.ki, self.closing_step = kp, ki, gripper.training.closing_step
 
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
         touched, force_error, integral = (tensordict.get(key) for key in self.in_keys)
-        both = touched.bool().all(-1, keepdim=True)
+        all_touched = touched.bool().all(-1, keepdim=True)
         error = force_error / self.stiffness
         # The authors add the left error to the one integral, use it, then add the right one and use that.
-        running = integral + (error * CONTROL_PERIOD_S).cumsum(-1)
-        delta = -0.5 * (self.kp * error + self.ki * running).sum(-1, keepdim=True)
-        waiting = -self.closing_m * (1 - touched)
-        action = torch.where(both, delta, waiting) / self.max_delta_m
-        tensordict.set("action", action.clamp(-1, 1))
-        return tensordict.set(("next", "force_integral"), torch.where(both, running[..., -1:], integral))
+        running = integral + (error * self.period_s).cumsum(-1)
+        delta = -1 / error.shape[-1] * (self.kp * error + self.ki * running).sum(-1, keepdim=True)
+        waiting = -self.closing_step * (1 - (touched if touched.shape[-1] == self.motors else all_touched.float()))
+        action = torch.where(all_touched, delta, waiting) / self.max_delta
+        tensordict.set("action", action.clamp(-1, 1).expand(*action.shape[:-1], self.motors))
+        return tensordict.set(("next", "force_integral"), torch.where(all_touched, running[..., -1:], integral))
 
     def make_tensordict_primer(self) -> TensorDictPrimer:
         """The transform that starts the integral at 0 and carries it from step to step."""

@@ -6,38 +6,43 @@ import torch
 from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 
-from forcegrasp.physics.parameters import MAX_FORCE_N, force_scale_of_kappa
+from forcegrasp.physics.gripper import Gripper
+from forcegrasp.physics.gripper_file import default_gripper
 
 
 class Constant(TensorDictModuleBase):
     """The same action at every step, as in the paper's identification trials.
 
     Args:
-      value: the action of both fingers, in [−1, 1]; −1 closes at full speed.
+      value: the action of all motors, in [−1, 1]; −1 closes at full speed.
     """
 
     def __init__(self, value: float) -> None:
         super().__init__()
-        self.in_keys, self.out_keys = ["had_contact"], ["action"]
+        self.in_keys, self.out_keys = ["joint_position"], ["action"]
         self.value = value
 
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
-        return tensordict.set("action", torch.full_like(tensordict.get("had_contact"), self.value))
+        return tensordict.set("action", torch.full_like(tensordict.get("joint_position"), self.value))
 
 
 class Informed(TensorDictModuleBase):
     """Knows the object's force scale: waits on first touch, then commands the delta whose force is the goal.
 
-    No controller that must find out the softness by touch can be expected to do better. f = 100 N/m · f_α · Δq in the
-    simulator, hence a = −f_goal / (0.30 N · f_α).
+    No controller that must find out the softness by touch can be expected to do better. f = f_max · f_α · Δq / Δq_max in the
+    simulator, hence a = −f_goal / (f_max · f_α).
     """
 
-    def __init__(self) -> None:
+    def __init__(self, gripper: Gripper | None = None) -> None:
         super().__init__()
+        gripper = gripper or default_gripper()
         self.in_keys, self.out_keys = ["had_contact", "goal_force", "grasp_parameters"], ["action"]
+        self.motors, self.training = len(gripper.motors), gripper.training
 
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
         touched, goal, parameters = (tensordict.get(key) for key in self.in_keys)
-        both = touched.bool().all(-1, keepdim=True)
-        hold = (-goal / (MAX_FORCE_N * force_scale_of_kappa(parameters[..., :1]))).expand_as(touched)
-        return tensordict.set("action", torch.where(both, hold, touched - 1).clamp(-1, 1))
+        all_touched = touched.bool().all(-1, keepdim=True)
+        hold = -goal / (self.training.max_force_n * self.training.force_scale(parameters[..., :1]))
+        waiting = (touched if touched.shape[-1] == self.motors else all_touched.to(goal.dtype)) - 1
+        action = torch.where(all_touched, hold, waiting).clamp(-1, 1)
+        return tensordict.set("action", action.expand(*action.shape[:-1], self.motors))

@@ -9,18 +9,19 @@ import numpy as np
 from forcegrasp.effects.base import Effect
 from forcegrasp.effects.model_file import Fitted, Model, read_model
 from forcegrasp.errors import ConfigError
+from forcegrasp.physics.gripper import Gripper
 from forcegrasp.physics.plant import Plant
 
 
-def read_tiago_model(path: Path | str) -> Model:
-    """Reads a model that the learning environment can simulate.
+def read_model_of(gripper: Gripper, path: Path | str) -> Model:
+    """Reads a model of this gripper.
 
     Raises:
       ConfigError: if it can't be read, or is of another gripper.
     """
     model = read_model(Path(path))
-    if model.gripper.name != "tiago":
-        raise ConfigError(f"model={path}: is of gripper {model.gripper.name}; the environment simulates tiago")
+    if model.gripper.name != gripper.name:
+        raise ConfigError(f"model={path}: is of gripper {model.gripper.name}, and gripper={gripper.name} is asked for")
     return model
 
 

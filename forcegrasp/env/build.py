@@ -8,6 +8,7 @@ import numpy as np
 from torchrl.envs import TransformedEnv
 from torchrl.envs.transforms import CatFrames, CatTensors, Compose, ObservationNorm, Transform
 
+from forcegrasp.assets import DEFAULT_GRIPPER
 from forcegrasp.config import (
     ActionConfig,
     GraspConfig,
@@ -19,8 +20,10 @@ from forcegrasp.config import (
 )
 from forcegrasp.effects.model_file import Model
 from forcegrasp.env.grasp_env import GraspEnv
-from forcegrasp.physics import GraspParameters
-from forcegrasp.physics.sampling import OPEN_M
+from forcegrasp.errors import ConfigError
+from forcegrasp.physics import GraspParameters, Gripper, load_gripper
+from forcegrasp.physics.completion import complete
+from forcegrasp.physics.gripper import NO_FORCES
 from forcegrasp.transforms import (
     ActionChangePenalty,
     ActionScale,
@@ -44,6 +47,7 @@ PART_KEYS = {
 def build_env(
     n: int,
     *,
+    gripper: Gripper | str = DEFAULT_GRIPPER,
     physics: PhysicsConfig | None = None,
     grasp: GraspConfig | None = None,
     sensors: SensorConfig | None = None,
@@ -54,20 +58,27 @@ def build_env(
     model: Model | None = None,
     seed: int = 0,
 ) -> TransformedEnv:
-    """Returns ``n`` grasps with ``observation`` ``(n, 10 · frames)`` in and ``action`` ``(n, 2)`` in [−1, 1] out.
+    """Returns ``n`` grasps with ``observation`` ``(n, size · frames)`` in and ``action`` ``(n, motors)`` in [−1, 1] out.
 
     Readings come first (noise), then what is computed from readings (contact, error), then memory, then the stacked
-    observation; on the way back the action is denormalised, then biased. Parts left out use their defaults.
+    observation; on the way back the action is denormalised, then biased. Parts left out use their defaults, and options
+    left out the gripper's (by name, or the path of its description).
     A ``model`` fitted to measurements brings its base parameters and effects, drawn anew for every grasp.
 
     Raises:
-      ConfigError: if an option is out of its range.
+      ConfigError: if an option is out of its range, or the gripper reads no forces.
     """
-    sensors, observation = sensors or SensorConfig(), observation or ObservationConfig()
-    action, reward = action or ActionConfig(), reward or RewardConfig()
+    if not isinstance(gripper, Gripper):
+        gripper = load_gripper(gripper)
+    if not gripper.forces:
+        raise ConfigError(
+            f"gripper={gripper.name}: {NO_FORCES}"
+        )
+    sensors, observation = complete(sensors or SensorConfig(), gripper), observation or ObservationConfig()
+    action, reward = complete(action or ActionConfig(), gripper), reward or RewardConfig()
     for name, part in (("sensors", sensors), ("observation", observation), ("action", action)):
         validate(part, f"{name}.")
-    grasps = GraspEnv(n, physics, grasp, reward, sampler, model=model)
+    grasps = GraspEnv(n, physics, grasp, reward, sampler, model=model, gripper=gripper)
     transforms: list[Transform] = [
         ObservationNoise(
             in_keys=["measured_position", "measured_force"],
@@ -75,12 +86,12 @@ def build_env(
             std=[sensors.position_std_m, sensors.force_std_n],
             device=grasps.device,
         ),
-        HadContact(sensors.contact_threshold_n),
+        HadContact(sensors.contact_threshold_n, gripper.stall),
         ForceError(),
         LastAction(),
         ActionChangePenalty(reward.action_weight),
-        # q from [0, 0.045] m to [-1, 1]
-        ObservationNorm(loc=-1.0, scale=2 / OPEN_M, in_keys=["sensed_position"], out_keys=["scaled_position"]),
+        # q from [0, stroke] to [-1, 1]
+        ObservationNorm(loc=-1.0, scale=2 / gripper.stroke, in_keys=["sensed_position"], out_keys=["scaled_position"]),
         CatTensors([PART_KEYS[part] for part in observation.parts], "observation", del_keys=False, sort=False),
         CatFrames(observation.frames, dim=-1, in_keys=["observation"], padding="same"),
     ]

@@ -16,16 +16,16 @@ from forcegrasp.effects.model_file import Model
 from forcegrasp.effects.variation import ModelVariation
 from forcegrasp.env.reward import force_reward, normalised_force_reward, object_penalty
 from forcegrasp.gpu.simulator import WarpGraspSimulator
-from forcegrasp.physics import GraspParameters, GraspSampler, GraspSimulator
-from forcegrasp.physics.sampling import OPEN_M
+from forcegrasp.physics import GraspParameters, GraspSampler, GraspSimulator, Gripper, default_gripper
+from forcegrasp.physics.completion import complete
 
-#: The entries a step writes beside reward and done, with shape and meaning.
+#: The entries a step writes beside reward and done: how many numbers (or of what), and their meaning.
 OBSERVATIONS = {
-    "joint_position": (2, "finger positions (left, right), metres; 0 closed, 0.045 open"),
-    "measured_position": (2, "what the encoders say, before noise (left, right), metres"),
-    "commanded_position": (2, "q_des held during the step (left, right), metres"),
+    "joint_position": ("motors", "positions of the motors (left, right, or the one), m or rad; 0 is closed"),
+    "measured_position": ("motors", "what the encoders say, before noise, m or rad"),
+    "commanded_position": ("motors", "q_des held during the step, m or rad"),
     "force": (2, "true fingertip forces (left, right), newtons"),
-    "measured_force": (2, "what the force sensors say, before noise (left, right), newtons"),
+    "measured_force": ("channels", "what the force readings say, before noise, newtons"),
     "goal_force": (1, "goal force of each finger, newtons"),
     "object_position": (1, "object position along the grasp axis, metres"),
     "object_speed": (1, "|change of object position|, metres per control step"),
@@ -37,7 +37,7 @@ OBSERVATIONS = {
 
 
 class GraspEnv(EnvBase):
-    """``n`` grasps at once. Action: ``joint_delta``, u = Δq_des in metres, ``(n, 2)``; see :data:`OBSERVATIONS`.
+    """``n`` grasps at once. Action: ``joint_delta``, u = Δq_des, m or rad, ``(n, motors)``; see :data:`OBSERVATIONS`.
 
     The reward is α₁ r_force + α₂ r_obj of paper eq. 11, from the true state; r_act needs the policy's own actions and
     is added by :class:`~forcegrasp.transforms.ActionChangePenalty`. An episode is truncated, never terminated.
@@ -51,6 +51,7 @@ class GraspEnv(EnvBase):
       seed: seed of the sampler's generator.
       model: a fitted model to draw grippers from, with the effects found in it; nominal by default. It overrides
         the range of b2.
+      gripper: what grasps; the paper's by default.
 
     Raises:
       ConfigError: if an option is out of its range.
@@ -66,15 +67,17 @@ class GraspEnv(EnvBase):
         sampler: Callable[[np.random.Generator, np.ndarray], GraspParameters] | None = None,
         seed: int = 0,
         model: Model | None = None,
+        gripper: Gripper | None = None,
     ) -> None:
-        physics, grasp = physics or PhysicsConfig(), grasp or GraspConfig()
+        gripper = gripper or default_gripper()
+        physics, grasp = physics or PhysicsConfig(), complete(grasp or GraspConfig(), gripper)
         reward = dataclasses.replace(reward or RewardConfig())
         for name, part in (("physics", physics), ("grasp", grasp), ("reward", reward)):
             validate(part, f"{name}.")
-        simulator = _simulator(n, physics, model)  # first: it says what is wrong with the device
+        simulator = _simulator(gripper, n, physics, model)  # first: it says what is wrong with the device
         super().__init__(device=physics.device, batch_size=torch.Size([n]))
-        self.simulator, self.reward_config = simulator, reward
-        self.sampler = sampler or GraspSampler(grasp)
+        self.gripper, self.simulator, self.reward_config = gripper, simulator, reward
+        self.sampler = sampler or GraspSampler(grasp, gripper)
         self.episode_steps = grasp.steps
         self._drawn = self._column(simulator.parameters.as_array())
         self.set_seed(seed)
@@ -84,11 +87,13 @@ class GraspEnv(EnvBase):
         def unbounded(size: int) -> Unbounded:
             return Unbounded(shape=torch.Size([n, size]), dtype=torch.float32, device=self.device)
 
-        delta = Bounded(-OPEN_M, OPEN_M, shape=torch.Size([n, 2]), dtype=torch.float32, device=self.device)
+        sizes = {"motors": len(self.gripper.motors), "channels": len(self.gripper.forces)}
+        stroke, shape = self.gripper.stroke, torch.Size([n, sizes["motors"]])
+        delta = Bounded(-stroke, stroke, shape=shape, dtype=torch.float32, device=self.device)
         self.action_spec = Composite(joint_delta=delta, shape=(n,), device=self.device)
         self.observation_spec = Composite(shape=(n,), device=self.device)
         for key, (size, _) in OBSERVATIONS.items():
-            self.observation_spec[key] = unbounded(size)
+            self.observation_spec[key] = unbounded(sizes.get(size, size))
         self.observation_spec["reward_terms"].shape = torch.Size([n])
         self.reward_spec = unbounded(1)
         flag = Categorical(2, shape=torch.Size([n, 1]), dtype=torch.bool, device=self.device)
@@ -155,9 +160,9 @@ class GraspEnv(EnvBase):
         )
 
 
-def _simulator(n: int, physics: PhysicsConfig, model: Model | None) -> GraspSimulator | WarpGraspSimulator:
+def _simulator(gripper: Gripper, n: int, physics: PhysicsConfig, model: Model | None) -> GraspSimulator | WarpGraspSimulator:
     check_no_effects(model, physics)
     if physics.engine == "warp":
-        return WarpGraspSimulator(n, physics.tier, physics.device)
+        return WarpGraspSimulator(n, physics.tier, physics.device, gripper)
     variation = None if model is None else ModelVariation(model)
-    return GraspSimulator(n, physics.tier, physics.threads, variation)
+    return GraspSimulator(n, physics.tier, physics.threads, variation, gripper)

@@ -11,6 +11,10 @@ from pathlib import Path
 
 from forcegrasp.config import PhysicsConfig
 from forcegrasp.errors import ConfigError
+from forcegrasp.physics.gripper import Gripper
+
+#: Fields that a drawn parameter may write per grasp.
+WRITTEN = frozenset({"geom_solimp", "actuator_biasprm"})
 
 
 def check_engine(physics: PhysicsConfig) -> None:
@@ -27,6 +31,21 @@ def check_engine(physics: PhysicsConfig) -> None:
                 f"physics.device=cuda: torch {torch.__version__} finds no GPU; it takes a CUDA driver and a build of"
                 " torch for CUDA; or use physics.device=cpu"
             )
+
+
+def check_gripper_for_warp(gripper: Gripper) -> None:
+    """Raises ConfigError if the engine does not take a gripper."""
+    written = {w.field for name in _drawn(gripper) for w in gripper.parameters[name].writes}
+    plain = all(m.closed == 0 and m.open > 0 for m in gripper.motors) and all(f.force_sensor for f in gripper.fingers)
+    if not (gripper.is_direct and plain and gripper.shape == "cylinder" and written <= WRITTEN):
+        raise ConfigError(
+            f"physics.engine=warp: does not take gripper {gripper.name}; it takes two motors that slide a finger each from"
+            f" 0 up, a force sensor per finger, a cylinder, and drawn parameters that write {' or '.join(sorted(WRITTEN))}"
+        )
+
+
+def _drawn(gripper: Gripper) -> list[str]:
+    return [*gripper.training.softness, *filter(None, [gripper.training.servo_gain])]
 
 
 @cache

@@ -1,4 +1,4 @@
-"""TIAGo's scene in as many worlds as there are grasps, on a device; one recorded graph steps them all."""
+"""A gripper's scene in as many worlds as there are grasps, on a device; one recorded graph steps them all."""
 
 # pyright: standard, reportMissingImports=false, reportArgumentType=false
 
@@ -12,10 +12,8 @@ import warp as wp
 from torch import Tensor
 
 from forcegrasp.gpu.floor import GAP_M, exact_contacts
-from forcegrasp.physics.gripper_file import load_gripper
+from forcegrasp.physics.gripper import Gripper
 from forcegrasp.physics.inertia import inertia_of_radius
-from forcegrasp.physics.model import CONTROL_PERIOD_S
-from forcegrasp.physics.parameters import GraspParameters
 
 # Fields of the model that are written per grasp, and those that MuJoCo Warp derives from them.
 _WRITTEN = ("geom_size", "geom_solimp", "body_inertia", "actuator_biasprm")
@@ -36,6 +34,7 @@ class WarpScene:
     """State, parameters and time of ``n`` grasps. Every tensor is float32 and lies on the device.
 
     Args:
+      gripper: what is simulated, see :func:`~forcegrasp.gpu.installation.check_gripper_for_warp`.
       n: number of grasps.
       tier: physics tier, see :meth:`~forcegrasp.physics.gripper.Gripper.compile`.
       device: ``"cpu"`` or ``"cuda"``.
@@ -44,19 +43,19 @@ class WarpScene:
       ConfigError: if there is no such tier.
     """
 
-    def __init__(self, n: int, tier: str, device: str) -> None:
-        self._gripper = gripper = load_gripper("tiago")
+    def __init__(self, gripper: Gripper, n: int, tier: str, device: str) -> None:
+        self._gripper = gripper
         self._host = host = gripper.compile(tier)
         self._warp_device = wp.get_device(device)
         self.n, self.device = n, torch.device(wp.device_to_torch(self._warp_device))
-        joints = [host.joint(name) for name in gripper.joints]
+        joints = [host.joint(motor.joint) for motor in gripper.motors]
         self._fingers = [int(joint.qposadr[0]) for joint in joints]
-        self._actuators = [host.actuator(name).id for name in gripper.actuators]
+        self._actuators = [host.actuator(motor.actuator).id for motor in gripper.motors]
         geom = host.geom(gripper.object_geom)
         self._body = int(geom.bodyid[0])
         self._geoms = np.flatnonzero(host.geom_bodyid == self._body).tolist()
         self._object = int(host.joint(gripper.object_joint).qposadr[0]) + gripper.axis
-        self._readings = [slice(s.adr[0], s.adr[0] + s.dim[0]) for s in map(host.sensor, gripper.force_sensors)]
+        self._readings = [slice(s.adr[0], s.adr[0] + s.dim[0]) for s in (host.sensor(f.force_sensor) for f in gripper.fingers)]
         floor = host.geom("floor").id
         host.geom_gap[floor] = GAP_M
         with wp.ScopedDevice(self._warp_device):
@@ -71,7 +70,7 @@ class WarpScene:
             self._start = torch.as_tensor(host.key_qpos[0], dtype=torch.float32, device=self.device)
             mjw.step(self._model, self._data)  # loads every kernel, which can't be done while recording
             with wp.ScopedCapture() as capture:
-                for _ in range(round(CONTROL_PERIOD_S / host.opt.timestep)):
+                for _ in range(round(gripper.period_s / host.opt.timestep)):
                     mjw.step(self._model, self._data)
             self._graph = capture.graph
 
@@ -90,21 +89,23 @@ class WarpScene:
         """Sum of each finger's force sensor at the last physics step, before f_α, newtons, ``(n, 2)``."""
         return torch.stack([self._state["sensordata"][:, part].sum(-1) for part in self._readings], dim=1)
 
-    def reset(self, ids: np.ndarray, parameters: GraspParameters) -> None:
-        """Opens these grippers and puts objects of the given parameters between the fingers; other rows stay."""
+    def reset(self, ids: np.ndarray, base: dict[str, np.ndarray]) -> None:
+        """Opens these grippers and puts objects of these base parameters between the fingers; other rows stay."""
         rows = torch.as_tensor(ids, device=self.device)
 
         def put(field: Tensor, index: list[int], column: int, values: np.ndarray) -> None:
             field[rows[:, None], index, column] = self._tensor(values)[:, None]
 
-        put(self._fields["geom_size"], self._geoms, 0, parameters.radius_m)  # cylinder, and sphere of the fast tier
-        put(self._fields["geom_solimp"], self._geoms, 2, parameters.rho_m)
-        put(self._fields["actuator_biasprm"], self._actuators, 2, parameters.b2)
-        inertia = inertia_of_radius(self._host, self._gripper, parameters.radius_m)
+        rows_of = {"geom": self._geoms, "actuator": self._actuators}
+        put(self._fields["geom_size"], self._geoms, 0, base["radius_m"])  # cylinder, and sphere of the fast tier
+        for name, values in base.items():
+            for write in self._gripper.parameters[name].writes:
+                put(self._fields[write.field], rows_of[write.field.split("_")[0]], write.column, write.sign * values)
+        inertia = inertia_of_radius(self._host, self._gripper, base["radius_m"])
         self._fields["body_inertia"][rows, self._body] = self._tensor(inertia)
         for name, state in self._state.items():
             state[rows] = self._start if name == "qpos" else 0
-        self._state["qpos"][rows, self._object] += self._tensor(parameters.offset_m)
+        self._state["qpos"][rows, self._object] += self._tensor(base["offset_m"])
         groups = mjw.SetConstGroup.FIXED | mjw.SetConstGroup.INERT0
         with wp.ScopedDevice(self._warp_device):
             mjw.set_const(self._model, self._data, groups)

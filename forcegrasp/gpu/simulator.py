@@ -9,13 +9,15 @@ import torch
 from torch import Tensor
 
 from forcegrasp.config import PhysicsConfig
-from forcegrasp.gpu.installation import check_engine, start_warp
+from forcegrasp.gpu.installation import check_engine, check_gripper_for_warp, start_warp
 from forcegrasp.physics import GraspParameters, guard
-from forcegrasp.physics.sampling import OPEN_M
+from forcegrasp.physics.gripper import Gripper
+from forcegrasp.physics.gripper_file import default_gripper
+from forcegrasp.physics.simulator import base_parameters, nominal_grasps
 
 
 class WarpGraspSimulator:
-    """Simulates ``n`` grasps of TIAGo's gripper, each with its own parameters, 25 control steps per second.
+    """Simulates ``n`` grasps of a gripper, each with its own parameters, one control step at a time.
 
     Every tensor is float32, lies on the device, and is the reader's own. There are no effects: what is measured is
     true. On a GPU, sums are made in any order: runs agree to rounding only.
@@ -24,28 +26,32 @@ class WarpGraspSimulator:
       n: number of grasps.
       tier: physics tier, ``"reference"`` or ``"fast"``, see :meth:`~forcegrasp.physics.gripper.Gripper.compile`.
       device: ``"cpu"`` or ``"cuda"``.
+      gripper: what is simulated; the paper's by default.
 
     Raises:
-      ConfigError: if there is no such tier, MuJoCo Warp is not installed, or there is no such device.
+      ConfigError: if there is no such tier, MuJoCo Warp is not installed, there is no such device, or the engine does not
+        take the gripper.
     """
 
-    def __init__(self, n: int, tier: str = "fast", device: str = "cpu") -> None:
+    def __init__(self, n: int, tier: str = "fast", device: str = "cpu", gripper: Gripper | None = None) -> None:
+        self.gripper = gripper = gripper or default_gripper()
         check_engine(PhysicsConfig(tier, engine="warp", device=device))
+        check_gripper_for_warp(gripper)
         start_warp()
         from forcegrasp.gpu.scene import WarpScene
 
-        self._scene = scene = WarpScene(n, tier, device)
+        self._scene = scene = WarpScene(gripper, n, tier, device)
         self.n, self.device = n, scene.device
         self.steps = torch.zeros(n, dtype=torch.int64, device=self.device)  #: control steps since the reset, ``(n,)``
-        self.parameters = GraspParameters(*np.broadcast_to(np.array([[0.5], [-9.0], [0.025], [0.0], [0.1]]), (5, n)))
+        self.parameters = nominal_grasps(gripper, n)
         self._force_scale = torch.ones(n, 1, device=self.device)
-        self.commanded_position = torch.full((n, 2), OPEN_M, device=self.device)  #: q_des of the last step, metres
+        self.commanded_position = torch.full((n, 2), gripper.stroke, device=self.device)  #: q_des of the last step, metres
         self.object_speed = torch.zeros(n, device=self.device)  #: |o_y(t) − o_y(t−1)|, metres per control step
         self.reset(self.parameters)
 
     @property
     def joint_position(self) -> Tensor:
-        """Finger positions (left, right), metres, ``(n, 2)``; 0 is closed, 0.045 open."""
+        """Finger positions (left, right), metres, ``(n, 2)``; 0 is closed."""
         return self._scene.position
 
     @property
@@ -86,12 +92,13 @@ class WarpGraspSimulator:
         merged = self.parameters.as_array()
         merged[ids] = parameters.as_array()
         self.parameters = GraspParameters.from_array(merged)
-        self._scene.reset(ids, parameters)
+        base = base_parameters(self.gripper, parameters)
+        self._scene.reset(ids, base)
         rows = torch.as_tensor(ids, device=self.device)
-        scale = torch.as_tensor(parameters.force_scale, dtype=torch.float32, device=self.device)
-        self._force_scale[rows, 0] = scale
+        scale = base.get("force_scale", np.ones(len(ids)))
+        self._force_scale[rows, 0] = torch.as_tensor(scale, dtype=torch.float32, device=self.device)
         # not in place: somebody may have read them
-        self.commanded_position = self.commanded_position.index_fill(0, rows, OPEN_M)
+        self.commanded_position = self.commanded_position.index_fill(0, rows, self.gripper.stroke)
         self.object_speed = self.object_speed.index_fill(0, rows, 0.0)
         self.steps = self.steps.index_fill(0, rows, 0)
 
@@ -113,7 +120,7 @@ class WarpGraspSimulator:
           PhysicsError: if a grasp diverged.
         """
         before = self.object_position
-        self.commanded_position = position.float().clamp(0.0, OPEN_M)
+        self.commanded_position = position.float().clamp(0.0, self.gripper.stroke)
         self._scene.advance(self.commanded_position)
         warnings = self._scene.warnings()
         if warnings.any():  # waits for the device: once per control step, in which torchrl asks whether all is done

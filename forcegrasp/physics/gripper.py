@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
@@ -22,6 +23,13 @@ TIERS = {"reference": 1, "fitting": 2, "fast": 4}
 #: Parameters that the simulator itself understands; they need no `writes`.
 SPECIAL = ("force_scale", "radius_m", "offset_m")
 SIDES = ("left", "right")
+# A motor that moves by less than this share of the largest command step stands against something.
+_STALL = 0.1
+#: What to do where a policy is asked for and the description says `force: none`.
+NO_FORCES = (
+    "a policy that controls forces must read some, and this description has none; give a finger a force_sensor, as in"
+    " `left: {joint: finger_l, force_sensor: force_l}`, or say `force: motor` to read the motor's effort"
+)
 
 
 @dataclass(frozen=True)
@@ -102,6 +110,20 @@ class Gripper:
         if self.is_direct:
             return straight_law(self.stroke)
         return measure_opening(self.spec(), self.motors, self.fingers, self.object_geom, self.axis)
+
+    @property
+    def stall(self) -> float:
+        """Movement in a control step above which a motor's effort says nothing of contact, m or rad.
+
+        Infinite where forces are read from sensors.
+        """
+        return _STALL * self.max_step if self.force == "motor" else math.inf
+
+    @property
+    def shape(self) -> str:
+        """What the scene's object is: "cylinder", "sphere" or "box"."""
+        geom = self.compile().geom(self.object_geom)
+        return mujoco.mjtGeom(geom.type[0]).name.removeprefix("mjGEOM_").lower()
 
     def contact_position(self, radius_m: np.ndarray | float) -> np.ndarray:
         """Position of the motors at which the pads meet an object of this radius between them, m or rad."""

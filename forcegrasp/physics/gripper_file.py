@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 import re
 from collections.abc import Mapping, Set
@@ -14,6 +15,7 @@ from typing import Any
 import mujoco
 
 from forcegrasp import plain_yaml
+from forcegrasp.assets import DEFAULT_GRIPPER
 from forcegrasp.errors import ConfigError, closest
 from forcegrasp.physics.gripper import SIDES, SPECIAL, Gripper, shipped_folder
 from forcegrasp.physics.gripper_checks import check_gripper
@@ -46,6 +48,12 @@ def load_gripper(name: str, folder: Path | None = None) -> Gripper:
             raise ConfigError(f"gripper={name}: no such gripper{closest(name, known)}; or give a description's path")
         return _load(shipped_folder() / f"{name}.yaml")
     return _load((folder or Path()) / name)
+
+
+@functools.cache
+def default_gripper() -> Gripper:
+    """The gripper that is simulated where no other is named: the paper's."""
+    return load_gripper(DEFAULT_GRIPPER)
 
 
 def shipped_grippers() -> list[str]:

@@ -7,7 +7,9 @@ import dataclasses
 import numpy as np
 
 from forcegrasp.config import GraspConfig, check_deformation
+from forcegrasp.physics.completion import complete
 from forcegrasp.physics.gripper import Gripper
+from forcegrasp.physics.gripper_file import default_gripper
 from forcegrasp.physics.parameters import GraspParameters
 
 
@@ -33,16 +35,17 @@ class GraspSampler:
     """Draws grasps from the ranges of a :class:`GraspConfig`; the ranges may be changed between draws.
 
     Args:
-      config: the ranges, complete: see :func:`~forcegrasp.physics.completion.complete`.
-      gripper: whose objects they are.
+      config: the ranges; those left out are the gripper's.
+      gripper: whose objects they are; the paper's by default.
 
     Raises:
       ConfigError: if the smallest object could be squeezed flat (paper, eq. 3: d_p < r).
     """
 
-    def __init__(self, config: GraspConfig, gripper: Gripper) -> None:
-        self.config, self.gripper = config, gripper
-        self.set_ranges(config.radius_m, config.offset_m)
+    def __init__(self, config: GraspConfig, gripper: Gripper | None = None) -> None:
+        self.gripper = gripper or default_gripper()
+        self.config = complete(config, self.gripper)
+        self.set_ranges(self.config.radius_m, self.config.offset_m)
 
     def set_ranges(self, radius_m: list[float], offset_m: list[float]) -> None:
         """Narrows or widens the object ranges, as the curriculum does."""

@@ -10,6 +10,7 @@ import numpy as np
 
 from forcegrasp.physics import guard
 from forcegrasp.physics.gripper import Gripper
+from forcegrasp.physics.gripper_file import default_gripper
 from forcegrasp.physics.parameters import GraspParameters
 from forcegrasp.physics.plant import Plant, write_base
 
@@ -32,20 +33,25 @@ class GraspSimulator:
     Results do not depend on the number of threads, on ``n``, or on what a slot simulated before, to the last bit.
 
     Args:
-      gripper: what is simulated.
       n: number of grasps.
       tier: physics tier, ``"reference"`` or ``"fast"``, see :meth:`~forcegrasp.physics.gripper.Gripper.compile`.
       threads: threads of the engine; 0 uses every core.
       variation: draws the gripper's own parameters and effects at each reset; nominal and none by default.
+      gripper: what is simulated; the paper's by default.
 
     Raises:
       ConfigError: if there is no such tier.
     """
 
     def __init__(
-        self, gripper: Gripper, n: int, tier: str = "reference", threads: int = 0, variation: Variation | None = None
+        self,
+        n: int,
+        tier: str = "reference",
+        threads: int = 0,
+        variation: Variation | None = None,
+        gripper: Gripper | None = None,
     ) -> None:
-        self.gripper = gripper
+        self.gripper = gripper = gripper or default_gripper()
         self.plant = plant = Plant(gripper, n, tier, threads)
         self.model = plant.model
         self.n = n

@@ -7,8 +7,9 @@ from pathlib import Path
 from torchrl.modules import ProbabilisticActor
 
 from forcegrasp.config import TrainConfig
-from forcegrasp.controllers.policy import make_policy
+from forcegrasp.controllers.policy import make_policy, observation_size
 from forcegrasp.errors import CheckpointError
+from forcegrasp.physics import load_gripper
 from forcegrasp.policies import FOLDER, shipped_policies
 from forcegrasp.runs.run_dir import RunDir
 
@@ -28,8 +29,8 @@ def load_policy(name: Path | str) -> tuple[ProbabilisticActor, TrainConfig]:
     run = RunDir.open(path.parent.parent if one else path)
     config = run.config()
     tensors, _ = run.load_file(path) if one else run.load()
-    size = 2 * len(config.observation.parts) * config.observation.frames
-    policy = make_policy(size, config.ppo)
+    gripper = load_gripper(config.gripper)
+    policy = make_policy(observation_size(gripper, config.observation), config.ppo, gripper)
     weights = {key.removeprefix("policy."): t for key, t in tensors.items() if key.startswith("policy.")}
     try:
         policy.load_state_dict(weights)

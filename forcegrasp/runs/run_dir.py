@@ -25,8 +25,9 @@ from torch import Tensor
 from forcegrasp import plain_yaml
 from forcegrasp.config import TrainConfig, validate
 from forcegrasp.effects.model_file import Model, write_model
-from forcegrasp.effects.variation import read_tiago_model
+from forcegrasp.effects.variation import read_model_of
 from forcegrasp.errors import CheckpointError, ConfigError
+from forcegrasp.physics import load_gripper
 from forcegrasp.runs import checkpoint
 from forcegrasp.whole_file import write_whole
 
@@ -87,8 +88,8 @@ class RunDir:
             return None
         copy = self.path / "model.yaml"
         if not copy.exists():
-            write_model(read_tiago_model(config.model), copy)
-        return read_tiago_model(copy)
+            write_model(read_model_of(load_gripper(config.gripper), config.model), copy)
+        return read_model_of(load_gripper(config.gripper), copy)
 
     @classmethod
     def open(cls, path: Path | str) -> RunDir:

@@ -88,6 +88,7 @@ def training_env(config: TrainConfig, model: Model | None = None, worker: int = 
     threads = config.physics.threads if config.collector.kind == "direct" else cluster.cores(config)
     return build_env(
         config.ppo.grasps // config.collector.workers,
+        gripper=config.gripper,
         physics=dataclasses.replace(config.physics, threads=threads),
         grasp=config.grasp,
         sensors=config.sensors,

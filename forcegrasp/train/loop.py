@@ -19,6 +19,8 @@ from forcegrasp.curriculum import CurriculumValues, LinearSchedule
 from forcegrasp.effects.model_file import Model
 from forcegrasp.env.episodes import summarise
 from forcegrasp.errors import CheckpointError
+from forcegrasp.physics import load_gripper
+from forcegrasp.physics.completion import complete
 from forcegrasp.runs.run_dir import RunDir
 from forcegrasp.train.collector import collecting, make_collector, random_states, set_random_states, training_env
 from forcegrasp.train.logging import TrainingLog
@@ -41,13 +43,15 @@ class Trainer:
         self.frames = self.batches = 0
         torch.set_num_threads(1)  # the physics needs the cores
         torch.manual_seed(config.seed)
+        self.gripper = load_gripper(config.gripper)
+        config = self.config = complete(config, self.gripper)
         self.env: TransformedEnv = training_env(config, model)
         self.schedule = LinearSchedule(config.curriculum, config.grasp, config.reward, config.ppo.total_frames)
         device = self.env.device
         self.shuffle = torch.Generator(device).manual_seed(config.seed)
         size = self.env.observation_spec["observation"].shape[-1]
-        self.policy = make_policy(size, config.ppo)
-        self.value = make_value(size, config.ppo)
+        self.policy = make_policy(size, config.ppo, self.gripper)
+        self.value = make_value(size, config.ppo, self.gripper)
         for net in (self.policy, self.value):
             net.to(device)
         self.ppo = PPO(self.policy, self.value, config.ppo)

@@ -14,11 +14,8 @@ from torchrl.objectives import ClipPPOLoss
 from torchrl.objectives.value import GAE
 
 from forcegrasp.config import PPOConfig
-
-# Middle and half width of kappa, b2, radius, offset and goal force: brings the true parameters to about [-1, 1].
-_MIDDLE = (0.5, -9.5, 0.025, 0.0, 0.5)
-_HALF = (0.5, 3.5, 0.010, 0.012, 0.5)
-
+from forcegrasp.physics.gripper import Gripper
+from forcegrasp.physics.gripper_file import default_gripper
 
 class Value(nn.Module):
     """State value. Its output is scaled by the horizon 1 / (1 − γ), so that the network's own stays about 1."""
@@ -26,26 +23,48 @@ class Value(nn.Module):
     middle: Tensor
     half_width: Tensor
 
-    def __init__(self, observation_size: int, hidden: list[int], discount: float, privileged: bool) -> None:
+    def __init__(
+        self, observation_size: int, hidden: list[int], discount: float, privileged: bool, gripper: Gripper
+    ) -> None:
         super().__init__()
-        extra = len(_MIDDLE) + 5 if privileged else 0
+        ranges = _parameter_ranges(gripper)
+        self.direct, self.stroke, self.force = gripper.is_direct, gripper.stroke, _usual_force(gripper)
+        extra = len(ranges) + 2 + len(gripper.motors) + 1 if privileged else 0
         self.net = MLP(
             in_features=observation_size + extra, out_features=1, num_cells=list(hidden), activation_class=nn.Tanh
         )
         self.horizon = 1 / max(1 - discount, 1e-3)
-        self.register_buffer("middle", torch.tensor(_MIDDLE), persistent=False)
-        self.register_buffer("half_width", torch.tensor(_HALF), persistent=False)
+        self.register_buffer("middle", torch.tensor([(low + high) / 2 for low, high in ranges]), persistent=False)
+        half = [max((high - low) / 2, 1e-6) for low, high in ranges]
+        self.register_buffer("half_width", torch.tensor(half), persistent=False)
 
     def forward(self, observation: Tensor, *state: Tensor) -> Tensor:
         if state:
             parameters, force, position, object_position = state
-            # true gap between each finger and the object's surface, in centimetres
-            side = torch.tensor([-1.0, 1.0], device=position.device)
-            gap = (position - side * object_position - parameters[..., 2:3]) * 100
             true = (parameters - self.middle) / self.half_width
             moved = (object_position - parameters[..., 3:4]) * 1000
-            observation = torch.cat([observation, true, force, gap, moved], dim=-1)
+            features = [true, force / self.force, self._gap(position, object_position, parameters[..., 2:3]), moved]
+            observation = torch.cat([observation, *features], dim=-1)
         return self.horizon * self.net(observation)
+
+    def _gap(self, position: Tensor, object_position: Tensor, radius: Tensor) -> Tensor:
+        """True gap between each finger and the object's surface, in centimetres; else where the motors are."""
+        if not self.direct:
+            return 2 * position / self.stroke - 1
+        side = torch.tensor([-1.0, 1.0], device=position.device)
+        return (position - side * object_position - radius) * 100
+
+
+def _parameter_ranges(gripper: Gripper) -> list[tuple[float, float]]:
+    """What the grasp's parameters (kappa, b2, radius, offset, goal force) usually are, to bring them to about [-1, 1]."""
+    training = gripper.training
+    room = min(training.offset_m[1], training.radius_m[1] - training.deformation_m) / 2
+    return [(0.0, 1.0), training.servo_gain_range, training.radius_m, (-room, room), (0.0, 2 * _usual_force(gripper))]
+
+
+def _usual_force(gripper: Gripper) -> float:
+    """A force of the size that goals have, newtons."""
+    return gripper.training.max_force_n * float(gripper.training.force_scale(0.5)) / 2
 
 
 #: What an update reports, by the names of torchrl's loss.
@@ -53,15 +72,15 @@ DIAGNOSTICS = ("loss_objective", "loss_critic", "kl_approx", "clip_fraction", "E
 PRIVILEGED = ["grasp_parameters", "force", "joint_position", "object_position"]
 
 
-def make_value(observation_size: int, config: PPOConfig) -> TensorDictModule:
+def make_value(observation_size: int, config: PPOConfig, gripper: Gripper | None = None) -> TensorDictModule:
     """The value network: reads ``observation`` (and the true state, if privileged), writes ``state_value``."""
     privileged = config.critic == "privileged"
-    net = Value(observation_size, config.hidden, config.discount, privileged)
+    net = Value(observation_size, config.hidden, config.discount, privileged, gripper or default_gripper())
     return TensorDictModule(net, in_keys=["observation", *(PRIVILEGED if privileged else [])], out_keys=["state_value"])
 
 
 def entropy(scale: Tensor) -> Tensor:
-    """Mean differential entropy of the policy's Gaussian, in nats, from its standard deviations ``(*B, 2)``."""
+    """Mean differential entropy of the policy's Gaussian, in nats, from its standard deviations ``(*B, motors)``."""
     return (scale.log() + 0.5 * math.log(2 * math.pi * math.e)).sum(-1).mean()
 
 

@@ -16,7 +16,7 @@ class ActionChangePenalty(Transform):
 
     Args:
       weight: α₃.
-      last_action_key: a(t−1), as written by :class:`LastAction`, ``(*B, 2)``.
+      last_action_key: a(t−1), as written by :class:`LastAction`, ``(*B, motors)``.
       reward_key: the reward to add to, ``(*B, 1)``.
       out_key: where the unweighted term goes, ``(*B, 1)``.
     """

@@ -12,9 +12,9 @@ class ActionScale(Transform):
     """Turns the policy's action in [−1, 1] into a position delta.
 
     Args:
-      max_delta: Δq_max, metres.
-      delta_key: what the environment takes, metres, ``(*B, 2)``.
-      action_key: what the policy gives, ``(*B, 2)``. It is stored as the policy gave it.
+      max_delta: Δq_max, m or rad.
+      delta_key: what the environment takes, m or rad, ``(*B, motors)``.
+      action_key: what the policy gives, ``(*B, motors)``. It is stored as the policy gave it.
     """
 
     def __init__(

@@ -13,8 +13,8 @@ class ForceError(Transform):
 
     Args:
       goal_key: goal force, newtons, ``(*B, 1)``.
-      force_key: measured force, newtons, ``(*B, 2)``.
-      out_key: the difference, newtons, ``(*B, 2)``.
+      force_key: measured force, newtons, ``(*B, channels)``.
+      out_key: the difference, newtons, ``(*B, channels)``.
     """
 
     def __init__(

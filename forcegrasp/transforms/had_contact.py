@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import torch
 from tensordict import TensorDictBase
 from tensordict.utils import NestedKey
@@ -15,21 +17,34 @@ class HadContact(Transform):
     The memory lives in the tensordict: h(t+1) is written from f(t+1) and h(t), so partial resets and batched envs need
     no bookkeeping.
 
+    Where the force is read from the motor's effort, which moving takes as well, a motor that still moves has no contact.
+
     Args:
       threshold: f_θ, newtons.
-      in_key: measured force, newtons, ``(*B, 2)``.
-      out_key: the flags, float 0 or 1, ``(*B, 2)``.
+      stall: largest movement of a motor in a step that may be contact, m or rad; any by default.
+      in_key: measured force, newtons, ``(*B, channels)``.
+      out_key: the flags, float 0 or 1, ``(*B, channels)``.
+      position_key: measured position, m or rad, ``(*B, channels)``; read only where ``stall`` is given.
     """
 
     def __init__(
-        self, threshold: float, in_key: NestedKey = "sensed_force", out_key: NestedKey = "had_contact"
+        self,
+        threshold: float,
+        stall: float = math.inf,
+        in_key: NestedKey = "sensed_force",
+        out_key: NestedKey = "had_contact",
+        position_key: NestedKey = "sensed_position",
     ) -> None:
         super().__init__(in_keys=[in_key], out_keys=[out_key])
-        self.threshold = threshold
+        self.threshold, self.stall, self.position_key = threshold, stall, position_key
 
     def _step(self, tensordict: TensorDictBase, next_tensordict: TensorDictBase) -> TensorDictBase:
         force = next_tensordict[self.in_keys[0]]
-        contact = (force > self.threshold).to(force.dtype)
+        contact = force > self.threshold
+        if math.isfinite(self.stall):
+            moved = next_tensordict[self.position_key] - tensordict[self.position_key]
+            contact = contact & (moved.abs() < self.stall)
+        contact = contact.to(force.dtype)
         next_tensordict.set(self.out_keys[0], torch.maximum(contact, tensordict[self.out_keys[0]]))
         return next_tensordict
 

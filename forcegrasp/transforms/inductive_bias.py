@@ -9,25 +9,37 @@ from torch import Tensor
 from torchrl.envs.transforms import Transform
 
 
-def contact_bias(had_contact: Tensor, force_error: Tensor, goal_force: Tensor, one: float, floor: float) -> Tensor:
-    """φ of each finger (paper, eq. 7).
+def contact_bias(
+    had_contact: Tensor, force_error: Tensor, goal_force: Tensor, one: float, floor: float, motors: int
+) -> Tensor:
+    """φ of each motor (paper, eq. 7).
 
-    1 before the finger's first contact; ``one`` for a finger that waits for the other; with both in contact
-    max(floor, 1 − |Δf| / f_goal).
+    Where each motor has a force reading of its own: 1 before its finger's first contact; ``one`` for a finger that
+    waits for the other; with both in contact max(floor, 1 − |Δf| / f_goal).
+
+    Else, as with one motor for two fingers, all motors have the same φ: 1 until every reading has shown contact, and
+    then max(floor, 1 − |Δf| / f_goal) of the mean error. Between the first and the second finger's touch nothing can
+    wait: the motor closes on, and the finger that has touched pushes the object towards the other one.
 
     Args:
-      had_contact: h, 0 or 1, ``(*B, 2)``.
-      force_error: Δf, newtons, ``(*B, 2)``.
+      had_contact: h, 0 or 1, ``(*B, channels)``.
+      force_error: Δf, newtons, ``(*B, channels)``.
       goal_force: f_goal, newtons, ``(*B, 1)``.
+      one, floor: as above.
+      motors: how many.
 
     Returns:
-      ``(*B, 2)``, in [0, 1].
+      ``(*B, motors)``, in [0, 1].
     """
     touched = had_contact > 0.5
-    both = touched.all(-1, keepdim=True)
+    all_touched = touched.all(-1, keepdim=True)
+    if touched.shape[-1] != motors:
+        error = force_error.abs().mean(-1, keepdim=True)
+        near_goal = (1 - error / goal_force).clamp_min(floor)
+        return torch.where(all_touched, near_goal, 1.0).expand(*near_goal.shape[:-1], motors)
     near_goal = (1 - force_error.abs() / goal_force).clamp_min(floor)
-    waiting = torch.where(touched, one, torch.ones_like(near_goal))
-    return torch.where(both, near_goal, waiting)
+    waiting = torch.where(touched, one, torch.ones_like(near_goal)) if motors > 1 else torch.ones_like(near_goal)
+    return torch.where(all_touched, near_goal, waiting)
 
 
 class InductiveBias(Transform):
@@ -39,7 +51,7 @@ class InductiveBias(Transform):
     Args:
       one: φ of a finger that waits for the other.
       floor: smallest φ with both fingers in contact.
-      delta_key: the quantity to scale, ``(*B, 2)``.
+      delta_key: the quantity to scale, ``(*B, motors)``.
     """
 
     def __init__(
@@ -57,5 +69,6 @@ class InductiveBias(Transform):
 
     def _inv_call(self, tensordict: TensorDictBase) -> TensorDictBase:
         had_contact, force_error, goal = (tensordict[key] for key in self.state_keys)
-        phi = contact_bias(had_contact, force_error, goal, self.one, self.floor)
-        return tensordict.set(self.in_keys_inv[0], tensordict[self.out_keys_inv[0]] * phi)
+        delta = tensordict[self.out_keys_inv[0]]
+        phi = contact_bias(had_contact, force_error, goal, self.one, self.floor, delta.shape[-1])
+        return tensordict.set(self.in_keys_inv[0], delta * phi)
