@@ -27,11 +27,13 @@ def main(arguments: list[str]) -> int:
     from forcegrasp.effects.model_file import read_model
     from forcegrasp.measure import write_set
     from forcegrasp.measure.record import parse_effect, record
+    from forcegrasp.physics.completion import complete
     from forcegrasp.physics.gripper_file import load_gripper
 
     out = default_out("record", config.out)
-    effects, known = [parse_effect(text) for text in config.effects], {}
     gripper = load_gripper(config.gripper)
+    config = complete(config, gripper)
+    effects, known = [parse_effect(text, gripper) for text in config.effects], {}
     if config.model:
         model = read_model(Path(config.model))
         if model.gripper.name != gripper.name:

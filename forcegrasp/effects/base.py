@@ -68,6 +68,7 @@ class Effect:
     #: the name of the only one.
     per: ClassVar[str] = ""
     alone: ClassVar[str] = ""
+    after_noise: ClassVar[bool] = False  #: acts on readings with their noise, as rounding does
     least_channels: ClassVar[int] = 0  #: force readings that the gripper must have for it to make a difference
     # of the gripper, see for_gripper
     motors: ClassVar[int] = 2

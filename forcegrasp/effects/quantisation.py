@@ -22,6 +22,7 @@ class Quantisation(Effect):
         Parameter("force_step_n", "step of the forces, if any", "N", 0.0, 1.0, 0.04, follows="force"),
     )
     order = 10
+    after_noise = True
 
     @classmethod
     def trials(cls) -> np.ndarray:

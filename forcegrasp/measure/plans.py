@@ -6,6 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from forcegrasp.physics.gripper import Gripper
+from forcegrasp.physics.sampling import offset_limits_m
+
 #: Seconds between two commands of a plan, and the length of a grasp (paper: 25 Hz, 6 s).
 PERIOD_S, SAMPLES = 0.04, 150
 # Time open and at rest before anything moves, which shows what sensors read in free air. Samples.
@@ -14,12 +17,12 @@ _REST = 8
 
 @dataclass(frozen=True)
 class PlannedGrasp:
-    """A grasp to record: both fingers are given the same command, the object may stand off the centre."""
+    """A grasp to record: all motors are given the same command, the object may stand off the centre."""
 
     object: int
     kind: str  #: its name on the menu
     offset_m: float
-    command_m: np.ndarray  #: ``(SAMPLES, 2)``
+    command_m: np.ndarray  #: m or rad, ``(SAMPLES, motors)``
 
 
 # Each grasp on the menu is given as the way from open (1) to first contact (0) and on to the deepest squeeze (−1), at
@@ -50,15 +53,18 @@ PLANS: dict[str, tuple[str, ...]] = {
 }
 
 
-def make_command(kind: str, contact_m: float, open_m: float, squeeze_m: float, speed: float = 1.0) -> np.ndarray:
-    """Commands of a grasp on the menu, metres, ``(SAMPLES, 2)``.
+def make_command(
+    kind: str, contact: float, stroke: float, squeeze: float, speed: float = 1.0, motors: int = 2
+) -> np.ndarray:
+    """Commands of a grasp on the menu, m or rad, ``(SAMPLES, motors)``.
 
     Args:
       kind: its name.
-      contact_m: finger position at first contact.
-      open_m: finger position when open.
-      squeeze_m: deepest command beyond contact.
+      contact: position of the motors at first contact.
+      stroke: their position when open.
+      squeeze: deepest command beyond contact.
       speed: stretches the way's pieces; below 1 it is slower and its end is cut off.
+      motors: how many are given it.
     """
     way = MENU["slow ramp" if kind == OFF_CENTRE else kind]
     time = np.arange(SAMPLES) * PERIOD_S
@@ -67,13 +73,13 @@ def make_command(kind: str, contact_m: float, open_m: float, squeeze_m: float, s
     # two points of one time are a jump: the later one counts from that time on
     instants = np.maximum.accumulate(instants + np.arange(len(instants)) * 1e-9)
     place = np.interp(time, instants, [p for _, p in way])
-    along = np.where(place >= 0, contact_m + place * (open_m - contact_m), contact_m + place * squeeze_m)
-    along[:_REST] = open_m
-    return np.repeat(np.clip(along, 0.0, open_m)[:, None], 2, axis=1)
+    along = np.where(place >= 0, contact + place * (stroke - contact), contact + place * squeeze)
+    along[:_REST] = stroke
+    return np.repeat(np.clip(along, 0.0, stroke)[:, None], motors, axis=1)
 
 
 def make_plan(
-    plan: str, radii_m: np.ndarray, grasps: int, open_m: float, rng: np.random.Generator
+    plan: str, radii_m: np.ndarray, grasps: int, gripper: Gripper, rng: np.random.Generator
 ) -> list[PlannedGrasp]:
     """A plan of grasps: the objects in turn, each meeting the whole menu at several speeds, depths and offsets.
 
@@ -81,19 +87,21 @@ def make_plan(
       plan: a name out of :data:`PLANS`.
       radii_m: radius of each object, ``(objects,)``.
       grasps: how many.
-      open_m: finger position when open.
+      gripper: whose motors are commanded.
       rng: draws speeds, depths and offsets.
     """
-    deepest, kinds, simple = open_m / 9, PLANS[plan], plan == "close_and_hold"
+    deepest, kinds, simple = gripper.stroke / 9, PLANS[plan], plan == "close_and_hold"
+    widest = float(gripper.opening.opening_m[-1]) / 2
     planned = []
     for index in range(grasps):
         turn, thing = divmod(index, len(radii_m))
         radius = radii_m[thing]
         speed, depth = (1.0, 1.0) if simple else (rng.uniform(0.8, 1.25), rng.uniform(0.5, 1.0))
-        room = min(open_m - radius, radius / 3, open_m / 8)
+        room = min(widest - radius, radius / 3, widest / 8)
         off_centre = (turn + thing) % 2 == 1 and not simple
         offset = rng.uniform(0.3, 0.8) * room * rng.choice([-1, 1]) if off_centre else 0.0
-        kind = kinds[(turn + thing) % len(kinds)]
-        command = make_command(kind, radius, open_m, depth * deepest, speed)
+        offset = float(np.clip(offset, *offset_limits_m(gripper, radius, 0.0)))
+        kind, contact = kinds[(turn + thing) % len(kinds)], float(gripper.contact_position(radius))
+        command = make_command(kind, contact, gripper.stroke, depth * deepest, speed, len(gripper.motors))
         planned.append(PlannedGrasp(thing, kind, offset, command))
     return planned

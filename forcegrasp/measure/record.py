@@ -8,15 +8,17 @@ from pathlib import Path
 
 import numpy as np
 
-from forcegrasp.effects import Effect, get_effect
+from forcegrasp.effects import Effect
+from forcegrasp.effects.for_gripper import effect_of
 from forcegrasp.errors import ConfigError, closest
 from forcegrasp.measure.plans import PERIOD_S, SAMPLES, make_plan
 from forcegrasp.measure.replay import EffectOn, Replay
 from forcegrasp.measure.schema import MeasuredGrasp, MeasurementSet, fingerprint_of_set
 from forcegrasp.physics.gripper import Gripper
 from forcegrasp.physics.gripper_parts import BaseParameter
+from forcegrasp.physics.sensors import is_rounding, with_noise
 
-# Objects' radii, as shares of the open finger's position: both fingers reach them, and they fit in.
+# Objects' radii, as shares of half the opening: both fingers reach them, and they fit in.
 _RADII = (0.4, 0.75)
 # Objects differ from the nominal one by up to this factor, either way.
 _OBJECT_FACTOR = 2.0
@@ -65,17 +67,18 @@ def record(
         if p.scope == "gripper"
     }
     of_objects = {p.name: _draw(p, objects, rng) for p in parameters if p.scope == "object" and p.name != "radius_m"}
-    radii = rng.uniform(*_RADII, objects) * gripper.stroke
-    planned = make_plan(plan, radii, grasps, gripper.stroke, rng)
+    radii = rng.uniform(*_RADII, objects) * (gripper.opening.opening_m[-1] / 2)
+    planned = make_plan(plan, radii, grasps, gripper, rng)
     thing = np.array([p.object for p in planned])
     base = {name: np.full(grasps, value) for name, value in of_gripper.items()}
     base |= {name: values[thing] for name, values in of_objects.items()}
     base |= {"radius_m": radii[thing], "offset_m": np.array([p.offset_m for p in planned])}
-    time, rest = np.arange(SAMPLES) * PERIOD_S, np.full((SAMPLES, 2), gripper.stroke)
+    time, rest = np.arange(SAMPLES) * PERIOD_S, np.full((SAMPLES, len(gripper.motors)), gripper.stroke)
+    unloaded = np.zeros((SAMPLES, len(gripper.forces)))
     bare = [
         MeasuredGrasp(
             f"g{index:03}", f"object_{p.object + 1}", "simulated", float(radii[p.object]), p.offset_m, None,
-            time, p.command_m, rest, np.zeros((SAMPLES, 2)), None,
+            time, p.command_m, rest, unloaded, None,
         )
         for index, p in enumerate(planned)
     ]  # fmt: skip
@@ -89,14 +92,10 @@ def record(
         {n: v for n, v in base.items() if n != "force_scale"},
         [e for e in on if not e.effect.reads_only(e.variant)],
     )
-    last = [e for e in on if e.effect.name == "quantisation"]  # a converter rounds the noise, too
-    readings = replay.read(motion, rows, base["force_scale"], [e for e in on if e.effect.reads() and e not in last])
-    position = readings.position + position_std_m * rng.standard_normal(readings.position.shape)
-    force = readings.force + force_std_n * rng.standard_normal(readings.force.shape)
-    for rounding in last:
-        live = rounding.effect(rounding.values, replay.dt)
-        position = np.stack([live.read_position(position[:, s]) for s in range(SAMPLES)], axis=1)
-        force = np.stack([live.read_force(force[:, s]) for s in range(SAMPLES)], axis=1)
+    readings = replay.read(motion, rows, base["force_scale"], [e for e in on if e.effect.reads()])
+    steps = next((values for effect, _, values in effects if is_rounding(effect)), np.zeros(2))
+    position = with_noise(readings.position, position_std_m, rng.standard_normal(readings.position.shape), steps[0])
+    force = with_noise(readings.force, force_std_n, rng.standard_normal(readings.force.shape), steps[1])
     full = tuple(dataclasses.replace(g, position_m=position[i], force_n=force[i]) for i, g in enumerate(bare))
     name = gripper.path.stem if gripper.is_shipped else str(gripper.path.resolve())
     fingerprint = fingerprint_of_set(name, position_std_m, force_std_n, full)
@@ -107,14 +106,14 @@ def record(
     return Recorded(measured, base)
 
 
-def parse_effect(text: str) -> tuple[type[Effect], str, np.ndarray]:
-    """Reads ``NAME [VARIANT] [PARAMETER=VALUE ...]``; what is not given is typical.
+def parse_effect(text: str, gripper: Gripper) -> tuple[type[Effect], str, np.ndarray]:
+    """Reads ``NAME [VARIANT] [PARAMETER=VALUE ...]``; what is not given is typical of this gripper.
 
     Raises:
-      ConfigError: if there is no such effect, variant or parameter, or a value is out of bounds.
+      ConfigError: if the gripper has no such effect, variant or parameter, or a value is out of bounds.
     """
     name, *words = text.split() or [""]
-    effect, variant = get_effect(name), ""
+    effect, variant = effect_of(name, gripper), ""
     values = dict(zip((p.name for p in effect.parameters), effect.typical_values(), strict=True))
     bounds = {p.name: p for p in effect.parameters}
     for word in words:

@@ -12,11 +12,12 @@ from forcegrasp.errors import PhysicsError
 from forcegrasp.measure.schema import MeasuredGrasp
 from forcegrasp.physics.gripper import Gripper
 from forcegrasp.physics.plant import Plant, write_base
+from forcegrasp.physics.sensors import ReadingEffects
 
 #: Threads of the engine; 0 uses every core. Programs that run several diagnoses side by side set it to 1.
 THREADS = 0
-#: A finger starts where its first command or the end of its range is, if it was measured that near to it. Metres.
-_AT_REST_M = 1e-3
+# A motor starts where its first command or the end of its range is, if it was measured so near to it. Share of its stroke.
+_AT_REST = 1 / 45
 #: Rows × physics steps that are kept in memory at once.
 _CHUNK = 8_000_000
 # Motions that are kept; those of 24 grasps of 6 s take 3 MB.
@@ -38,8 +39,8 @@ class Motion:
     """What happened in simulated rows, at the physics rate; not yet what sensors say of it."""
 
     grasp: np.ndarray  #: index of the measured grasp each row replays, ``(n,)``
-    position: np.ndarray  #: metres, ``(n, steps, 2)``
-    pad_force: np.ndarray  #: force between pad and object before f_α, newtons, ``(n, steps, 2)``
+    position: np.ndarray  #: of the motors, m or rad, ``(n, steps, motors)``
+    force: np.ndarray  #: what the force readings transduce, before f_α, newtons, ``(n, steps, channels)``
     object_position: np.ndarray  #: metres, ``(n, steps)``
 
 
@@ -47,8 +48,8 @@ class Motion:
 class Readings:
     """What sensors say at the sample times; after a grasp's last sample, its last reading again."""
 
-    position: np.ndarray  #: metres, ``(n, samples, 2)``
-    force: np.ndarray  #: newtons, ``(n, samples, 2)``
+    position: np.ndarray  #: m or rad, ``(n, samples, motors)``
+    force: np.ndarray  #: newtons, ``(n, samples, channels)``
     object_position: np.ndarray  #: metres, ``(n, samples)``
 
 
@@ -102,7 +103,7 @@ class Replay:
 
     def remember(self, key: bytes, motion: Motion, rows: np.ndarray) -> None:
         """Keeps these rows of a motion under a name; the ones kept longest ago are forgotten."""
-        names = ("grasp", "position", "pad_force", "object_position")
+        names = ("grasp", "position", "force", "object_position")
         self.remembered.pop(key, None)  # it goes to the end
         self.remembered[key] = Motion(*(getattr(motion, name)[rows] for name in names))
         for oldest in list(self.remembered)[:-_REMEMBERED]:
@@ -135,18 +136,18 @@ class Replay:
         plant.attach([(e.effect(e.values, self.dt, e.variant), e.rows) for e in effects if len(e.rows)])
         ids = np.arange(n)
         plant.reset(ids, write_base(plant, ids, base), self.start_m[grasp])
-        position, pad_force = np.empty((2, n, self._steps, 2))
+        position, force = (np.empty((n, self._steps, width)) for width in (plant.motors, plant.channels))
         objects = np.empty((n, self._steps))
-        position[:, 0], pad_force[:, 0], objects[:, 0] = plant.position, plant.force, plant.object_position
+        position[:, 0], force[:, 0], objects[:, 0] = plant.position, plant.transduced_force, plant.object_position
         if not plant.acts_in_steps:
             commands = self._command[:-1, grasp].swapaxes(0, 1)
-            position[:, 1:], pad_force[:, 1:], objects[:, 1:] = plant.play(commands)
+            position[:, 1:], force[:, 1:], objects[:, 1:] = plant.play(commands)
         else:
             for step in range(self._steps - 1):
                 if self._encoders_known:
                     plant.recorded_position = self._encoder[step, grasp]
                 plant.advance(self._command[step, grasp], 1, self._fresh[step, grasp])
-                position[:, step + 1], pad_force[:, step + 1] = plant.position, plant.force
+                position[:, step + 1], force[:, step + 1] = plant.position, plant.transduced_force
                 objects[:, step + 1] = plant.object_position
         bad = plant.warnings().any(axis=1)
         if bad.any():
@@ -155,7 +156,7 @@ class Replay:
             raise PhysicsError(
                 f"grasp {self.grasps[grasp[row]].name} diverged with {values}; narrow the gripper's bounds"
             )
-        return Motion(grasp, position, pad_force, objects)
+        return Motion(grasp, position, force, objects)
 
     def read(
         self, motion: Motion, rows: np.ndarray, force_scale: np.ndarray, effects: Sequence[EffectOn] = ()
@@ -172,40 +173,42 @@ class Replay:
         each = np.asarray(rows)[:, None]
         position, objects = motion.position[each, steps], motion.object_position[each, steps]
         if not effects:
-            return Readings(position, motion.pad_force[each, steps] * force_scale[:, None, None], objects)
-        force = motion.pad_force[rows] * force_scale[:, None, None]
-        true_position = motion.position[rows] if any("read_position" in e.effect.hooks() for e in effects) else None
-        live = sorted(
-            ((e.effect(e.values, self.dt, e.variant), e.rows) for e in effects), key=lambda pair: pair[0].rank
-        )
+            return Readings(position, motion.force[each, steps] * force_scale[:, None, None], objects)
+        force = motion.force[rows] * force_scale[:, None, None]
+        live = ReadingEffects([self._on_readings(effect) for effect in effects])
+        true_position = motion.position[rows] if live.change_position else motion.position[:0]
         for step in range(self._steps):
-            for effect, which in live:
-                force[which, step] = effect.read_force(force[which, step])
-                if true_position is not None:
-                    true_position[which, step] = effect.read_position(true_position[which, step])
+            live.apply(true_position[:, step], force[:, step])
         count = np.arange(len(grasp))[:, None]
-        if true_position is not None:
+        if live.change_position:
             position = true_position[count, steps]
         return Readings(position, force[count, steps], objects)
+
+    def _on_readings(self, one: EffectOn) -> Effect:
+        """An effect that changes what is read, on its readings, without a plant."""
+        effect = one.effect(one.values, self.dt, one.variant)
+        effect.rows = np.asarray(one.rows)
+        return effect
 
 
 def join(motions: Sequence[Motion]) -> Motion:
     """The rows of several motions, one after the other."""
     if len(motions) == 1:
         return motions[0]
-    names = ("grasp", "position", "pad_force", "object_position")
+    names = ("grasp", "position", "force", "object_position")
     return Motion(*(np.concatenate([getattr(m, name) for m in motions]) for name in names))
 
 
-def start_position(grasp: MeasuredGrasp, open_m: float) -> np.ndarray:
-    """Where the fingers stood at the first sample, metres, ``(2,)``.
+def start_position(grasp: MeasuredGrasp, stroke: float) -> np.ndarray:
+    """Where the motors stood at the first sample, m or rad, ``(motors,)``.
 
-    An encoder may be off and is noisy: within a millimetre of the open end, or of the first command, they stood there.
+    An encoder may be off and is noisy: near enough to the open end, or to the first command, they stood there.
     """
-    start = np.clip(grasp.position_m[0], 0.0, open_m)
-    for anchor in (grasp.command_m[0], np.full(2, open_m)):
-        start = np.where(np.abs(grasp.position_m[0] - anchor) < _AT_REST_M, anchor, start)
-    return np.clip(start, 0.0, open_m)
+    first = grasp.position_m[0]
+    start = np.clip(first, 0.0, stroke)
+    for anchor in (grasp.command_m[0], np.full(len(first), stroke)):
+        start = np.where(np.abs(first - anchor) < _AT_REST * stroke, anchor, start)
+    return np.clip(start, 0.0, stroke)
 
 
 def _cut(effect: EffectOn, part: slice) -> EffectOn:

@@ -17,6 +17,7 @@ from forcegrasp.physics.gripper import SIDES, Gripper, own_sensor
 from forcegrasp.physics.gripper_parts import BaseParameter, Finger
 from forcegrasp.physics.inertia import inertia_of_radius
 from forcegrasp.physics.opening import command_law
+from forcegrasp.physics.sensors import ReadingEffects
 
 if TYPE_CHECKING:
     from forcegrasp.effects.base import Effect
@@ -97,6 +98,7 @@ class Plant:
         self._friction_active: np.ndarray | None = None  # which motors' friction was stiffened, ``(n, motors)``
         self._effects: list[Effect] = []
         self._hooked: dict[str, list[Effect]] = {}
+        self._reading_effects = ReadingEffects([])
         self.force_scale = np.ones(n)  #: f_α, factor from the force sensors to the reading, ``(n,)``
         #: What effects add to in each step: friction of the motors ``(n, motors)``, displacement of the pads towards
         #: opening (metres) and forces on them (newtons, positive opens), ``(n, 2)``, and forces on the object ``(n,)``.
@@ -108,7 +110,9 @@ class Plant:
         self.pad_force = np.zeros((n, 2))
         #: True fingertip forces (left, right): the interaction with the object times f_α, newtons, ``(n, 2)``.
         self.force = np.zeros((n, 2))
-        self.measured_force = np.zeros((n, self.channels))  #: what the force sensors say, newtons
+        self.transduced_force = np.zeros((n, self.channels))  #: what goes into the force readings, newtons
+        #: The same after effects and before noise and rounding: what the force readings say, newtons, ``(n, channels)``.
+        self.measured_force = np.zeros((n, self.channels))
         self.measured_position = np.zeros((n, self.motors))  #: what the encoders say, m or rad
         #: What the encoders said when a real gripper was recorded, m or rad, ``(n, motors)``; None if only simulated.
         self.recorded_position: np.ndarray | None = None
@@ -244,8 +248,9 @@ class Plant:
     def attach(self, effects: Sequence[tuple[Effect, np.ndarray]]) -> None:
         """Puts effects into the plant, each on its own rows, in the order of their stages; replaces earlier ones."""
         self._effects = [effect.attach(self, rows) for effect, rows in sorted(effects, key=lambda pair: pair[0].rank)]
-        hooks = ("change_model", "command", "act", "interaction", "read_force", "read_position")
+        hooks = ("change_model", "command", "act", "interaction")
         self._hooked = {hook: [e for e in self._effects if hook in e.hooks()] for hook in hooks}
+        self._reading_effects = ReadingEffects(self._effects)
 
     def reset(self, ids: np.ndarray, offset_m: np.ndarray, position: np.ndarray | None = None) -> None:
         """Starts grasps anew, after their parameters were written.
@@ -348,7 +353,7 @@ class Plant:
     @property
     def acts_in_steps(self) -> bool:
         """Whether an effect acts in every step, and not only on the model when a grasp starts."""
-        return any(effects for hook, effects in self._hooked.items() if hook != "change_model")
+        return any(hook != "change_model" for effect in self._effects for hook in effect.hooks())
 
     def warnings(self) -> np.ndarray:
         """MuJoCo's warning counters, ``(n, kinds)``; all 0 in a sound simulation."""
@@ -362,7 +367,7 @@ class Plant:
         addresses, factors = self._efforts
         if addresses:
             return sensors[..., addresses] * factors * scale
-        return force.copy() if len(self._felt) == 2 else force[..., self._felt]
+        return force if len(self._felt) == 2 else force[..., self._felt]
 
     def _pads_of(self, sensors: np.ndarray) -> np.ndarray:
         # contiguous, lest the order of the sum depend on n
@@ -443,11 +448,10 @@ class Plant:
             force[effect.rows] = effect.interaction(force[effect.rows])
         scale = self.force_scale[:, None]
         self.force = force * scale
-        self.measured_force = self._channels_of(self._sensors, self.force, scale)
+        self.transduced_force = self._channels_of(self._sensors, self.force, scale)
+        self.measured_force = self.transduced_force.copy()
         self.measured_position = self.position.copy()
-        for hook, reading in (("read_force", self.measured_force), ("read_position", self.measured_position)):
-            for effect in self._hooked.get(hook, ()):
-                reading[effect.rows] = getattr(effect, hook)(reading[effect.rows])
+        self._reading_effects.apply(self.measured_position, self.measured_force)
 
 
 @dataclass(frozen=True)

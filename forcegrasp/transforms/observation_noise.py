@@ -1,4 +1,4 @@
-"""Sensor noise, o = s + σ ε (paper, Sec. 4)."""
+"""Sensor noise, o = s + σ ε (paper, Sec. 4), and the rounding of a converter after it."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ from tensordict import TensorDictBase
 from tensordict.utils import NestedKey
 from torchrl.data import Composite, Unbounded
 from torchrl.envs.transforms import Transform
+
+from forcegrasp.physics.sensors import with_noise
 
 
 class ObservationNoise(Transform):
@@ -23,6 +25,7 @@ class ObservationNoise(Transform):
       std: one standard deviation per key, in that key's unit; 0 copies the value.
       seed: seed of the generator.
       device: where the noise is drawn; that of the readings, lest it be copied there.
+      step: one step per key that readings are rounded to, after the noise, in that key's unit; 0 rounds nothing.
     """
 
     def __init__(
@@ -32,11 +35,13 @@ class ObservationNoise(Transform):
         std: Sequence[float],
         seed: int = 0,
         device: torch.device | str = "cpu",
+        step: Sequence[float] | None = None,
     ) -> None:
         if not len(in_keys) == len(out_keys) == len(std):
             raise ValueError(f"needs one out_key and one std per in_key; got {in_keys}, {out_keys}, {std}")
         super().__init__(in_keys=in_keys, out_keys=out_keys)
         self.std = [float(s) for s in std]
+        self.step = [float(s) for s in step or [0.0] * len(std)]
         self.generator = torch.Generator(device)
         self.set_seed(seed)
 
@@ -45,11 +50,11 @@ class ObservationNoise(Transform):
         self.generator.manual_seed(seed)
 
     def _call(self, next_tensordict: TensorDictBase) -> TensorDictBase:
-        for in_key, out_key, std in zip(self.in_keys, self.out_keys, self.std, strict=True):
+        for in_key, out_key, std, step in zip(self.in_keys, self.out_keys, self.std, self.step, strict=True):
             value = next_tensordict[in_key]
             device = self.generator.device
             noise = torch.randn(value.shape, generator=self.generator, dtype=value.dtype, device=device)
-            next_tensordict.set(out_key, value + std * noise.to(value.device))
+            next_tensordict.set(out_key, with_noise(value, std, noise.to(value.device), step))
         return next_tensordict
 
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:

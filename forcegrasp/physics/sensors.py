@@ -1,0 +1,54 @@
+"""The sensor chain, in the one order in which everything is read: transduction, effects, noise, rounding."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from forcegrasp.effects.base import Effect
+
+
+def is_rounding(effect: type[Effect]) -> bool:
+    """Whether an effect comes after the noise, as a converter's rounding does: readings lie on its grid."""
+    return effect.after_noise
+
+
+class ReadingEffects:
+    """Effects between a transducer and the noise, on rows of their own, in the order of their stages.
+
+    Args:
+      effects: any; those that change no reading, or come after the noise, are left out.
+    """
+
+    def __init__(self, effects: Sequence[Effect]) -> None:
+        live = sorted((e for e in effects if e.reads() and not is_rounding(type(e))), key=lambda e: e.rank)
+        self._force = [e for e in live if "read_force" in e.hooks()]
+        self._position = [e for e in live if "read_position" in e.hooks()]
+
+    @property
+    def change_position(self) -> bool:
+        """Whether positions are changed at all."""
+        return bool(self._position)
+
+    def apply(self, position: np.ndarray, force: np.ndarray) -> None:
+        """Changes what was transduced at one instant, in place: ``(n, motors)`` and ``(n, channels)``."""
+        for effect in self._force:
+            force[effect.rows] = effect.read_force(force[effect.rows])
+        for effect in self._position:
+            position[effect.rows] = effect.read_position(position[effect.rows])
+
+
+def with_noise(value: Any, std: float, normal: Any, step: float = 0.0) -> Any:
+    """A reading: noise added, and then rounded as the converter does.
+
+    Args:
+      value: what comes out of the effects; a numpy array or a torch tensor.
+      std: of the noise, in the value's unit.
+      normal: standard normal numbers of the value's shape.
+      step: of the converter, in the value's unit; 0 rounds nothing.
+    """
+    noisy = value + std * normal
+    return noisy if step == 0 else step * (noisy / step).round()
