@@ -24,7 +24,6 @@ from forcegrasp.physics import GraspSampler
 from forcegrasp.physics.fast import SPHERE
 from forcegrasp.physics.gripper import Gripper
 from forcegrasp.physics.gripper_file import load_gripper
-from forcegrasp.physics.model import CONTROL_PERIOD_S
 from forcegrasp.physics.plant import Plant, write_base
 
 TIAGO = load_gripper("tiago")
@@ -104,7 +103,7 @@ class Run:
         plant.reset(self.ids, write_base(plant, self.ids, base))
         position, force = np.empty((2, STEPS, plant.n, 2))
         for index, delta in enumerate(self.deltas):
-            plant.advance(np.clip(plant.position + delta, 0, TIAGO.open_m), round(CONTROL_PERIOD_S / plant.dt))
+            plant.advance(np.clip(plant.position + delta, 0, TIAGO.stroke), round(TIAGO.period_s / plant.dt))
             position[index], force[index] = plant.position, plant.force
         return position, force
 

@@ -18,8 +18,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from forcegrasp.effects import catalogue
+from forcegrasp.physics import default_gripper
 from forcegrasp.physics.gripper_file import load_gripper
-from forcegrasp.physics.parameters import MAX_FORCE_N, force_scale_of_kappa, rho_of_kappa
 from forcegrasp.physics.plant import Plant, write_base
 
 PERIOD_S, SECONDS = 0.04, 6.0
@@ -106,15 +106,15 @@ def simulate(which: Sequence[Case]) -> tuple[np.ndarray, np.ndarray]:
     )
     kappa, radius, offset = np.tile(GRASPS, (len(which), 1)).T
     mass, noise, touch = (np.repeat([getattr(c, f) for c in which], count) for f in ("mass_kg", "noise_n", "touch_n"))
-    ids, scale = np.arange(n), force_scale_of_kappa(kappa)
-    base = {"rho_m": rho_of_kappa(kappa), "force_scale": scale, "radius_m": radius, "offset_m": offset}
+    ids, scale = np.arange(n), default_gripper().training.force_scale(kappa)
+    base = {"rho_m": default_gripper().training.at("rho_m", kappa), "force_scale": scale, "radius_m": radius, "offset_m": offset}
     offsets = write_base(plant, ids, base)
     body = plant.model.geom(plant.gripper.object_geom).bodyid[0]
     for name in ("body_mass", "body_inertia"):
         values = plant.base(name)[:, body]
         values *= (mass / 0.4).reshape(-1, *[1] * (values.ndim - 1))
     plant.reset(ids, offsets)
-    goal, start = 0.5 * MAX_FORCE_N * scale, plant.object_position.copy()
+    goal, start = 0.5 * default_gripper().training.max_force_n * scale, plant.object_position.copy()
     touched, integral, at_touch = np.zeros((n, 2), bool), np.zeros(n), np.full(n, np.nan)
     for _ in range(round(SECONDS / PERIOD_S)):
         force = plant.measured_force + noise[:, None] * rng.standard_normal((n, 2))

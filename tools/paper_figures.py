@@ -37,8 +37,8 @@ from forcegrasp.calibration.figures import COLOURS, draw_power_grasps, draw_pres
 from forcegrasp.calibration.power_grasp import PAPER_B2
 from forcegrasp.calibration.staircase import PAPER_SLOPES_N_M
 from forcegrasp.config import TrainConfig
-from forcegrasp.physics.parameters import RHO_RANGE_M, force_scale_of_kappa, kappa_of_force_scale
-from forcegrasp.physics.sampling import OPEN_M, offset_limit_m
+from forcegrasp.physics import default_gripper
+from forcegrasp.physics.sampling import offset_limits_m
 
 ROOT = Path(__file__).resolve().parent.parent
 #: A figure, and a table of its numbers in Markdown; either may be missing.
@@ -64,7 +64,7 @@ def act_var() -> Drawn:
 
 def solimp_var() -> Drawn:
     """Appendix, variation of ρ: ∂f/∂q changes, the final force does not."""
-    rho = np.linspace(*RHO_RANGE_M, 5)
+    rho = np.linspace(*default_gripper().training.softness["rho_m"], 5)
     closing, slowly = vary_rho(rho), vary_rho(rho, delta_m=SLOWLY_M, seconds=5.0)
     figure = draw_presses(closing, [f"ρ = {1e3 * r:.3g} mm" for r in rho])
     figure.suptitle("Pressing at full action with $f_\\alpha$ = 1, by ρ (paper: variation of ρ)", fontsize=11)
@@ -82,7 +82,7 @@ def fscale_var() -> Drawn:
     closing = vary_kappa(KAPPAS)
     figure = draw_presses(closing, [f"κ = {k:g}" for k in KAPPAS])
     figure.suptitle("Pressing at full action, by κ (paper: variation of κ)", fontsize=11)
-    numbers = zip(KAPPAS, force_scale_of_kappa(KAPPAS), contact_slope(closing), closing.final_force_n, strict=True)
+    numbers = zip(KAPPAS, default_gripper().training.force_scale(KAPPAS), contact_slope(closing), closing.final_force_n, strict=True)
     return figure, table(
         "κ | f_α | ∂f/∂q at Δq = 3 mm [N/m] | f(T) [N]",
         [f"{k:g} | {a:g} | {s:.0f} | {f:.3f}" for k, a, s, f in numbers],
@@ -91,7 +91,7 @@ def fscale_var() -> Drawn:
 
 def stiffness() -> Drawn:
     """Appendix, comparison of final forces: regression of f(T) on Δq, and the f_α that matches the robot's slopes."""
-    stairs, scales = staircase(KAPPAS), force_scale_of_kappa(KAPPAS)
+    stairs, scales = staircase(KAPPAS), default_gripper().training.force_scale(KAPPAS)
     unit = staircase(values={"force_scale": 1.0}).slopes[0].n_per_m
     robot = {name: (stairs.delta_m, FORCE_N[name], slope) for name, slope in PAPER_SLOPES_N_M.items()}
     figure = draw_staircase(
@@ -104,7 +104,7 @@ def stiffness() -> Drawn:
     ]
     for name, slope in PAPER_SLOPES_N_M.items():
         scale = float(match_force_scale(slope, unit))
-        rows.append(f"robot, {name} | {slope:.0f} | – | **{scale:.2f}** | **{float(kappa_of_force_scale(scale)):.2f}**")
+        rows.append(f"robot, {name} | {slope:.0f} | – | **{scale:.2f}** | **{float(default_gripper().training.kappa_of_force_scale(scale)):.2f}**")
     return figure, table("object | slope of f(T) [N/m] | offset [mN] | f_α | κ", rows)
 
 
@@ -120,7 +120,7 @@ def schematic() -> Drawn:
 
 def draw_gripper(axes: Axes) -> None:
     """The open gripper from above, millimetres, with an object off the middle."""
-    open_mm, radius, offset, squeeze = 1e3 * OPEN_M, 20.0, 7.0, 6.0
+    open_mm, radius, offset, squeeze = 1e3 * default_gripper().stroke, 20.0, 7.0, 6.0
     for side in (-1, 1):
         axes.add_patch(Rectangle((side * open_mm, -14), side * 6, 28, color="0.35"))
         axes.plot([side * (open_mm + 4.5)] * 2, [0, 34], color="0.35", lw=6, solid_capstyle="butt")
@@ -153,11 +153,11 @@ def draw_constraints(axes: Axes) -> None:
     depth, (low, high) = config.deformation_m, config.radius_m
     radii = np.linspace(depth, 0.040, 400)
     sampled = radii[(radii >= low) & (radii <= high)]
-    limit = 1e3 * offset_limit_m(sampled, depth)
+    limit = 1e3 * offset_limits_m(default_gripper(), sampled, depth)[1]
     axes.fill_between(1e3 * sampled, -limit, limit, color="#cfe5f2", label="sampled")
     for sign in (1, -1):
         name = {1: "", -1: "_"}[sign]  # a name that begins with _ is left out of the legend
-        inside, within = sign * 1e3 * (OPEN_M - radii), sign * 1e3 * (radii - depth)
+        inside, within = sign * 1e3 * (default_gripper().stroke - radii), sign * 1e3 * (radii - depth)
         axes.plot(1e3 * radii, inside, color=ORANGE, label=name + r"$|o_y| + r_o < q^{max}$ (1)")
         axes.plot(1e3 * radii, within, color=BLUE, label=name + r"$r_o - d_p > |o_y|$ (2)")
     axes.axvline(1e3 * depth, color=GREEN, ls="--", label=rf"$d_p = {1e3 * depth:g}$ mm $< r_o$ (3)")

@@ -18,8 +18,7 @@ from paper_figures import KAPPAS, ROOT, into_page, table
 
 from forcegrasp.calibration import close
 from forcegrasp.calibration.figures import COLOURS
-from forcegrasp.physics import GraspParameters, GraspSimulator
-from forcegrasp.physics.parameters import force_scale_of_kappa, rho_of_kappa
+from forcegrasp.physics import GraspParameters, GraspSimulator, default_gripper
 
 RADIUS_M = 0.025
 #: Commanded deltas of the squeezes, up to the largest; the third and the last are in the table.
@@ -39,7 +38,7 @@ def impedance(depth_m: np.ndarray, rho_m: float) -> np.ndarray:
 def squeezes() -> tuple[np.ndarray, np.ndarray]:
     """How deep a pad sinks in at rest, metres, and what a finger reads with f_α = 1, newtons; each ``(κ, Δq)``."""
     n = len(DELTAS_M)
-    values = {"rho_m": np.repeat(rho_of_kappa(KAPPAS), n), "radius_m": RADIUS_M, "force_scale": 1.0}
+    values = {"rho_m": np.repeat(default_gripper().training.at("rho_m", KAPPAS), n), "radius_m": RADIUS_M, "force_scale": 1.0}
     closing = close(np.tile(DELTAS_M, len(KAPPAS)), 6.0, values, start_m=RADIUS_M + 0.001)
     shape = (len(KAPPAS), n)
     return RADIUS_M - closing.final_position_m.reshape(shape), closing.final_force_n.reshape(shape)
@@ -69,7 +68,7 @@ def draw_contact(depth: np.ndarray, force: np.ndarray) -> Figure:
     figure = Figure(figsize=(9, 3.4), layout="constrained")
     left, right = figure.subplots(1, 2)
     reach = np.linspace(0, 0.011, 300)
-    for row, rho in enumerate(rho_of_kappa(KAPPAS)):
+    for row, rho in enumerate(default_gripper().training.at("rho_m", KAPPAS)):
         colour = COLOURS[row]
         left.plot(1e3 * reach, impedance(reach, rho), color=colour, label=f"ρ = {1e3 * rho:.3g} mm")
         right.plot(1e3 * depth[row], force[row], ".-", ms=4, lw=1, color=colour)
@@ -118,12 +117,13 @@ def main() -> None:
     drag = (PUSHES_N @ PUSHES_N) / (speed @ PUSHES_N)  # least squares through 0
     for name, figure in (("contact", draw_contact(depth, force)), ("floor", draw_floor(speed, drag))):
         figure.savefig(options.out / f"physics_{name}.png", dpi=110, metadata={"Software": ""})
-    scale = force_scale_of_kappa(KAPPAS)
+    scale = default_gripper().training.force_scale(KAPPAS)
+    rho = default_gripper().training.at("rho_m", KAPPAS)
     slope = scale[:, None] * np.gradient(force, axis=1) / np.gradient(1e3 * depth, axis=1)
     rows = [
-        f"{k:g} | {1e3 * rho_of_kappa(k):.2f} | {a:g} | {d[2]:.2f}, {d[-1]:.2f} | {s[2]:.2f}, {s[-1]:.1f}"
+        f"{k:g} | {1e3 * r:.2f} | {a:g} | {d[2]:.2f}, {d[-1]:.2f} | {s[2]:.2f}, {s[-1]:.1f}"
         f" | {1e3 * z:.1f} | {c:.0f}"
-        for k, a, d, s, z, c in zip(KAPPAS, scale, 1e3 * depth, slope, sunk, drag, strict=True)
+        for k, r, a, d, s, z, c in zip(KAPPAS, rho, scale, 1e3 * depth, slope, sunk, drag, strict=True)
     ]
     head = (
         "κ | ρ [mm] | f_α | pads sink in at Δq = 0.3, 3 mm [mm] | slope of the reading there [N/mm]"

@@ -15,7 +15,6 @@ from forcegrasp.calibration.rig import FINAL_S, MAX_DELTA_M, SAMPLE_S, close, pa
 from forcegrasp.errors import ConfigError, MeasurementError
 from forcegrasp.physics.gripper import Gripper
 from forcegrasp.physics.gripper_file import load_gripper
-from forcegrasp.physics.model import CONTROL_PERIOD_S
 
 # Values of the parameter that are simulated, to interpolate between: 25 of b₂ come within 1 µm of a simulation.
 _TABLE = 25
@@ -56,7 +55,7 @@ def fit_power_grasp(
     *,
     delta_m: float = MAX_DELTA_M,
     start_s: float | None = None,
-    period_s: float = CONTROL_PERIOD_S,
+    period_s: float | None = None,
     gripper: Gripper | None = None,
     tier: str = "reference",
 ) -> PowerGraspFit:
@@ -72,7 +71,7 @@ def fit_power_grasp(
       parameter: what to fit, by its name in the gripper's description, within the bounds given there.
       delta_m: Δq that was commanded again and again, metres.
       start_s: when the first command was sent, if that is known.
-      period_s: seconds between two commands.
+      period_s: seconds between two commands; the gripper's by default.
       gripper: TIAGo's by default.
       tier: physics tier.
 
@@ -89,6 +88,7 @@ def fit_power_grasp(
     begun = _onset(time, position)
     first = begun - _SLACK_S if start_s is None else start_s - clock_s[0]
     took = time[-1] - begun
+    period_s = period_s or gripper.period_s
     if not 2 * period_s <= took <= _LONGEST_S:
         raise MeasurementError(
             f"power grasp: it closed within {took:g} s, and must within {2 * period_s:g} to {_LONGEST_S:g} s:"

@@ -12,7 +12,6 @@ from forcegrasp.errors import ConfigError, PhysicsError, closest
 from forcegrasp.physics.gripper import Gripper
 from forcegrasp.physics.gripper_file import load_gripper
 from forcegrasp.physics.gripper_parts import BaseParameter
-from forcegrasp.physics.model import CONTROL_PERIOD_S
 from forcegrasp.physics.plant import Plant, write_base
 
 #: Largest position delta, Δq_max, metres (paper, appendix).
@@ -65,7 +64,7 @@ def close(
     touching: bool = True,
     start_m: Values | None = None,
     tier: str = "reference",
-    period_s: float = CONTROL_PERIOD_S,
+    period_s: float | None = None,
     threads: int = 0,
 ) -> Closing:
     """Commands q_des = q − Δq to both fingers again and again, in many simulations at once (paper, eq. 4).
@@ -79,7 +78,7 @@ def close(
       touching: whether there is anything to touch; without, fingers close until they stop.
       start_m: where the fingers start, metres, ``(n,)`` or one for all; open by default.
       tier: physics tier, ``"reference"`` or ``"fast"``.
-      period_s: seconds for which each command is held, to the nearest physics step.
+      period_s: seconds for which each command is held, to the nearest physics step; the gripper's by default.
       threads: threads of the engine; 0 uses every core.
 
     Raises:
@@ -91,6 +90,7 @@ def close(
     columns = _columns(gripper, given)
     delta = columns.pop("delta_m")
     n = len(delta)
+    period_s = gripper.period_s if period_s is None else period_s
     for name, value, low, high in (("period_s", period_s, 0.001, 1.0), ("seconds", seconds, FINAL_S, _MOST_S / n)):
         if not low <= value <= high:
             raise ConfigError(f"{name}={value:g}: must lie in [{low:g}, {high:g}]")

@@ -6,7 +6,7 @@ import numpy as np
 
 from forcegrasp.calibration.rig import MAX_DELTA_M, Closing, Values, close, column_of
 from forcegrasp.errors import ConfigError
-from forcegrasp.physics.parameters import force_scale_of_kappa, rho_of_kappa
+from forcegrasp.physics import default_gripper
 
 #: Objects of the figures: the middle of the paper's interval of radii, metres.
 RADIUS_M = 0.025
@@ -53,7 +53,8 @@ def kappa_values(kappa: Values) -> dict[str, np.ndarray]:
     kappa = column_of("kappa", kappa)
     if not ((kappa >= 0) & (kappa <= 1)).all():
         raise ConfigError(f"kappa={kappa[~((kappa >= 0) & (kappa <= 1))][0]:g}: must lie in [0, 1]")
-    return {"rho_m": rho_of_kappa(kappa), "force_scale": force_scale_of_kappa(kappa)}
+    training = default_gripper().training
+    return {"rho_m": training.at("rho_m", kappa), "force_scale": training.force_scale(kappa)}
 
 
 def contact_slope(closing: Closing) -> np.ndarray:

@@ -16,7 +16,7 @@ from forcegrasp.compare.final_force_shapes import BASE, FURTHER, Shape, ShapeFit
 from forcegrasp.compare.report import Section
 from forcegrasp.measure.schema import FinalForceTable
 from forcegrasp.physics.gripper import Gripper
-from forcegrasp.physics.parameters import kappa_of_force_scale
+from forcegrasp.physics.gripper_parts import Training
 
 #: Rows that an object must have to be fitted.
 LEAST_ROWS = 4
@@ -80,7 +80,7 @@ class TableAnalysis:
     slopes_differ_p: float | None = None  #: probability of slopes that differ this much if all objects had one
     slope_ratio: tuple[float, float, float] | None = None  #: largest ÷ smallest slope with its 95 % interval
     shared: dict[str, float] = field(default_factory=dict)  #: rms error, N, with one onset "travel" or one "force"
-    has_kappa: bool = False  #: whether the paper's coupling of stiffness and force scale applies
+    training: Training | None = None  #: of the gripper, if its objects' force scale follows the softness κ
 
     @property
     def best(self) -> Candidate | None:
@@ -97,9 +97,9 @@ class TableAnalysis:
 
     def kappa(self, name: str) -> float | None:
         """κ of the paper's coupling whose f_α is nearest to an object's under the base law; None if there is none."""
-        if not self.has_kappa or self.position_gain is None or self.base is None:
+        if self.training is None or self.position_gain is None or self.base is None:
             return None
-        return float(kappa_of_force_scale(self.base.fits[name].slope / self.position_gain))
+        return float(self.training.kappa_of_force_scale(self.base.fits[name].slope / self.position_gain))
 
     def compare_json(self) -> dict:
         """The base law's errors, for `compare.json`."""
@@ -130,7 +130,7 @@ def analyse_table(table: FinalForceTable, gripper: Gripper) -> TableAnalysis:
     """
     rows, skipped = _usable(table)
     gain = gripper.parameters["position_gain"].nominal if "position_gain" in gripper.parameters else None
-    facts = {"position_gain": gain, "has_kappa": gain is not None and "rho_m" in gripper.parameters}
+    facts = {"position_gain": gain, "training": gripper.training if gain is not None and "force_scale" in gripper.training.softness else None}
     if not rows:
         why = "; ".join(f"{name}: {reason}" for name, reason in skipped.items())
         return TableAnalysis(table, rows, skipped, "not_fitted", f"no object can be fitted ({why})", **facts)

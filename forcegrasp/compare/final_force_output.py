@@ -11,7 +11,6 @@ from matplotlib.figure import Figure
 from forcegrasp.compare.figures import plain
 from forcegrasp.compare.final_force_causes import CAUSES, MENU, NO_TRACE, Onset, grasps_for
 from forcegrasp.compare.report import Picture, Section, Table, Text
-from forcegrasp.physics.parameters import FORCE_SCALE_RANGE
 
 if TYPE_CHECKING:
     from forcegrasp.compare.final_force import Candidate, TableAnalysis
@@ -193,8 +192,8 @@ def facts(analysis: TableAnalysis) -> list[str]:
             f" (p = {analysis.slopes_differ_p:.2g})"
         )
     kappas = {name: analysis.kappa(name) for name in analysis.rows}
-    if analysis.has_kappa:
-        soft, hard = FORCE_SCALE_RANGE
+    if analysis.training is not None:
+        hard, soft = analysis.training.softness["force_scale"]
         scales = [scale[0] for name in analysis.rows if (scale := analysis.force_scale(name))]
         named = ", ".join(f"{name} {kappa:.3f}" for name, kappa in kappas.items())
         inside = all(soft <= scale <= hard for scale in scales)

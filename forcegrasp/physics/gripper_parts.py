@@ -100,6 +100,11 @@ class Training:
         low, high, share = (hard, soft, kappa) if hard <= soft else (soft, hard, 1 - kappa)
         return low + share * (high - low)
 
+    def kappa_of_force_scale(self, force_scale: np.ndarray | float) -> np.ndarray:
+        """Softness κ whose f_α is nearest: the inverse of :meth:`force_scale`, within [0, 1]."""
+        hard, soft = self.softness["force_scale"]
+        return np.clip(1 - (force_scale - soft) / (hard - soft), 0.0, 1.0)
+
     def force_scale(self, kappa: np.ndarray | float) -> np.ndarray | float:
         """f_α of an object of softness κ; 1 where it does not depend on it."""
         return self.at("force_scale", kappa) if "force_scale" in self.softness else 1.0 + 0.0 * kappa

@@ -17,6 +17,7 @@ from forcegrasp.config import PPOConfig
 from forcegrasp.physics.gripper import Gripper
 from forcegrasp.physics.gripper_file import default_gripper
 
+
 class Value(nn.Module):
     """State value. Its output is scaled by the horizon 1 / (1 − γ), so that the network's own stays about 1."""
 

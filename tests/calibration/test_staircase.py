@@ -9,8 +9,8 @@ from scipy.stats import linregress
 from forcegrasp.calibration import match_force_scale, regress, staircase
 from forcegrasp.calibration.staircase import DELTAS_M
 from forcegrasp.errors import ConfigError, MeasurementError
+from forcegrasp.physics import default_gripper
 from forcegrasp.physics.gripper_file import load_gripper
-from forcegrasp.physics.parameters import force_scale_of_kappa, kappa_of_force_scale
 
 KAPPA = np.array([0.0, 0.4, 1.0])
 
@@ -22,12 +22,12 @@ def stairs():
 
 def test_final_force_is_the_static_law(stairs):
     np.testing.assert_allclose(stairs.delta_m, np.arange(1, 11) * 0.0003)
-    law = 100 * force_scale_of_kappa(KAPPA)[:, None] * stairs.delta_m
+    law = 100 * default_gripper().training.force_scale(KAPPA)[:, None] * stairs.delta_m
     np.testing.assert_allclose(stairs.force_n, law, rtol=0.01)
 
 
 def test_slope_is_that_of_the_law(stairs):
-    for slope, scale in zip(stairs.slopes, force_scale_of_kappa(KAPPA), strict=True):
+    for slope, scale in zip(stairs.slopes, default_gripper().training.force_scale(KAPPA), strict=True):
         assert slope.n_per_m == pytest.approx(100 * scale, rel=0.01)
         assert slope.low <= slope.n_per_m <= slope.high
         assert abs(slope.offset_n) < 0.002
@@ -48,13 +48,13 @@ def test_slopes_of_the_paper():
     # The law's 100 N/m per f_α: sponge and wood differ by less than a tenth of the interval [0.5, 5].
     scales = match_force_scale([278.0, 330.0], 100.0)
     np.testing.assert_allclose(scales, [2.78, 3.30])
-    np.testing.assert_allclose(kappa_of_force_scale(scales), [(5 - 2.78) / 4.5, (5 - 3.30) / 4.5])
+    np.testing.assert_allclose(default_gripper().training.kappa_of_force_scale(scales), [(5 - 2.78) / 4.5, (5 - 3.30) / 4.5])
 
 
 def test_kappa_and_force_scale_are_inverse():
     kappa = np.linspace(0, 1, 11)
-    np.testing.assert_allclose(kappa_of_force_scale(force_scale_of_kappa(kappa)), kappa, atol=1e-12)
-    np.testing.assert_array_equal(kappa_of_force_scale(np.array([0.1, 9.0])), [1.0, 0.0])
+    np.testing.assert_allclose(default_gripper().training.kappa_of_force_scale(default_gripper().training.force_scale(kappa)), kappa, atol=1e-12)
+    np.testing.assert_array_equal(default_gripper().training.kappa_of_force_scale(np.array([0.1, 9.0])), [1.0, 0.0])
 
 
 def test_regression_is_least_squares_with_an_interval_of_the_right_size():

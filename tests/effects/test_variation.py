@@ -9,7 +9,7 @@ import pytest
 
 from forcegrasp.effects import catalogue, get_effect
 from forcegrasp.effects.model_file import Fitted, FoundEffect, Model, write_model
-from forcegrasp.effects.variation import ModelVariation, read_tiago_model
+from forcegrasp.effects.variation import ModelVariation, read_model_of
 from forcegrasp.errors import ConfigError
 from forcegrasp.physics import GraspParameters, GraspSimulator
 from forcegrasp.physics.gripper_file import load_gripper
@@ -199,6 +199,6 @@ def test_only_models_of_tiago_are_for_learning(root, tmp_path):
     base = {n: Fitted(p.nominal, p.low, p.high, p.unit) for n, p in second.parameters.items() if p.scope == "gripper"}
     write_model(Model(second, base), tmp_path / "second.yaml")
     with pytest.raises(ConfigError, match=r"second\.yaml: is of gripper second; the environment simulates tiago"):
-        read_tiago_model(tmp_path / "second.yaml")
+        read_model_of(default_gripper(), tmp_path / "second.yaml")
     write_model(FITTED, tmp_path / "tiago.yaml")
-    assert read_tiago_model(str(tmp_path / "tiago.yaml")) == FITTED
+    assert read_model_of(default_gripper(), str(tmp_path / "tiago.yaml")) == FITTED

@@ -22,7 +22,7 @@ from forcegrasp.config import (
 )
 from forcegrasp.effects import get_effect
 from forcegrasp.effects.model_file import Fitted, FoundEffect, Model
-from forcegrasp.effects.variation import read_tiago_model
+from forcegrasp.effects.variation import read_model_of
 from forcegrasp.env import build_env, seed_env
 from forcegrasp.env.reward import normalised_force_reward
 from forcegrasp.errors import ConfigError
@@ -304,7 +304,7 @@ def test_every_option_changes_something(rollout, part, option):
 
 
 def test_reward_of_measured_forces_is_that_of_a_models_sensors():
-    model = read_tiago_model("virtual_robot")  # whose force sensors have a dead zone
+    model = read_model_of(load_gripper("tiago"), "virtual_robot")  # whose force sensors have a dead zone
     for forces, key in (("actual", "force"), ("measured", "measured_force")):
         reward = RewardConfig("goal_normalised", object_weight=0.0, action_weight=0.0, forces=forces)
         after = play(build(reward=reward, model=model))["next"]

@@ -8,8 +8,10 @@ import pytest
 from forcegrasp.config import GraspConfig
 from forcegrasp.errors import ForcegraspError
 from forcegrasp.evaluate.grids import object_grid, read_objects
-from forcegrasp.physics.parameters import MAX_FORCE_N
-from forcegrasp.physics.sampling import OPEN_M, offset_limit_m
+from forcegrasp.physics import default_gripper
+from forcegrasp.physics.sampling import offset_limits_m
+
+TIAGO = default_gripper()
 
 GOOD = "format: forcegrasp-objects/1\nobjects:\n  cup: {diameter_m: 0.06, kappa: 0.3, goal_force_n: [0.2, 0.9]}\n"
 
@@ -20,9 +22,9 @@ def test_the_papers_objects_can_be_held_with_their_goal_forces():
     grid = object_grid(objects, GraspConfig(), 50, seed=0)
     grasps = grid.grasps
     assert grid.trials == 50
-    assert np.all(grasps.goal_force_n <= 0.9501 * MAX_FORCE_N * grasps.force_scale)
-    limit = offset_limit_m(grasps.radius_m, 0.012)
-    assert np.all(np.abs(grasps.offset_m) + grasps.radius_m < OPEN_M)
+    assert np.all(grasps.goal_force_n <= 0.9501 * TIAGO.training.max_force_n * TIAGO.training.force_scale(grasps.kappa))
+    limit = offset_limits_m(TIAGO, grasps.radius_m, 0.012)[1]
+    assert np.all(np.abs(grasps.offset_m) + grasps.radius_m < TIAGO.stroke)
     assert np.all((np.abs(grasps.offset_m) >= limit / 2) & (np.abs(grasps.offset_m) <= limit))
     assert 0.3 < np.mean(grasps.offset_m > 0) < 0.7
 

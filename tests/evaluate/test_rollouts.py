@@ -12,7 +12,8 @@ from forcegrasp.env.episodes import summarise
 from forcegrasp.evaluate import rollouts
 from forcegrasp.evaluate.grids import kappa_grid
 from forcegrasp.evaluate.rollouts import roll_out
-from forcegrasp.physics.sampling import offset_limit_m
+from forcegrasp.physics import default_gripper
+from forcegrasp.physics.sampling import offset_limits_m
 
 FAST = PhysicsConfig(tier="fast", threads=1)
 NO_BIAS = ActionConfig(inductive_bias=False)
@@ -40,7 +41,7 @@ def test_all_else_is_random_and_within_its_range():
         values = getattr(grasps, name)
         assert low <= values.min() < low + 0.05 * (high - low)
         assert high - 0.05 * (high - low) < values.max() <= high
-    assert (np.abs(grasps.offset_m) < offset_limit_m(grasps.radius_m, config.deformation_m)).all()
+    assert (np.abs(grasps.offset_m) < offset_limits_m(default_gripper(), grasps.radius_m, config.deformation_m)[1]).all()
     assert (grasps.goal_force_n <= 0.95 * 0.30 * grasps.force_scale * (1 + 1e-12)).all()
 
 

@@ -6,10 +6,11 @@ import pytest
 import torch
 
 from forcegrasp.config import GraspConfig, PhysicsConfig
-from forcegrasp.effects.variation import read_tiago_model
+from forcegrasp.effects.variation import read_model_of
 from forcegrasp.env import GraspEnv
 from forcegrasp.errors import ConfigError
 from forcegrasp.gpu import check_engine, installation
+from forcegrasp.physics import default_gripper
 
 
 @pytest.fixture
@@ -43,4 +44,4 @@ def test_a_device_that_the_engine_cannot_use():
 
 def test_no_effects(installed):
     with pytest.raises(ConfigError, match="model: engine warp simulates the nominal gripper alone"):
-        GraspEnv(2, PhysicsConfig(engine="warp"), GraspConfig(), model=read_tiago_model("virtual_robot"))
+        GraspEnv(2, PhysicsConfig(engine="warp"), GraspConfig(), model=read_model_of(default_gripper(), "virtual_robot"))

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from forcegrasp.measure.plans import MENU, OFF_CENTRE, PERIOD_S, PLANS, SAMPLES, make_command, make_plan
+from forcegrasp.physics import default_gripper
 
 OPEN_M, CONTACT_M, SQUEEZE_M = 0.045, 0.025, 0.003
 TIME = np.arange(SAMPLES) * PERIOD_S
@@ -13,7 +14,7 @@ RADII = np.array([0.020, 0.030, 0.033])
 
 
 def plan(name: str = "rich", grasps: int = 30, radii: np.ndarray = RADII, seed: int = 0):
-    return make_plan(name, radii, grasps, OPEN_M, np.random.default_rng(seed))
+    return make_plan(name, radii, grasps, default_gripper(), np.random.default_rng(seed))
 
 
 @pytest.mark.parametrize("kind", [*MENU, OFF_CENTRE])

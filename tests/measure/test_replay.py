@@ -17,7 +17,7 @@ from forcegrasp.physics.gripper_file import load_gripper
 from forcegrasp.physics.plant import Plant, write_base
 
 TIAGO = load_gripper("tiago")
-OPEN_M = TIAGO.open_m
+OPEN_M = TIAGO.stroke
 SECOND = Path(__file__).parents[1] / "grippers" / "second.yaml"
 CASES = [pytest.param(e, v, id=f"{e.name}-{v}".rstrip("-")) for e in catalogue().values() for v in e.variants]
 BASE = {"position_gain": 90.0, "velocity_gain": -8.0, "rho_m": 0.005, "radius_m": 0.03, "offset_m": 0.002}

@@ -191,7 +191,7 @@ BROKEN_VALUES = [
     ("fingers.opened", 0.05, "fingers.opened: unknown"),
     ("object.shape", "box", "object.shape: unknown"),
     (f"{_DAMPING}.min", 1, f"{_DAMPING}.min: unknown"),
-    ("format", "forcegrasp-gripper/9", "format: must be forcegrasp-gripper/1"),
+    ("format", "forcegrasp-gripper/9", "format: must be forcegrasp-gripper/2; forcegrasp-gripper/1 is read, too"),
     ("name", 7, "name=7: must be text"),
     ("name", ["a"], "name=['a']: must be text"),
     ("model", None, "model=None: must be text"),
@@ -307,7 +307,7 @@ TOUCH = '<touch name="touch_east" site="east"/>'
         ("</mujoco>", "", "not XML"),
         ("<mujoco", "\x00\x01", "not XML"),
         ('axis="1 0 0" range', 'axis="0 0 0" range', "MuJoCo refuses it"),
-        (WEST, '<joint name="west" type="hinge"/>', "fingers.joints: 'west' must be a slide joint"),
+        (WEST, '<joint name="west" type="hinge"/>', "fingers.closed=0.05: the left joint goes from 0 to 0.000872665 rad"),
         (WEST, '<joint name="west" axis="0 0 1"/>', "fingers.joints: 'west' must open towards -x"),
         (WEST, '<joint name="west" axis="-1 0 0"/>', "fingers.joints: 'west' must open towards -x"),
         (WEST, '<joint name="west" range="0 0.04"/>', "fingers.closed=0.05: the left joint goes from 0 to 0.04 m"),
@@ -370,7 +370,7 @@ def test_mjcf_shortcuts_are_undone_without_a_trace():
     model = gripper.compile()
     assert model.geom("west").sameframe[0] == mujoco.mjtSameFrame.mjSAMEFRAME_BODY
     data = mujoco.MjData(model)
-    data.ctrl[:] = gripper.closed
+    data.ctrl[:] = gripper.motors[0].closed
     mujoco.mj_step(model, data, 1000)
     plant = _plant(gripper, 1)
     plant.advance(np.zeros((1, 2)), 1000)

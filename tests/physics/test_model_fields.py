@@ -12,15 +12,15 @@ from forcegrasp.errors import ConfigError
 from forcegrasp.physics import GraspSimulator
 from forcegrasp.physics.fast import compile_fast
 from forcegrasp.physics.gripper_file import load_gripper
-from forcegrasp.physics.model import build_model
 
 TIERS = ("reference", "fast")
+TIAGO = load_gripper("tiago")
 
 
 def _compile(tier: str, radius: float, rho: float, b2: float) -> mujoco.MjModel:
     """The scene compiled with a grasp's parameters in it from the start."""
     spec = mujoco.MjSpec.from_file(str(files("forcegrasp") / "assets" / "tiago.xml"))
-    fast = compile_fast(spec, load_gripper("tiago")) if tier == "fast" else None
+    fast = compile_fast(spec, TIAGO.motors, TIAGO.object_geom, TIAGO.axis) if tier == "fast" else None
     for geom in spec.body("object").geoms:
         geom.size[0], geom.solimp[2] = radius, rho
     for actuator in spec.actuators:
@@ -59,7 +59,7 @@ def test_inverse_weights_know_the_armature(draw, tier):
 
 
 def test_solver_and_contact_options():
-    reference, fast = (build_model(tier) for tier in TIERS)
+    reference, fast = (TIAGO.compile(tier) for tier in TIERS)
     for model, step in ((reference, 0.002), (fast, 0.008)):
         option = model.opt
         assert option.timestep == step

@@ -12,8 +12,7 @@ import gymnasium
 import numpy as np
 
 from forcegrasp.config import TrainConfig
-from forcegrasp.physics import GraspSampler, GraspSimulator
-from forcegrasp.physics.sampling import OPEN_M
+from forcegrasp.physics import GraspSampler, GraspSimulator, default_gripper
 
 if TYPE_CHECKING:  # it would bring torch
     from forcegrasp.curriculum.schedule import CurriculumValues
@@ -85,4 +84,4 @@ class PlainGrasp(gymnasium.Env[np.ndarray, np.ndarray]):
         position = self.simulator.joint_position[0] + sensors.position_std_m * noise[0]
         force = self.simulator.force[0] + sensors.force_std_n * noise[1]
         touched = np.maximum(self.had_contact, force > sensors.contact_threshold_n) * (self.simulator.steps[0] > 0)
-        return np.concatenate([position * 2 / OPEN_M - 1, force, self.goal - force, self.last_action, touched])
+        return np.concatenate([position * 2 / default_gripper().stroke - 1, force, self.goal - force, self.last_action, touched])

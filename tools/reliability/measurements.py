@@ -13,7 +13,7 @@ from forcegrasp.cli.main import main
 from forcegrasp.effects.model_file import read_model
 from forcegrasp.errors import ForcegraspError
 from forcegrasp.measure import MeasurementSet, check_set, read_set
-from forcegrasp.physics.sampling import OPEN_M
+from forcegrasp.physics import default_gripper
 from tools.reliability import spoil
 from tools.reliability.child import each, fork, peak_memory_mb
 from tools.reliability.training import status
@@ -90,7 +90,7 @@ def _read(folder: Path, file: str, names_row: bool) -> tuple[str, str]:
         else:
             measured = read_set(folder)
             assert isinstance(measured, MeasurementSet)  # which a table is not
-            check_set(measured, OPEN_M)
+            check_set(measured, default_gripper().stroke)
     except ForcegraspError as error:
         return "refused", _wrong_with(str(error), folder, names_row)
     return "read", ""

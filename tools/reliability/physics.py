@@ -9,10 +9,10 @@ import numpy as np
 
 from forcegrasp.effects.base import Effect
 from forcegrasp.effects.registry import catalogue
+from forcegrasp.physics import default_gripper
 from forcegrasp.physics.gripper import Gripper
 from forcegrasp.physics.gripper_file import load_gripper
 from forcegrasp.physics.guard import silence_log
-from forcegrasp.physics.model import CONTROL_PERIOD_S
 from forcegrasp.physics.plant import Plant, write_base
 from tools.reliability.trial import Promise, Trial
 
@@ -75,7 +75,7 @@ def grasp(plant: Plant, rng: np.random.Generator) -> list[list[str]]:
     for _ in range(STEPS):
         share = np.clip(style[:, :1] + style[:, 1:] * rng.uniform(-1, 1, (plant.n, 2)), -1, 1)
         command = np.clip(plant.measured_position + DELTA_M * share, 0, plant.gripper.stroke)
-        plant.advance(command, round(CONTROL_PERIOD_S / plant.dt))
+        plant.advance(command, round(default_gripper().period_s / plant.dt))
     warnings = plant.warnings()
     return [[mujoco.mjtWarning(int(kind)).name for kind in np.flatnonzero(counts)] for counts in warnings]
 

@@ -13,7 +13,7 @@ import polars as pl
 from forcegrasp.cli.main import main
 from forcegrasp.deploy.contract import read_contract
 from forcegrasp.measure import MeasurementSet, check_set, read_set
-from forcegrasp.physics.sampling import OPEN_M
+from forcegrasp.physics import default_gripper
 from tools.reliability.attacks.attack import MARK, Attack, not_files, replace
 
 NAMES = [
@@ -138,7 +138,7 @@ GRIPPERS = [
 def _read() -> None:
     measured = read_set(".")
     assert isinstance(measured, MeasurementSet)
-    check_set(measured, OPEN_M)
+    check_set(measured, default_gripper().stroke)
 
 
 def attacks() -> Iterator[Attack]:
