@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from forcegrasp.config import CurriculumConfig, GraspConfig, RewardConfig
+from forcegrasp.physics import Gripper, default_gripper
+from forcegrasp.physics.completion import complete
 
 
 @dataclass(frozen=True)
@@ -43,11 +45,19 @@ class LinearSchedule:
       curriculum: start values, and the share of training over which they are annealed.
       grasp, reward: the final values.
       total_frames: frames of the whole training.
+      gripper: whose ranges stand in for those left out; the paper's by default.
     """
 
     def __init__(
-        self, curriculum: CurriculumConfig, grasp: GraspConfig, reward: RewardConfig, total_frames: int
+        self,
+        curriculum: CurriculumConfig,
+        grasp: GraspConfig,
+        reward: RewardConfig,
+        total_frames: int,
+        gripper: Gripper | None = None,
     ) -> None:
+        gripper = gripper or default_gripper()
+        curriculum, grasp = complete(curriculum, gripper), complete(grasp, gripper)
         self.end_frames = curriculum.end_fraction * total_frames if curriculum.enabled else 0.0
         self._start = (curriculum.object_weight, curriculum.speed_threshold_m, curriculum.radius_m, curriculum.offset_m)
         self._end = (reward.object_weight, reward.speed_threshold_m, grasp.radius_m, grasp.offset_m)

@@ -17,6 +17,10 @@ from forcegrasp.physics.plant import Plant
 TIAGO = load_gripper("tiago")
 
 
+def _fast(spec: mujoco.MjSpec) -> mujoco.MjModel:
+    return compile_fast(spec, TIAGO.motors, TIAGO.object_geom, TIAGO.axis)
+
+
 def _spec(stiffness: float = 100.0, time_constant: float = 0.02) -> mujoco.MjSpec:
     spec = mujoco.MjSpec.from_file(str(TIAGO.model))
     for actuator in spec.actuators:
@@ -43,7 +47,7 @@ def test_free_fingers_move_as_with_small_steps(b2):
     [(100, 0.02, 0.008), (600, 0.02, 0.004), (5000, 0.02, 0.002), (100, 0.01, 0.004), (100, 0.005, 0.002)],
 )
 def test_steps_suit_servo_and_contact(stiffness, time_constant, step):
-    model = compile_fast(_spec(stiffness, time_constant), TIAGO)
+    model = _fast(_spec(stiffness, time_constant))
     assert model.opt.timestep == step
     assert model.dof_damping[-2:] == pytest.approx(1 + stiffness * (step - 0.002) / 2)
 
@@ -63,7 +67,7 @@ def test_the_sphere_stays_between_the_pads():
 def test_an_object_that_never_rests_keeps_the_sphere_in_its_middle():
     spec = _spec()
     spec.delete(spec.geom("floor"))
-    assert compile_fast(spec, TIAGO).geom("object_pads").pos == pytest.approx(0)
+    assert _fast(spec).geom("object_pads").pos == pytest.approx(0)
 
 
 def test_a_damping_that_is_written_keeps_what_the_step_needs():
@@ -74,6 +78,6 @@ def test_a_damping_that_is_written_keeps_what_the_step_needs():
     assert made_up.max() > 0
     for one in (plant, reference):
         one.write(gripper.parameters["joint_damping"], np.arange(2), np.array([20.0, 50.0]))
-    fingers = reference.finger_dofs
+    fingers = reference.motor_dofs
     difference = plant.field("dof_damping")[:, fingers] - reference.field("dof_damping")[:, fingers]
     assert difference == pytest.approx(np.broadcast_to(made_up[fingers], (2, 2)))

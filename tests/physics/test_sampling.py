@@ -10,7 +10,7 @@ from scipy import stats
 
 from forcegrasp.config import GraspConfig
 from forcegrasp.errors import ConfigError
-from forcegrasp.physics import FixedGrasps, GraspSampler
+from forcegrasp.physics import FixedGrasps, GraspSampler, default_gripper
 
 N = 100_000
 
@@ -45,7 +45,7 @@ def test_the_whole_of_the_allowed_offsets_is_used(grasps):
 
 
 def test_goal_can_be_reached(grasps):
-    highest = 0.95 * 0.30 * grasps.force_scale
+    highest = 0.95 * 0.30 * default_gripper().training.force_scale(grasps.kappa)
     assert (grasps.goal_force_n >= 0.08).all()
     assert (grasps.goal_force_n <= highest).all()
     share = (grasps.goal_force_n - 0.08) / (highest - 0.08)

@@ -43,7 +43,7 @@ def tensors(*values: np.ndarray) -> list[torch.Tensor]:
 @settings(max_examples=100, deadline=None)
 @given(**GRASPS, one=UNIT, floor=UNIT)
 def test_phi_equals_the_equation(h, error, goal, one: float, floor: float) -> None:
-    bias = contact_bias(*tensors(h, error, goal), one, floor).numpy()
+    bias = contact_bias(*tensors(h, error, goal), one, floor, 2).numpy()
     np.testing.assert_allclose(bias, phi(h, error, goal, one, floor), rtol=1e-6, atol=1e-6)
     assert ((bias >= 0) & (bias <= 1)).all()
 
@@ -61,26 +61,26 @@ def test_phi_equals_the_equation(h, error, goal, one: float, floor: float) -> No
     ],
 )
 def test_phases_of_a_grasp(h: list, error: list, want: list) -> None:
-    bias = contact_bias(*tensors([h], [error], [[0.5]]), 0.1, 0.9)
+    bias = contact_bias(*tensors([h], [error], [[0.5]]), 0.1, 0.9, 2)
     np.testing.assert_allclose(bias, [want], rtol=1e-6)
 
 
 def test_never_reverses_with_floor_zero() -> None:
-    bias = contact_bias(*tensors([[1, 1]], [[9.0, -9.0]], [[0.5]]), 0.0, 0.0)
+    bias = contact_bias(*tensors([[1, 1]], [[9.0, -9.0]], [[0.5]]), 0.0, 0.0, 2)
     assert bias.tolist() == [[0.0, 0.0]]
 
 
 def test_force_error_matters_only_with_both_in_contact() -> None:
     for h in ([0, 0], [1, 0], [0, 1]):
-        near, far = (contact_bias(*tensors([h], [[e, -e]], [[0.5]]), 0.1, 0.5) for e in (0.1, 0.2))
+        near, far = (contact_bias(*tensors([h], [[e, -e]], [[0.5]]), 0.1, 0.5, 2) for e in (0.1, 0.2))
         assert torch.equal(near, far)
-    near, far = (contact_bias(*tensors([[1, 1]], [[e, -e]], [[0.5]]), 0.1, 0.5) for e in (0.1, 0.2))
+    near, far = (contact_bias(*tensors([[1, 1]], [[e, -e]], [[0.5]]), 0.1, 0.5, 2) for e in (0.1, 0.2))
     assert (near > far).all()
 
 
 def test_double_precision_is_kept() -> None:
     h, error, goal = (value.double() for value in tensors([[1, 0]], [[0.5, 0.5]], [[0.5]]))
-    np.testing.assert_allclose(contact_bias(h, error, goal, 0.1, 0.9), [[0.1, 1.0]], rtol=1e-12)
+    np.testing.assert_allclose(contact_bias(h, error, goal, 0.1, 0.9, 2), [[0.1, 1.0]], rtol=1e-12)
 
 
 @settings(max_examples=30, deadline=None)
