@@ -29,6 +29,7 @@ class ForcePI(TensorDictModuleBase):
       max_delta: Δq_max that the environment scales actions by, m or rad; the gripper's own by default.
       stiffness: k instead, N/m or N/rad.
       kp, ki: K_p (1) and K_i (1/s).
+      closing_step: position delta while closing instead, m or rad per step.
     """
 
     def __init__(
@@ -38,6 +39,7 @@ class ForcePI(TensorDictModuleBase):
         stiffness: float | None = None,
         kp: float = 0.18,
         ki: float = 1.13,
+        closing_step: float | None = None,
     ) -> None:
         super().__init__()
         gripper = gripper or default_gripper()
@@ -47,7 +49,8 @@ class ForcePI(TensorDictModuleBase):
         self.motors, self.period_s = len(gripper.motors), gripper.period_s
         self.max_delta = gripper.max_step if max_delta is None else max_delta
         self.stiffness = gripper.training.assumed_stiffness if stiffness is None else stiffness
-        self.kp, self.ki, self.closing_step = kp, ki, gripper.training.closing_step
+        self.closing_step = gripper.training.closing_step if closing_step is None else closing_step
+        self.kp, self.ki = kp, ki
 
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
         touched, force_error, integral = (tensordict.get(key) for key in self.in_keys)

@@ -23,7 +23,7 @@ def test_names(name, kind):
 
 @pytest.mark.parametrize(("name", "value"), [("close", -1.0), ("nothing", 0.0)])
 def test_constant(name, value):
-    td = TensorDict({"had_contact": torch.rand(3, 2)}, batch_size=3)
+    td = TensorDict({"joint_position": torch.rand(3, 2)}, batch_size=3)
     assert torch.equal(make_controller(name)(td)["action"], torch.full((3, 2), value))
     assert torch.equal(Constant(0.4)(td)["action"], torch.full((3, 2), 0.4))
 

@@ -15,7 +15,7 @@ from forcegrasp.env import build_env
 NEAR = GraspConfig(radius_m=[0.03, 0.035], offset_m=[-0.006, 0.006], steps=50)
 
 
-def scalar_law(touched, errors, integral, kp=0.18, ki=1.13, stiffness=160.0, closing_m=0.004, max_delta_m=0.003):
+def scalar_law(touched, errors, integral, kp=0.18, ki=1.13, stiffness=160.0, closing_step=0.004, max_delta=0.003):
     """Actions of both fingers and the new integral, for one grasp and one step."""
     if touched[0] and touched[1]:
         delta = 0.0
@@ -25,8 +25,8 @@ def scalar_law(touched, errors, integral, kp=0.18, ki=1.13, stiffness=160.0, clo
             delta += kp * error + ki * integral
         deltas = [-delta / 2, -delta / 2]
     else:
-        deltas = [0.0 if t else -closing_m for t in touched]
-    return [min(1.0, max(-1.0, d / max_delta_m)) for d in deltas], integral
+        deltas = [0.0 if t else -closing_step for t in touched]
+    return [min(1.0, max(-1.0, d / max_delta)) for d in deltas], integral
 
 
 @pytest.mark.parametrize(
@@ -36,8 +36,8 @@ def scalar_law(touched, errors, integral, kp=0.18, ki=1.13, stiffness=160.0, clo
         {"kp": 0.9, "ki": 0.0},
         {"kp": 0.0, "ki": 4.0},
         {"stiffness": 50.0},
-        {"closing_m": 0.001},
-        {"max_delta_m": 0.01},
+        {"closing_step": 0.001},
+        {"max_delta": 0.01},
     ],
     ids=lambda gains: "-".join(gains) or "default",
 )
@@ -70,7 +70,7 @@ def test_law(gains):
         clipped += (np.abs(expected) == 1).sum()
     assert touched.all(axis=-1).mean() > 0.2
     assert np.abs(expected_integral).max() > 1e-4
-    assert clipped > 0 or "closing_m" in gains or "max_delta_m" in gains
+    assert clipped > 0 or "closing_step" in gains or "max_delta" in gains
 
 
 def test_phases():

@@ -37,8 +37,9 @@ def test_reset_writes_what_the_compiler_would(draw, tier):
     simulator = GraspSimulator(len(grasps), tier, threads=1)
     simulator.reset(draw(24, seed=12))
     simulator.reset(grasps)
+    rho = TIAGO.training.at("rho_m", grasps.kappa)
     for i in range(len(grasps)):
-        compiled = _compile(tier, grasps.radius_m[i], grasps.rho_m[i], grasps.b2[i])
+        compiled = _compile(tier, grasps.radius_m[i], rho[i], grasps.b2[i])
         written, _ = simulator.scene(i)
         names = [name for name in dir(compiled) if isinstance(getattr(compiled, name), np.ndarray)]
         assert {"body_inertia", "geom_rbound", "geom_aabb", "bvh_aabb", "body_invweight0", "dof_invweight0"} <= {*names}

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from forcegrasp.physics import GraspParameters
+from forcegrasp.physics import GraspParameters, default_gripper
 
 
 def test_softness_interpolates_between_hard_and_soft():
-    grasps = GraspParameters([0.0, 0.25, 0.5, 1.0], -9, 0.025, 0, 0.1)
-    np.testing.assert_allclose(grasps.rho_m, [0.003, 0.00475, 0.0065, 0.010], rtol=1e-15)
-    np.testing.assert_allclose(grasps.force_scale, [5, 3.875, 2.75, 0.5], rtol=1e-15)
+    training, kappa = default_gripper().training, np.array([0.0, 0.25, 0.5, 1.0])
+    np.testing.assert_allclose(training.at("rho_m", kappa), [0.003, 0.00475, 0.0065, 0.010], rtol=1e-15)
+    np.testing.assert_allclose(training.force_scale(kappa), [5, 3.875, 2.75, 0.5], rtol=1e-15)
 
 
 def test_scalars_are_broadcast_and_nothing_is_shared():

@@ -93,7 +93,7 @@ def test_set_ranges_replaces_the_object_ranges_only():
     assert 0.020 <= grasps.radius_m.min() < 0.0205 < 0.0245 < grasps.radius_m.max() <= 0.025
     assert (grasps.offset_m == 0).all()
     assert 0.2 <= grasps.kappa.min() < grasps.kappa.max() <= 0.3
-    assert config.radius_m == [0.015, 0.035]  # the caller's config is not ours to change
+    assert config == GraspConfig(kappa=[0.2, 0.3])  # the caller's config is not ours to change
 
 
 @pytest.mark.parametrize("deformation_m", [0.015, 0.02])
