@@ -20,6 +20,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from forcegrasp.cli.main import main as forcegrasp
+from forcegrasp.cli.measuring import refuse_table
 from forcegrasp.compare.comparison import Comparison
 from forcegrasp.compare.figures import MEASURED, WITH, WITHOUT
 from forcegrasp.compare.heldout import rms
@@ -54,7 +55,7 @@ def compared() -> tuple[Comparison, Comparison]:
     """Records, fits and adds in the working directory; returns the set beside both models."""
     for arguments in LOOP:
         call(arguments)
-    loaded = load(Path("my_set"))
+    loaded = refuse_table(load(Path("my_set")), "compare")
     before, after = (compare(loaded, read_model(Path(name)), 0, print)[0] for name in ("model.yaml", "better.yaml"))
     return before, after
 
@@ -85,18 +86,21 @@ def _draw(before: Comparison, after: Comparison, effect: str, share: float) -> F
     span = _parted(time, np.abs(without - having)[:, side])
     now = span[0] + share * (span[1] - span[0])
     figure = Figure(figsize=(8.8, 3.2), dpi=100)
-    for left, title, signal, factor in ((0.055, "finger [mm]", side, 1e3), (0.385, "its force [N]", 2 + side, 1.0)):
-        axes = figure.add_axes((left, 0.15, 0.27, 0.62))
+    for left, title, signal, factor in (
+        (0.055, "finger's position [mm]", side, 1e3),
+        (0.385, "its force [N]", 2 + side, 1.0),
+    ):
+        axes = figure.add_axes((left, 0.15, 0.27, 0.59))
         curves = [factor * signals[:, signal] for signals in (measured, without, having)]
         _draw_signal(axes, time, curves, span, now)
         _tidy(axes, title, "time [s]")
-    _draw_bars(figure.add_axes((0.775, 0.15, 0.21, 0.62)), before, after, share)
+    _draw_bars(figure.add_axes((0.775, 0.15, 0.21, 0.59)), before, after, share)
     errors = [f"error {rms(c.heldout, target):.1f} × sensor noise" for c in (before, after)]
-    ends = {0: (f"Model without {effect}: {errors[0]}", WITHOUT), 1: (f"Model with {effect}: {errors[1]}", WITH)}
+    ends = {0.0: (f"Model without {effect}: {errors[0]}", WITHOUT), 1.0: (f"Model with {effect}: {errors[1]}", WITH)}
     told, colour = ends.get(share, (f"Adding {effect} …", MEASURED))
     figure.text(0.012, 0.97, told, fontsize=13, weight="bold", va="top", color=colour)
-    key = "grasps held out of the fit · dots: measured, lines: predicted"
-    figure.text(0.988, 0.96, key, fontsize=9, va="top", ha="right")
+    key = "dots: measured · lines: predicted for grasps that were held out of the fit"
+    figure.text(0.012, 0.89, key, fontsize=9, va="top", color=MEASURED)
     return figure
 
 
@@ -153,7 +157,8 @@ def _tidy(axes: Axes, title: str, xlabel: str) -> None:
 def write_gif(pictures: list[np.ndarray], path: Path) -> None:
     """Writes pictures as a GIF that starts over and over, in colours that all of them share."""
     images = [Image.fromarray(picture) for picture in pictures]
-    palette = Image.fromarray(np.concatenate([pictures[0], pictures[-1]])).quantize(_COLOURS)
+    some = np.concatenate([pictures[0], pictures[len(pictures) // 2], pictures[-1]])
+    palette = Image.fromarray(some).quantize(_COLOURS)
     first, *rest = (image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images)
     durations = [FIRST_MS, *[STEP_MS] * (len(rest) - 1), LAST_MS]
     first.save(path, "GIF", save_all=True, append_images=rest, duration=durations, loop=0)
