@@ -36,6 +36,13 @@ SCHEMAS: dict[str, type] = {
     "curves": CurvesConfig,
     "render": RenderConfig,
 }
+#: What a training takes of Hydra's own options. Others name search paths, callbacks and classes, that is, code.
+LAUNCHERS = ["basic", "joblib", "submitit_local", "submitit_slurm"]
+LAUNCHER_OPTIONS = (
+    *("n_jobs", "partition", "account", "qos", "constraint", "exclude", "array_parallelism", "timeout_min"),
+    *("max_num_timeout", "cpus_per_task", "mem_gb", "gpus_per_node", "gres"),
+)
+HYDRA_OPTIONS = ("hydra.run.dir", "hydra.sweep.dir", *(f"hydra.launcher.{name}" for name in LAUNCHER_OPTIONS))
 
 
 def compose(verb: str, overrides: list[str]) -> Any:
@@ -79,6 +86,8 @@ def _compose(verb: str, overrides: list[str]) -> tuple[Any, dict[str, Any]]:
 
     register_schemas()
     choices, known = groups(verb), [name for name, _, _ in leaves(SCHEMAS[verb])]
+    if verb == "train":
+        choices, known = choices | {"hydra/launcher": LAUNCHERS}, [*known, *HYDRA_OPTIONS]
     for override in overrides:
         _check_override(verb, override, choices, known)
     GlobalHydra.instance().clear()
@@ -149,12 +158,16 @@ def parse_override(override: str) -> Any:
       ConfigError: if it can't be read.
     """
     from hydra.core.override_parser.overrides_parser import OverridesParser
+    from hydra.core.override_parser.types import Glob
     from hydra.errors import HydraException
 
     try:
-        return OverridesParser.create().parse_override(override)
+        parsed = OverridesParser.create().parse_override(override)
     except HydraException as error:
         raise ConfigError(f"{override!r}: can't be read ({str(error).splitlines()[0]})") from error
+    if isinstance(parsed.value(), Glob):
+        raise ConfigError(f"{override!r}: glob() is not known here; write the values one by one, as in a,b,c")
+    return parsed
 
 
 def _check_override(verb: str, override: str, choices: dict[str, list[str]], known: list[str]) -> None:
@@ -168,8 +181,9 @@ def _check_override(verb: str, override: str, choices: dict[str, list[str]], kno
         for choice in value.split(","):
             if choice.strip() not in choices[key]:
                 raise ConfigError(f"no {key} named {choice.strip()!r}{closest(choice.strip(), choices[key])}")
-    elif key not in known and not key.startswith(("hydra.", "hydra/")):
-        raise ConfigError(f"no option {key!r}{closest(key, [*known, *choices])}")
+    elif key not in known:
+        own = [name for name in [*known, *choices] if name.startswith("hydra") == key.startswith("hydra")]
+        raise ConfigError(f"no option {key!r}{closest(key, own or known)}")
     if parse_override(override).is_sweep_override():
         sweep = "; to run one after another, add -m" if verb == "train" else ""
         raise ConfigError(f"{override!r}: several values; a list is written [a,b]{sweep}")

@@ -33,6 +33,15 @@ from forcegrasp.whole_file import write_whole
 _PACKAGES = ("torch", "torchrl", "tensordict", "mujoco", "gymnasium", "hydra-core", "numpy")
 
 
+def _refuse_interpolations(options: dict[str, Any], path: str = "") -> None:
+    """Raises ConfigError where a value asks for another one, such as a variable of the reader's environment."""
+    for name, value in options.items():
+        if isinstance(value, dict):
+            _refuse_interpolations(value, f"{path}{name}.")
+        elif "${" in str(value):
+            raise ConfigError(f"{path}{name}={value}: ${{...}} is not replaced in a file; write the value itself")
+
+
 def fingerprint(options: dict[str, Any]) -> str:
     """Identifies a training by its options as config.yaml has them; checkpoints carry it.
 
@@ -122,6 +131,7 @@ class RunDir:
             loaded = plain_yaml.load(self.config_path)
             if not isinstance(loaded, dict):  # text would be taken for more YAML
                 raise ConfigError("no options in it")
+            _refuse_interpolations(loaded)
             merged = OmegaConf.merge(OmegaConf.structured(TrainConfig), loaded)
             config = cast(TrainConfig, OmegaConf.to_object(merged))
             validate(config)

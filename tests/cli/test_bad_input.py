@@ -111,7 +111,12 @@ MISTAKES = [
     (["train", "hydra=3"], "hydra"),
     (["train", "hydra/launcher=jobli"], "jobli"),
     (["train", "hydra.run.dir="], "hydra.run.dir"),
+    (["train", "hydra.searchpath=[file:///tmp]"], "no option 'hydra.searchpath'"),
+    (["train", "-m", "seed=0,1", "hydra/callbacks=mine"], "no option 'hydra/callbacks'"),
+    (["train", "hydra.launcher.n_job=2"], "did you mean hydra.launcher.n_jobs"),
+    (["evaluate", "hydra.run.dir=x"], "no option 'hydra.run.dir'"),
     # sweeps
+    (["train", "-m", "experiment=glob(*)"], "write the values one by one"),
     (["train", "-m", "seed=0,x"], "seed=x"),
     (["train", "-m", "experiment=ib,noib"], "did you mean no_ib"),
     (["train", "-m", "ppo.grasps=4,0"], "ppo.grasps=0"),

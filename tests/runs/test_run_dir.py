@@ -192,6 +192,21 @@ def test_broken_config_is_refused(run, content, capsys):
     assert not capsys.readouterr().out
 
 
+@pytest.mark.parametrize("name", ["model", "seed", "ppo.hidden", "observation.parts"])
+@pytest.mark.parametrize("asked", ["${oc.env:OWN_SECRET}", "x${oc.env:OWN_SECRET}", "${seed}", "${oc.decode:'1'}"])
+def test_config_that_asks_for_another_value_is_refused(run, name, asked, monkeypatch):
+    """A stranger's file could show what the environment of whoever reads it holds."""
+    monkeypatch.setenv("OWN_SECRET", "hunter2")
+    options = yaml.safe_load(run.config_path.read_text())
+    section, _, leaf = name.rpartition(".")
+    (options[section] if section else options)[leaf] = [asked] if section else asked
+    run.config_path.write_text(yaml.safe_dump(options))
+    with pytest.raises(CheckpointError, match=r"\$\{...\} is not replaced in a file; write the value itself") as caught:
+        run.config()
+    assert name in str(caught.value)
+    assert "hunter2" not in str(caught.value)
+
+
 def test_config_that_is_no_text_is_refused(run):
     run.config_path.write_bytes(b"seed: \xff\xfe")
     with pytest.raises(CheckpointError):
