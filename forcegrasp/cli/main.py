@@ -7,6 +7,7 @@ import os
 import sys
 
 from forcegrasp import __version__
+from forcegrasp.cli.terminal import in_a_line, show_everything
 from forcegrasp.errors import ForcegraspError, closest
 
 VERBS = {
@@ -58,6 +59,7 @@ Every verb explains its options with --help. Exit status: 0 done, 1 the doctor f
 
 def main(arguments: list[str] | None = None) -> int:
     """Runs one verb; returns the exit status."""
+    show_everything()
     arguments = sys.argv[1:] if arguments is None else arguments
     if not arguments or arguments[0] in ("-h", "--help", "help"):
         verbs = "\n".join(f"  {name:<10} {what}" for name, what in VERBS.items())
@@ -70,27 +72,31 @@ def main(arguments: list[str] | None = None) -> int:
     try:
         if verb not in VERBS:
             raise ForcegraspError(f"no verb {verb!r}{closest(verb, VERBS)}")
+        for argument in rest:
+            if argument != in_a_line(argument):
+                told = "a line break, a control character, or bytes that are no text in this locale"
+                raise ForcegraspError(f"{argument!r}: has {told}; rename what it names")
         if verb != "doctor" and not {"-h", "--help"} & set(rest):
             import_mujoco()
         return importlib.import_module(f"forcegrasp.cli.{verb}").main(rest)
     except ImportError as error:
         if (error.name or "").startswith("forcegrasp"):
             raise  # a fault of this project's, not of the installation
-        print(f"forcegrasp: {_in_a_line(error)}; see what is wrong with: forcegrasp doctor", file=sys.stderr)
+        print(
+            f"forcegrasp: {' '.join(str(error).split()).rstrip('.')}; see what is wrong with: forcegrasp doctor",
+            file=sys.stderr,
+        )
         return 2
     except ForcegraspError as error:
-        print(f"forcegrasp: {error}", file=sys.stderr)
+        print(f"forcegrasp: {in_a_line(str(error))}", file=sys.stderr)
         return 2
     except OSError as error:
-        print(f"forcegrasp: {error.filename or 'file system'}: {error.strerror or error}", file=sys.stderr)
+        told = f"{error.filename or 'file system'}: {error.strerror or error}"
+        print(f"forcegrasp: {in_a_line(told)}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         print("forcegrasp: interrupted", file=sys.stderr)
         return 130
-
-
-def _in_a_line(error: Exception) -> str:
-    return " ".join(str(error).split()).rstrip(".")
 
 
 def import_mujoco() -> None:

@@ -124,7 +124,7 @@ def register_schemas() -> None:
 def groups(verb: str) -> dict[str, list[str]]:
     """Config groups of a verb and their choices, from conf/; a group of one verb alone lies in conf/VERB."""
     conf = files("forcegrasp.conf")
-    text = (conf / f"{verb}.yaml").read_text()
+    text = (conf / f"{verb}.yaml").read_text("utf-8")
     own = conf / verb
     folders = {f.name: f for f in conf.iterdir() if f.is_dir() and f"- {f.name}:" in text}
     folders |= {f.name: f for f in own.iterdir()} if own.is_dir() else {}

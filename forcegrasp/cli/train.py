@@ -146,8 +146,10 @@ def _sweep_job(composed) -> int:
     from omegaconf import OmegaConf
 
     from forcegrasp.cli.main import import_mujoco
+    from forcegrasp.cli.terminal import show_everything
 
-    import_mujoco()  # a launcher may have started a process of its own
+    show_everything()  # a launcher may have started a process of its own
+    import_mujoco()
     hydra, config = HydraConfig.get(), cast("TrainConfig", OmegaConf.to_object(composed))
     overrides = [text for text in hydra.overrides.task if not text.startswith("sweep=")]  # this run is a single one
     path = Path(hydra.runtime.output_dir)

@@ -115,7 +115,7 @@ def _describe(figures: dict[str, dict[str, np.ndarray]], baseline: str, seed: in
 def _write_trials(path: Path, grid: Grid, figures: dict[str, dict[str, np.ndarray]]) -> None:
     columns = ["policy", "cell", "kappa", "b2", "radius_m", "offset_m", "goal_force_n", *FIGURES]
     cells = np.repeat(grid.cells, grid.trials)
-    with open(path, "w", newline="") as file:
+    with open(path, "w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file)
         writer.writerow(columns)
         for name, values in figures.items():

@@ -32,7 +32,6 @@ if TYPE_CHECKING:
     from tensordict import TensorDictBase
 
 _BACKENDS = {"linux": ("egl", "osmesa"), "darwin": ("cgl",)}
-NO_RENDERER = "no OpenGL without a display; install libegl1 or libosmesa6 (Debian's names) to get videos"
 #: How much of what has not happened yet shines through.
 _AHEAD = 0.15
 
@@ -45,6 +44,13 @@ def backends() -> tuple[str, ...]:
     """MuJoCo's renderers to try in turn: the one that the user asked for, or those that need no display."""
     asked = os.environ.get("MUJOCO_GL")
     return (asked,) if asked else _BACKENDS.get(sys.platform, ("glfw",))
+
+
+def no_renderer() -> str:
+    """Why nothing renders, and after a semicolon what to do: another choice if the user made one, else a package."""
+    if asked := os.environ.get("MUJOCO_GL"):
+        return f"nothing renders with MUJOCO_GL={asked}; unset MUJOCO_GL, or mend what it names"
+    return "no OpenGL without a display; install libegl1 or libosmesa6 (Debian's names) to get videos"
 
 
 def grasp_video(episodes: dict[str, TensorDictBase], sensors: SensorConfig, every: int = 2) -> bytes:
@@ -76,7 +82,7 @@ def grasp_video(episodes: dict[str, TensorDictBase], sensors: SensorConfig, ever
             subprocess.run(command, env=environment, cwd=folder, capture_output=True, check=False)
             if target.exists():
                 return target.read_bytes()
-    raise NoRendererError(NO_RENDERER)
+    raise NoRendererError(no_renderer())
 
 
 def _render(source: Path, target: Path, every: int) -> None:

@@ -210,7 +210,7 @@ class RunDir:
     def log_metrics(self, row: dict[str, float]) -> None:
         """Appends a row to metrics.csv; the first row decides the columns."""
         new = not self.metrics_path.exists()
-        with open(self.metrics_path, "a", newline="") as file:
+        with open(self.metrics_path, "a", encoding="utf-8", newline="") as file:
             writer = csv.DictWriter(file, fieldnames=list(row))
             if new:
                 writer.writeheader()
@@ -220,7 +220,7 @@ class RunDir:
         """Keeps the whole rows up to a checkpoint, so that a resumed run logs nothing twice and mends a torn line."""
         if not self.metrics_path.exists():
             return
-        with open(self.metrics_path, newline="") as file:
+        with open(self.metrics_path, encoding="utf-8", newline="") as file:
             header, *lines = list(csv.reader(file.read().replace("\0", "").splitlines())) or [[]]
         kept = [line for line in lines if len(line) == len(header) and line[0].isdigit() and int(line[0]) <= frames]
         if not kept:  # the header may be torn, too; the next row writes it anew

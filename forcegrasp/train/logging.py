@@ -49,7 +49,7 @@ class TrainingLog:
         self.writer = SummaryWriter(str(run.tensorboard), purge_step=frames + 1 if frames else None)
         if not frames:
             self.writer.add_text("1_about_this_run", card(run, config))
-            self.writer.add_text("2_config", "```\n" + run.config_path.read_text() + "```")
+            self.writer.add_text("2_config", "```\n" + run.config_path.read_text("utf-8") + "```")
             self.writer.add_custom_scalars(layout())
 
     def batch(self, number: int, frames: int, groups: dict[str, dict[str, float]], episodes: TensorDictBase) -> None:

@@ -99,11 +99,19 @@ def test_pictures_of_several_policies_have_the_same_scales(episode):
         assert axes.get_ylim()[1] >= own.get_ylim()[1]
 
 
-def test_no_renderer(episode, monkeypatch):
-    monkeypatch.setenv("MUJOCO_GL", "nonsense")
-    with pytest.raises(NoRendererError, match="install") as caught:
+@pytest.mark.parametrize(
+    ("asked", "told"), [("broken", "with MUJOCO_GL=broken; unset MUJOCO_GL"), (None, "install libegl1 or libosmesa6")]
+)
+def test_no_renderer(asked, told, episode, monkeypatch):
+    """Who named a renderer that is none is not sent to install a library."""
+    monkeypatch.setattr("forcegrasp.evaluate.video.backends", lambda: ("broken",))
+    monkeypatch.delenv("MUJOCO_GL", raising=False)
+    if asked:
+        monkeypatch.setenv("MUJOCO_GL", asked)
+    with pytest.raises(NoRendererError, match=told) as caught:
         grasp_video({"close": episode}, SensorConfig())
     assert "\n" not in str(caught.value)
+    assert ("install" in str(caught.value)) == (asked is None)
 
 
 def test_training_goes_on_without_a_renderer(tmp_path, monkeypatch, capsys):
