@@ -66,6 +66,7 @@ STEPS = [
     Step("doctor", ["forcegrasp", "doctor"]),
     Step("effects", ["forcegrasp", "effects"]),
     Step("effects NAME", ["forcegrasp", "effects", "backlash"]),
+    Step("completion", ["forcegrasp", "completion", "bash"]),
     Step("train", ["forcegrasp", "train", *TINY, "hydra.run.dir=run"], ("run/run.json", "run/metrics.csv")),
     Step("train resume=", ["forcegrasp", "train", "resume=run"], prepare=interrupt),
     Step("train -m", ["forcegrasp", "train", "-m", *TINY, "seed=0,1", "hydra.sweep.dir=sweep"], ("sweep/curves.png",)),

@@ -23,6 +23,7 @@ VERBS = {
     "render": "play one grasp and show it as a video: the scene, the forces, the object's displacement",
     "effects": "list the physical effects that a simulator may lack, or explain one",
     "doctor": "check this installation and say what to do where something is wrong",
+    "completion": "print a script that completes verbs, options and values in bash, zsh or fish",
 }
 
 USAGE = """forcegrasp {version}: simulate tactile grasping, train grasp-force controllers, compare them
@@ -76,7 +77,7 @@ def main(arguments: list[str] | None = None) -> int:
             if argument != in_a_line(argument):
                 told = "a line break, a control character, or bytes that are no text in this locale"
                 raise ForcegraspError(f"{argument!r}: has {told}; rename what it names")
-        if verb != "doctor" and not {"-h", "--help"} & set(rest):
+        if verb not in ("doctor", "completion") and not {"-h", "--help"} & set(rest):
             import_mujoco()
         return importlib.import_module(f"forcegrasp.cli.{verb}").main(rest)
     except ImportError as error:
