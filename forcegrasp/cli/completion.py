@@ -63,15 +63,15 @@ def table() -> Iterator[list[str]]:
     from forcegrasp.effects.model_file import SHIPPED
     from forcegrasp.policies import shipped_policies
 
-    policies = [*shipped_policies(), *CONTROLLERS]
+    policies, effects = [*shipped_policies(), *CONTROLLERS, FILES], list(catalogue())
     named = {
-        **dict.fromkeys(("policies", "baseline", "run"), [*policies, FILES]),
-        **dict.fromkeys(("effects", "effect"), list(catalogue())),
+        **dict.fromkeys(("policies", "baseline", "run"), policies),
+        **dict.fromkeys(("effects", "effect"), effects),
         "gripper": [*shipped_grippers(), FILES],
         "model": [SHIPPED, FILES],
         "objects": ["paper", FILES],
     }
-    plain = {"effects": named["effects"], "export": named["run"], "completion": list(SHELLS)}
+    plain = {"effects": effects, "export": policies, "completion": list(SHELLS)}
     for verb in VERBS:
         flags = ["--help", *(["--all"] if verb in SCHEMAS else []), *(["-m"] if verb == "train" else [])]
         options = list(leaves(SCHEMAS[verb])) if verb in SCHEMAS else []
@@ -85,7 +85,7 @@ def table() -> Iterator[list[str]]:
             yield [verb, name, *([SEVERAL] if kind.startswith("list") else []), *values]
         for group, choices in (groups(verb) if verb in SCHEMAS else {}).items():
             yield [verb, group, *choices]
-    yield ["render", "policy", *named["policies"]]
+    yield ["render", "policy", *policies]
     yield ["train", "resume", FILES]
     yield ["train", "hydra/launcher", *LAUNCHERS]
     for name in HYDRA_OPTIONS:

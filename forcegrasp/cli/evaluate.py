@@ -24,7 +24,8 @@ def main(arguments: list[str]) -> int:
     if any(a in ("-h", "--help") for a in arguments):
         from forcegrasp.policies import shipped_policies
 
-        print(help_text("evaluate", PURPOSE, NOTES.format(shipped=", ".join(shipped_policies()) or "none")), end="")
+        notes = NOTES.format(shipped=", ".join(shipped_policies()) or "none")
+        print(help_text("evaluate", PURPOSE, notes, everything="--all" in arguments), end="")
         return 0
     config = compose("evaluate", arguments)
     out = Path(config.out or f"runs/evaluate_{time.strftime('%Y-%m-%d_%H-%M-%S')}")

@@ -53,8 +53,8 @@ from measurements to a better model (a set is a folder of CSV files; forcegrasp 
   forcegrasp add data=my_set model=model.yaml effect=backlash out=better.yaml
   forcegrasp compare data=my_set model=better.yaml         the error fell
 
-Every verb explains its options with --help. Exit status: 0 done, 1 the doctor found something to mend, 2 bad input,
-130 interrupted (and saved).
+Every verb explains its common options with --help, all of them with --help --all. Exit status: 0 done, 1 the doctor
+found something to mend, 2 bad input, 130 interrupted (and saved).
 """
 
 
@@ -63,13 +63,15 @@ def main(arguments: list[str] | None = None) -> int:
     show_everything()
     arguments = sys.argv[1:] if arguments is None else arguments
     if not arguments or arguments[0] in ("-h", "--help", "help"):
-        verbs = "\n".join(f"  {name:<10} {what}" for name, what in VERBS.items())
+        verbs = "\n".join(f"  {name:<11} {what}" for name, what in VERBS.items())
         print(USAGE.format(version=__version__, verbs=verbs), end="")
         return 0 if arguments else 2
     if arguments[0] == "--version":
         print(__version__)
         return 0
     verb, *rest = arguments
+    if "--all" in rest:
+        rest.append("--help")  # --all alone asks for all of the help, too
     try:
         if verb not in VERBS:
             raise ForcegraspError(f"no verb {verb!r}{closest(verb, VERBS)}")

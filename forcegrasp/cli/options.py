@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import textwrap
 from collections.abc import Iterator
 from importlib.resources import files
 from typing import Any
@@ -43,6 +44,13 @@ LAUNCHER_OPTIONS = (
     *("max_num_timeout", "cpus_per_task", "mem_gb", "gpus_per_node", "gres"),
 )
 HYDRA_OPTIONS = ("hydra.run.dir", "hydra.sweep.dir", *(f"hydra.launcher.{name}" for name in LAUNCHER_OPTIONS))
+
+#: Options of sections that a short help shows; those without a section are always there.
+COMMON = (
+    *("physics.threads", "grasp.kappa", "grasp.steps", "sensors.force_std_n"),
+    *("ppo.total_frames", "ppo.grasps", "ppo.learning_rate", "log.video_every"),
+)
+HELP_WIDTH = 100
 
 
 def compose(verb: str, overrides: list[str]) -> Any:
@@ -199,10 +207,14 @@ def _one_line(error: Exception) -> str:
     return f"{key}: {text}" if key and key not in text else text
 
 
-def help_text(verb: str, purpose: str, notes: str = "", plain: str = "") -> str:
-    """The verb's help: groups, then every option with default, unit, meaning and source.
+def help_text(verb: str, purpose: str, notes: str = "", plain: str = "", everything: bool = True) -> str:
+    """The verb's help: groups, then options.
 
-    ``plain`` is what the verb takes without ``key=``.
+    Args:
+      verb: its name.
+      purpose, notes: what it is for, and what is no option of it.
+      plain: what it takes without ``key=``.
+      everything: every option with default, unit, meaning and source; else a line for each that is common.
     """
     usage = f"usage: forcegrasp {verb} {plain and f'[{plain}] '}[key=value ...]"
     lines = [f"forcegrasp {verb}: {purpose}", "", usage, ""]
@@ -213,14 +225,17 @@ def help_text(verb: str, purpose: str, notes: str = "", plain: str = "") -> str:
         lines += ["presets (a preset sets several options; options given beside it win)", *presets]
     else:
         lines.pop()
+    return "\n".join([*lines, *(_every_option(verb) if everything else _common_options(verb))]) + "\n"
+
+
+def _every_option(verb: str) -> Iterator[str]:
     section = None
     for name, entry, default in leaves(SCHEMAS[verb]):
         head = name.rpartition(".")[0]
         if head != section:
             section = head
-            lines += ["", head or "general"]
+            yield from ("", head or "general")
         meta = entry.metadata
-        shown = str(default).replace("'", "").replace(" ", "")
         detail = (
             meta["doc"]
             + (f" [{meta['unit']}]" if meta["unit"] else "")
@@ -228,6 +243,21 @@ def help_text(verb: str, purpose: str, notes: str = "", plain: str = "") -> str:
         )
         if not all(choice in detail for choice in meta["choices"]):
             detail += f": {' or '.join(meta['choices'])}"
-        option = f"  {name}={shown}"
-        lines.append(f"{option}\n{'':<6}{detail}")
-    return "\n".join(lines) + "\n"
+        yield f"  {_with_default(name, default)}\n{'':<6}{detail}"
+
+
+def _common_options(verb: str) -> Iterator[str]:
+    options = list(leaves(SCHEMAS[verb]))
+    shown = [option for option in options if "." not in option[0] or option[0] in COMMON]
+    yield from ("", "common options")
+    for name, entry, default in shown:
+        unit = f" [{entry.metadata['unit']}]" if entry.metadata["unit"] else ""
+        head, text = _with_default(name, default), entry.metadata["doc"] + unit
+        first, *more = textwrap.wrap(f"  {head:<27} {text}", HELP_WIDTH, subsequent_indent=" " * 30)
+        yield "\n".join([first, *more])
+    sections = sorted({name.partition(".")[0] for name, _, _ in options if "." in name})
+    yield f"\n{len(options) - len(shown)} more of {', '.join(sections)}:\n  forcegrasp {verb} --help --all"
+
+
+def _with_default(name: str, default: Any) -> str:
+    return f"{name}={str(default).replace(chr(39), '').replace(' ', '')}"

@@ -20,7 +20,7 @@ What is not given of the grasp is drawn from the seed.
 def main(arguments: list[str]) -> int:
     """Runs the verb; returns the exit status."""
     if any(a in ("-h", "--help") for a in arguments):
-        print(help_text("render", PURPOSE, NOTES), end="")
+        print(help_text("render", PURPOSE, NOTES, everything="--all" in arguments), end="")
         return 0
     alone = [a.partition("=")[2] for a in arguments if a.startswith("policy=")]
     rest = [a for a in arguments if not a.startswith("policy=")]

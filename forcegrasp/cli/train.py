@@ -34,7 +34,7 @@ Watch a training with: tensorboard --logdir runs. Ctrl-C saves and ends.
 def main(arguments: list[str]) -> int:
     """Runs the verb; returns the exit status."""
     if any(a in ("-h", "--help") for a in arguments):
-        print(help_text("train", PURPOSE, NOTES), end="")
+        print(help_text("train", PURPOSE, NOTES, everything="--all" in arguments), end="")
         return 0
     resume = [a for a in arguments if a.startswith("resume=")]
     multirun = [a for a in arguments if a in ("-m", "--multirun")]
