@@ -12,7 +12,7 @@ NOTES = """
   data=my_set      a folder with meta.yaml, grasps.csv and samples.csv (or samples.parquet); or, for a table of final
                    forces, with meta.yaml and table.csv
   model=FILE       what forcegrasp fit or add wrote; its parameters are fitted again
-  effects=[A,B]    see forcegrasp effects
+  'effects=[A,B]'  see forcegrasp effects
 
   The verdict is one of: effect (one or several, in the order found), one_of (these data can't tell which), explained
   (nothing is missing), unknown (none of the effects), not_fitted (the base model can't be fitted to these data).

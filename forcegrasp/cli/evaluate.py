@@ -10,7 +10,8 @@ from forcegrasp.errors import ConfigError
 
 PURPOSE = "compare policies and controllers on the same simulated grasps"
 NOTES = """
-  policies=[A,B]   run directories of forcegrasp train; policies that come with the package: {shipped};
+  'policies=[A,B]' run directories of forcegrasp train; policies that come with the package:
+                   {shipped};
                    or controllers: force_pi (Lach et al. 2022), informed (knows the object's force scale: the mark to
                    reach), close, nothing
   plan=paper       the paper's simulation experiment; objects: its six objects in the training simulator;

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import codecs
+import io
 import sys
 import unicodedata
 
@@ -20,7 +21,7 @@ def show_everything() -> None:
     """Has stdout and stderr write what their encoding lacks in ASCII, where Python would raise UnicodeEncodeError."""
     codecs.register_error(_HANDLER, _replace)
     for stream in (sys.stdout, sys.stderr):
-        if hasattr(stream, "reconfigure"):  # it may be something else within another program
+        if isinstance(stream, io.TextIOWrapper):  # it may be something else within another program
             stream.reconfigure(errors=_HANDLER)
 
 
