@@ -198,7 +198,7 @@ def test_what_a_training_takes_of_hydras_own_is_there():
 
 
 def test_options_of_slurm_are_the_launchers():
-    pytest.importorskip("hydra_plugins.hydra_submitit_launcher", reason="hydra-submitit-launcher: .[cluster]")
+    pytest.importorskip("hydra_plugins.hydra_submitit_launcher")  # of the extra cluster
     slurm = [f"{name}=3" for name in HYDRA_OPTIONS if "launcher" in name and "n_jobs" not in name]
     compose("train", ["hydra/launcher=submitit_slurm", *slurm])
 
