@@ -16,6 +16,7 @@ from forcegrasp.compare.score import Background, Score, Signatures, null_gains
 from forcegrasp.compare.target import Target
 from forcegrasp.effects import Effect
 from forcegrasp.effects.quantisation import Quantisation
+from forcegrasp.short_repr import ShortRepr, counted, some
 
 #: Largest number of effects that are looked for.
 MOST_EFFECTS = 6
@@ -45,8 +46,8 @@ _PARALLEL = 0.995
 _NEARLY = 0.95
 
 
-@dataclass(frozen=True, eq=False)
-class Candidate:
+@dataclass(frozen=True, eq=False, repr=False)
+class Candidate(ShortRepr):
     """One effect, refitted together with everything else."""
 
     effect: type[Effect]
@@ -59,6 +60,10 @@ class Candidate:
     largest_fall: float  #: largest share by which the error of a signal in a phase falls
     signature: np.ndarray  #: unit vector, ``(N,)``
 
+    def _summary(self) -> str:
+        sizes = some(f"{name} {value:.3g}" for name, value in self.parameters().items())
+        return f"{self.effect.name}: error {self.error_after:.2f} × noise, gain {self.heldout_gain:+.0f}, {sizes}"
+
     @property
     def heldout_gain(self) -> float:
         """Change of the held-out log-likelihood, all grasps together."""
@@ -70,8 +75,8 @@ class Candidate:
         return dict(zip((p.name for p in self.effect.parameters), map(float, self.fit.values[-count:]), strict=True))
 
 
-@dataclass(frozen=True)
-class Step:
+@dataclass(frozen=True, repr=False)
+class Step(ShortRepr):
     """One round of the search."""
 
     verdict: str  #: "effect", "one_of" or "none"
@@ -81,9 +86,13 @@ class Step:
     error_before: float
     error_after: float
 
+    def _summary(self) -> str:
+        told = f"error {self.error_before:.2f} → {self.error_after:.2f} × noise"
+        return f"{self.verdict}: {some(self.effects)}; {told}, {counted(len(self.candidates), 'candidate')}"
 
-@dataclass(frozen=True)
-class Diagnosis:
+
+@dataclass(frozen=True, repr=False)
+class Diagnosis(ShortRepr):
     """What the data say that the model lacks."""
 
     verdict: str  #: "effect", "one_of", "explained", "unknown" or "not_fitted"
@@ -98,6 +107,10 @@ class Diagnosis:
     numerical: tuple[np.ndarray, ...] = field(default=())  #: each ``(G, S, 4)``
     floor: float = 1.0  #: error that sensor noise and the model's own numerical error leave
     left: str = ""  #: where there is more than that, in words; empty if nowhere
+
+    def _summary(self) -> str:
+        told = f"error {self.error_before:.2f} → {self.error_after:.2f} × noise, floor {self.floor:.2f}"
+        return f"{self.verdict}: {some(self.effects)}; {told}"
 
     def heldout(self) -> np.ndarray:
         """Residuals of held-out grasps under the final fit, ``(G, S, 4)``."""

@@ -19,6 +19,7 @@ from forcegrasp import plain_yaml
 from forcegrasp.effects import Effect, get_effect
 from forcegrasp.errors import ConfigError, closest
 from forcegrasp.physics.gripper import Gripper, load_gripper
+from forcegrasp.short_repr import ShortRepr, counted, cut, some
 from forcegrasp.whole_file import write_whole
 
 FORMAT = "forcegrasp-model/1"
@@ -38,13 +39,17 @@ class Fitted:
     unit: str = ""
 
 
-@dataclass(frozen=True)
-class FoundEffect:
+@dataclass(frozen=True, repr=False)
+class FoundEffect(ShortRepr):
     """An effect of a model, with its parameters."""
 
     effect: type[Effect]
     variant: str
     parameters: dict[str, Fitted]
+
+    def _summary(self) -> str:
+        sizes = [f"{name} {fitted.value:.4g} {fitted.unit}" for name, fitted in self.parameters.items()]
+        return f"{self.effect.name} {self.variant}".strip() + f": {some(sizes)}"
 
     @property
     def values(self) -> np.ndarray:
@@ -52,8 +57,8 @@ class FoundEffect:
         return np.array([self.parameters[p.name].value for p in self.effect.parameters])
 
 
-@dataclass(frozen=True)
-class Model:
+@dataclass(frozen=True, repr=False)
+class Model(ShortRepr):
     """A gripper's fitted base parameters, and the effects that were found."""
 
     gripper: Gripper
@@ -63,6 +68,10 @@ class Model:
     effects: tuple[FoundEffect, ...] = ()
     data: dict[str, str] = field(default_factory=dict)  #: set and fingerprint
     warnings: tuple[str, ...] = ()
+
+    def _summary(self) -> str:
+        effects = some(e.effect.name for e in self.effects) or "none"
+        return f"{cut(self.gripper.name)}, effects: {effects}; {counted(len(self.warnings), 'warning')}"
 
 
 def write_model(model: Model, path: Path) -> None:

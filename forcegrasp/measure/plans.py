@@ -6,14 +6,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from forcegrasp.short_repr import ShortRepr
+
 #: Seconds between two commands of a plan, and the length of a grasp (paper: 25 Hz, 6 s).
 PERIOD_S, SAMPLES = 0.04, 150
 # Time open and at rest before anything moves, which shows what sensors read in free air. Samples.
 _REST = 8
 
 
-@dataclass(frozen=True)
-class PlannedGrasp:
+@dataclass(frozen=True, repr=False)
+class PlannedGrasp(ShortRepr):
     """A grasp to record: both fingers are given the same command, the object may stand off the centre."""
 
     object: int

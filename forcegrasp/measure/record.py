@@ -14,6 +14,7 @@ from forcegrasp.measure.plans import PERIOD_S, SAMPLES, make_plan
 from forcegrasp.measure.replay import EffectOn, Replay
 from forcegrasp.measure.schema import MeasuredGrasp, MeasurementSet, fingerprint_of_set
 from forcegrasp.physics.gripper import BaseParameter, Gripper
+from forcegrasp.short_repr import ShortRepr
 
 # Objects' radii, as shares of the open finger's position: both fingers reach them, and they fit in.
 _RADII = (0.4, 0.75)
@@ -21,8 +22,8 @@ _RADII = (0.4, 0.75)
 _OBJECT_FACTOR = 2.0
 
 
-@dataclasses.dataclass(frozen=True)
-class Recorded:
+@dataclasses.dataclass(frozen=True, repr=False)
+class Recorded(ShortRepr):
     """A set, and the truth that its files don't tell."""
 
     measured: MeasurementSet

@@ -21,6 +21,7 @@ from forcegrasp.errors import ConfigError, closest
 from forcegrasp.physics.fast import compile_fast
 from forcegrasp.physics.guard import silence_log
 from forcegrasp.physics.scene_file import check_scene
+from forcegrasp.short_repr import ShortRepr, counted, cut
 
 FORMAT = "forcegrasp-gripper/1"
 _WRITE = re.compile(r"(-?)((?:actuator|dof|geom)_\w+)(?: (\d+))?")
@@ -62,8 +63,8 @@ class BaseParameter:
         return self.low > 0 and self.high / self.low > 5
 
 
-@dataclass(frozen=True)
-class Gripper:
+@dataclass(frozen=True, repr=False)
+class Gripper(ShortRepr):
     """A two-finger gripper and the object between its fingers, as a MuJoCo scene."""
 
     name: str
@@ -79,6 +80,9 @@ class Gripper:
     object_geom: str
     axis: int  #: 0, 1, 2 for x, y, z
     parameters: dict[str, BaseParameter]
+
+    def _summary(self) -> str:
+        return f"{cut(self.name)}, {counted(len(self.parameters), 'parameter')}"
 
     @property
     def open_m(self) -> float:

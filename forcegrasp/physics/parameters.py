@@ -7,6 +7,8 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from forcegrasp.short_repr import ShortRepr
+
 Numbers = TypeVar("Numbers", float, np.ndarray)
 
 #: Interval of the solver impedance width ρ, hard to soft (paper, Sec. 3). Metres.
@@ -35,8 +37,8 @@ def kappa_of_force_scale(force_scale: np.ndarray | float) -> np.ndarray:
     return np.clip(1 - (force_scale - soft) / (hard - soft), 0.0, 1.0)
 
 
-@dataclass(frozen=True)
-class GraspParameters:
+@dataclass(frozen=True, repr=False)
+class GraspParameters(ShortRepr):
     """The parameters of n grasps. Every field is a float64 array of shape ``(n,)``."""
 
     kappa: np.ndarray  #: softness κ; 0 hard, 1 soft
