@@ -62,7 +62,7 @@ def check_physics() -> Iterator[Finding]:
 
 def check_renderer() -> Iterator[Finding]:
     """What videos are made with: tried in turn in a process each, as videos are."""
-    from forcegrasp.evaluate.video import backends, no_renderer
+    from forcegrasp.physics.scene_renderer import backends, no_renderer
 
     asked = os.environ.get("MUJOCO_GL")
     if asked in ("disable", "disabled", "off", "false", "0"):

@@ -15,7 +15,8 @@ from torch.utils.tensorboard import SummaryWriter
 from forcegrasp.config import TrainConfig
 from forcegrasp.errors import CheckpointError
 from forcegrasp.evaluate.plots import force_traces
-from forcegrasp.evaluate.video import NoRendererError, grasp_video
+from forcegrasp.evaluate.video import grasp_video
+from forcegrasp.physics.scene_renderer import NoRendererError
 from forcegrasp.runs.run_dir import RunDir
 from forcegrasp.train.board import card, layout, tag
 

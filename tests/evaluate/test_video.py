@@ -25,7 +25,8 @@ from forcegrasp.evaluate.grasp_layout import (
     TOP_EDGE,
     WIDTH,
 )
-from forcegrasp.evaluate.video import NoRendererError, grasp_video
+from forcegrasp.evaluate.video import grasp_video
+from forcegrasp.physics.scene_renderer import NoRendererError
 from forcegrasp.runs.run_dir import RunDir
 from forcegrasp.train.loop import train
 
