@@ -49,7 +49,7 @@ class Loaded(ShortRepr, Generic[Measured]):
         return f"{self.measured!r}, {counted(len(self.warnings), 'warning')}"
 
 
-def load(path: Path) -> Loaded[MeasurementSet] | Loaded[FinalForceTable]:
+def load(path: str | Path) -> Loaded[MeasurementSet] | Loaded[FinalForceTable]:
     """Reads and checks a set.
 
     Raises:

@@ -74,12 +74,13 @@ class Model(ShortRepr):
         return f"{cut(self.gripper.name)}, effects: {effects}; {counted(len(self.warnings), 'warning')}"
 
 
-def write_model(model: Model, path: Path) -> None:
+def write_model(model: Model, path: str | Path) -> None:
     """Writes a model as YAML, whole or not at all.
 
     Raises:
       ConfigError: if the file can't be written.
     """
+    path = Path(path)
     content: dict[str, Any] = {
         "format": FORMAT,
         "gripper": _gripper_name(model.gripper),
@@ -111,14 +112,13 @@ def write_model(model: Model, path: Path) -> None:
         raise ConfigError(f"{path}: could not write the model ({error.strerror})") from error
 
 
-def read_model(path: Path) -> Model:
+def read_model(path: str | Path) -> Model:
     """Reads a model; ``virtual_robot`` is the one that comes with the package.
 
     Raises:
       ConfigError: names the file, the key, and what it must be.
     """
-    if str(path) == SHIPPED:
-        path = Path(str(files("forcegrasp.assets") / f"{SHIPPED}.yaml"))
+    path = Path(str(files("forcegrasp.assets") / f"{SHIPPED}.yaml")) if str(path) == SHIPPED else Path(path)
     try:
         raw = plain_yaml.load(path)
     except (OSError, plain_yaml.PlainYamlError) as error:

@@ -12,15 +12,16 @@ from forcegrasp.errors import ConfigError
 from forcegrasp.physics.plant import Plant
 
 
-def read_tiago_model(path: Path | str) -> Model:
-    """Reads a model that the learning environment can simulate.
+def read_tiago_model(source: Model | str | Path) -> Model:
+    """Returns a model that the learning environment can simulate, from its file unless it is one.
 
     Raises:
       ConfigError: if it can't be read, or is of another gripper.
     """
-    model = read_model(Path(path))
+    model = source if isinstance(source, Model) else read_model(Path(source))
     if model.gripper.name != "tiago":
-        raise ConfigError(f"model={path}: is of gripper {model.gripper.name}; the environment simulates tiago")
+        name = "model" if isinstance(source, Model) else f"model={source}"
+        raise ConfigError(f"{name}: is of gripper {model.gripper.name}; the environment simulates tiago")
     return model
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 from torchrl.envs import TransformedEnv
@@ -18,6 +19,7 @@ from forcegrasp.config import (
     validate,
 )
 from forcegrasp.effects.model_file import Model
+from forcegrasp.effects.variation import read_tiago_model
 from forcegrasp.env.grasp_env import GraspEnv
 from forcegrasp.physics import GraspParameters
 from forcegrasp.physics.sampling import OPEN_M
@@ -51,23 +53,24 @@ def build_env(
     action: ActionConfig | None = None,
     reward: RewardConfig | None = None,
     sampler: Callable[[np.random.Generator, np.ndarray], GraspParameters] | None = None,
-    model: Model | None = None,
+    model: Model | str | Path | None = None,
     seed: int = 0,
 ) -> TransformedEnv:
     """Returns ``n`` grasps with ``observation`` ``(n, 10 · frames)`` in and ``action`` ``(n, 2)`` in [−1, 1] out.
 
     Readings come first (noise), then what is computed from readings (contact, error), then memory, then the stacked
     observation; on the way back the action is denormalised, then biased. Parts left out use their defaults.
-    A ``model`` fitted to measurements brings its base parameters and effects, drawn anew for every grasp.
+    A ``model`` fitted to measurements, or its file, brings its base parameters and effects, drawn anew for every grasp.
 
     Raises:
-      ConfigError: if an option is out of its range.
+      ConfigError: if an option is out of its range, or the model can't be read or is of another gripper.
     """
     sensors, observation = sensors or SensorConfig(), observation or ObservationConfig()
     action, reward = action or ActionConfig(), reward or RewardConfig()
     for name, part in (("sensors", sensors), ("observation", observation), ("action", action)):
         validate(part, f"{name}.")
-    grasps = GraspEnv(n, physics, grasp, reward, sampler, model=model)
+    known = None if model is None else read_tiago_model(model)
+    grasps = GraspEnv(n, physics, grasp, reward, sampler, model=known)
     transforms: list[Transform] = [
         ObservationNoise(
             in_keys=["measured_position", "measured_force"],

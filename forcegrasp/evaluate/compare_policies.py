@@ -27,7 +27,7 @@ from forcegrasp.gpu import check_engine
 _MORE_IS_BETTER = ("force_reward_normalised", "force_reward_paper", "force_reward_measured")
 
 
-def evaluate(config: EvaluateConfig, out: Path, console: Console | None = None) -> dict:
+def evaluate(config: EvaluateConfig, out: str | Path, console: Console | None = None) -> dict:
     """Rolls every policy out on the same grasps; prints tables and writes everything into ``out``.
 
     Writes ``evaluation.json`` (the returned summary), ``tables.md``, ``trials.csv`` (one row per trial),
@@ -36,7 +36,7 @@ def evaluate(config: EvaluateConfig, out: Path, console: Console | None = None) 
     Raises:
       ConfigError, CheckpointError, MeasurementError, PhysicsError: with what to do about it.
     """
-    console = console or Console()
+    out, console = Path(out), console or Console()
     torch.set_num_threads(1)
     check_engine(config.physics)
     model = read_tiago_model(config.model) if config.model else None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -22,14 +23,14 @@ SHORT = ("force\nreward,\nnormalised", "force\nreward,\npaper's", "object\nmoved
 POINTS = 200
 
 
-def learning_curves(folders: list[Path], out: Path, console: Console | None = None) -> dict[str, Any]:
+def learning_curves(folders: Sequence[str | Path], out: str | Path, console: Console | None = None) -> dict[str, Any]:
     """Draws ``curves.png``, writes ``curves.json`` (which is returned) and prints the end of training per group.
 
     Raises:
       CheckpointError: if there is no run, or one can't be read.
     """
-    console = console or Console()
-    runs, notes = find_histories(folders, [column for column, *_ in CURVES])
+    out, console = Path(out), console or Console()
+    runs, notes = find_histories([Path(folder) for folder in folders], [column for column, *_ in CURVES])
     groups, left_out = group_runs(runs)
     cut = [f"{r.path} unfinished: {r.frames[-1]:,.0f} of {r.total:,} frames" for r in runs if not r.finished]
     frames = np.linspace(min(r.frames[0] for r in runs), max(r.frames[-1] for r in runs), POINTS)

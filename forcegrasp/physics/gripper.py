@@ -123,7 +123,7 @@ def shipped_folder() -> Path:
     return Path(str(files("forcegrasp") / "assets"))
 
 
-def load_gripper(name: str, folder: Path | None = None) -> Gripper:
+def load_gripper(name: str | Path, folder: str | Path = "") -> Gripper:
     """Returns a gripper by name (``tiago``) or by the path of its description.
 
     Args:
@@ -134,13 +134,14 @@ def load_gripper(name: str, folder: Path | None = None) -> Gripper:
       ConfigError: if there is no such gripper, or its description can't be right; names the file and the line's key.
     """
     shipped = shipped_folder()
+    name = str(name)
     if re.fullmatch(r"\w+", name):
         path = shipped / f"{name}.yaml"
         if not path.is_file():
             known = [p.stem for p in shipped.glob("*.yaml")]
             raise ConfigError(f"gripper={name}: no such gripper{closest(name, known)}; or give a description's path")
     else:
-        path = (folder or Path()) / name
+        path = Path(folder) / name
     return _load(path)
 
 
