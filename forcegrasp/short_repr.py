@@ -14,15 +14,16 @@ _LONGEST_TEXT = 40
 class ShortRepr:
     """Base of dataclasses that hold arrays or much text; they are declared with ``repr=False``.
 
-    A class says in :meth:`_summary` what a user wants to know; by default that is every field, arrays by their shapes.
+    A class says in :meth:`summary` what a user wants to know; by default that is every field, arrays by their shapes.
     """
 
-    def _summary(self) -> str:
+    def summary(self) -> str:
+        """What stands between the parentheses of the repr."""
         assert is_dataclass(self)
         return ", ".join(f"{field.name}={_brief(getattr(self, field.name))}" for field in fields(self))
 
     def __repr__(self) -> str:
-        return cut(f"{type(self).__name__}({self._summary()})", LONGEST)
+        return cut(f"{type(self).__name__}({self.summary()})", LONGEST)
 
 
 def cut(text: str, most: int = _LONGEST_TEXT) -> str:

@@ -38,7 +38,7 @@ class Comparison(ShortRepr):
     heldout: np.ndarray  #: the same for grasps held out of the fit; NaN where there are none
     floor: float  #: error ÷ noise that a perfect model would leave
 
-    def _summary(self) -> str:
+    def summary(self) -> str:
         return f"error {self.floor_ratio():.2f} × noise, a perfect model {self.floor:.2f}"
 
     def cells(self) -> list[Cell]:

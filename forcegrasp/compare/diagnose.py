@@ -60,7 +60,7 @@ class Candidate(ShortRepr):
     largest_fall: float  #: largest share by which the error of a signal in a phase falls
     signature: np.ndarray  #: unit vector, ``(N,)``
 
-    def _summary(self) -> str:
+    def summary(self) -> str:
         sizes = some(f"{name} {value:.3g}" for name, value in self.parameters().items())
         return f"{self.effect.name}: error {self.error_after:.2f} × noise, gain {self.heldout_gain:+.0f}, {sizes}"
 
@@ -86,7 +86,7 @@ class Step(ShortRepr):
     error_before: float
     error_after: float
 
-    def _summary(self) -> str:
+    def summary(self) -> str:
         told = f"error {self.error_before:.2f} → {self.error_after:.2f} × noise"
         return f"{self.verdict}: {some(self.effects)}; {told}, {counted(len(self.candidates), 'candidate')}"
 
@@ -108,7 +108,7 @@ class Diagnosis(ShortRepr):
     floor: float = 1.0  #: error that sensor noise and the model's own numerical error leave
     left: str = ""  #: where there is more than that, in words; empty if nowhere
 
-    def _summary(self) -> str:
+    def summary(self) -> str:
         told = f"error {self.error_before:.2f} → {self.error_after:.2f} × noise, floor {self.floor:.2f}"
         return f"{self.verdict}: {some(self.effects)}; {told}"
 

@@ -83,7 +83,7 @@ class TableAnalysis(ShortRepr):
     shared: dict[str, float] = field(default_factory=dict)  #: rms error, N, with one onset "travel" or one "force"
     has_kappa: bool = False  #: whether the paper's coupling of stiffness and force scale applies
 
-    def _summary(self) -> str:
+    def summary(self) -> str:
         return f"{self.verdict}: {some(self.effects) or self.reason}"
 
     @property

@@ -47,7 +47,7 @@ class Fit(ShortRepr):
     gradient: float  #: largest |slope| of the cost along one coordinate, in its own standard error; 0 at an optimum
     evaluations: int
 
-    def _summary(self) -> str:
+    def summary(self) -> str:
         return f"{counted(len(self.vector), 'parameter')}, sum of squared residuals {self.cost:.4g}"
 
     @property

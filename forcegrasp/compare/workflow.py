@@ -45,8 +45,8 @@ class Loaded(ShortRepr, Generic[Measured]):
     gripper: Gripper
     warnings: list[str]
 
-    def _summary(self) -> str:
-        return f"{self.measured!r}, {counted(len(self.warnings), 'warning')}"
+    def summary(self) -> str:
+        return f"{self.measured.summary()}; {counted(len(self.warnings), 'warning')}"
 
 
 def load(path: str | Path) -> Loaded[MeasurementSet] | Loaded[FinalForceTable]:
@@ -147,7 +147,7 @@ class Added(ShortRepr):
     error_after: float
     model: Model
 
-    def _summary(self) -> str:
+    def summary(self) -> str:
         return f"error {self.error_before:.2f} → {self.error_after:.2f} × noise, {self.model!r}"
 
 

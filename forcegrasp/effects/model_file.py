@@ -47,7 +47,7 @@ class FoundEffect(ShortRepr):
     variant: str
     parameters: dict[str, Fitted]
 
-    def _summary(self) -> str:
+    def summary(self) -> str:
         sizes = [f"{name} {fitted.value:.4g} {fitted.unit}" for name, fitted in self.parameters.items()]
         return f"{self.effect.name} {self.variant}".strip() + f": {some(sizes)}"
 
@@ -69,7 +69,7 @@ class Model(ShortRepr):
     data: dict[str, str] = field(default_factory=dict)  #: set and fingerprint
     warnings: tuple[str, ...] = ()
 
-    def _summary(self) -> str:
+    def summary(self) -> str:
         effects = some(e.effect.name for e in self.effects) or "none"
         return f"{cut(self.gripper.name)}, effects: {effects}; {counted(len(self.warnings), 'warning')}"
 

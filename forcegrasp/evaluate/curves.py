@@ -39,7 +39,7 @@ def learning_curves(folders: Sequence[str | Path], out: str | Path, console: Con
         "interval": "95 % t-interval of the mean over seeds",
         "last": LAST,
         "notes": [*notes, *left_out, *cut],
-        "groups": {group.label: _summary(group, frames) for group in groups},
+        "groups": {group.label: summary(group, frames) for group in groups},
     }
     out.mkdir(parents=True, exist_ok=True)
     (out / "curves.json").write_text(json.dumps(report, indent=1, ensure_ascii=False) + "\n", "utf-8")
@@ -53,7 +53,7 @@ def learning_curves(folders: Sequence[str | Path], out: str | Path, console: Con
     return report
 
 
-def _summary(group: Group, frames: np.ndarray) -> dict[str, Any]:
+def summary(group: Group, frames: np.ndarray) -> dict[str, Any]:
     summary: dict[str, Any] = {
         "runs": [{"path": str(r.path), "seed": r.seed, "frames": int(r.frames[-1])} for r in group.runs],
         "averaged_seeds": [run.seed for run in group.averaged],

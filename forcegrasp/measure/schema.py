@@ -40,7 +40,7 @@ class MeasuredGrasp(ShortRepr):
     object_m: np.ndarray | None  #: ``(T,)``, object position along the grasp axis; None if not measured
     rows: np.ndarray | None = field(default=None, compare=False)  #: ``(T,)``, where the samples stand in their file
 
-    def _summary(self) -> str:
+    def summary(self) -> str:
         return f"{cut(self.name)} on {cut(self.object)}, {counted(len(self.time_s), 'sample')}"
 
     def signals(self) -> dict[str, np.ndarray]:
@@ -64,7 +64,7 @@ class MeasurementSet(ShortRepr):
     grasps: tuple[MeasuredGrasp, ...]
     fingerprint: str  #: sha256 of all that a result can depend on; see :func:`fingerprint_of_set`
 
-    def _summary(self) -> str:
+    def summary(self) -> str:
         objects = counted(len({grasp.object for grasp in self.grasps}), "object")
         return f"{cut(self.name)}: {counted(len(self.grasps), 'grasp')} of {objects}, gripper {cut(self.gripper)}"
 
@@ -84,7 +84,7 @@ class FinalForceTable(ShortRepr):
     final_force_n: np.ndarray  #: ``(n,)``
     fingerprint: str  #: sha256 of all that a result can depend on
 
-    def _summary(self) -> str:
+    def summary(self) -> str:
         objects = counted(len(set(self.objects)), "object")
         return f"{cut(self.name)}: {counted(len(self.objects), 'squeeze')} of {objects}, gripper {cut(self.gripper)}"
 

@@ -81,7 +81,7 @@ class Gripper(ShortRepr):
     axis: int  #: 0, 1, 2 for x, y, z
     parameters: dict[str, BaseParameter]
 
-    def _summary(self) -> str:
+    def summary(self) -> str:
         return f"{cut(self.name)}, {counted(len(self.parameters), 'parameter')}"
 
     @property
