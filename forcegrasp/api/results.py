@@ -284,7 +284,7 @@ class TableResult(Result):
         return self.analysis.sections()
 
     def summary(self) -> str:
-        return f"{cut(self.name)}: {self.verdict}, {some(self.effects) or cut(self.analysis.reason, 150)}"
+        return f"{cut(self.name)}: {self.verdict} {some(self.effects) or cut(self.analysis.reason, 150)}"
 
 
 #: What a model can be taken from.

@@ -14,7 +14,7 @@ import torch
 from gymnasium.utils.env_checker import check_env
 from torchrl.envs.utils import step_mdp
 
-import forcegrasp  # noqa: F401 - registers the environment
+import forcegrasp
 from forcegrasp.config import GraspConfig, ObservationConfig, PhysicsConfig
 from forcegrasp.effects.model_file import read_model
 from forcegrasp.env import build_env
@@ -84,6 +84,10 @@ def test_seeds():
 def test_seed_of_the_constructor_holds_until_the_first_seeded_reset():
     made = gymnasium.make(ID, seed=1, **PARTS).reset()[0]
     np.testing.assert_array_equal(made, gymnasium.make(ID, **PARTS).reset(seed=1)[0])
+
+
+def test_what_builds_it_is_at_the_front_door():
+    assert forcegrasp.build_env is build_env
 
 
 def test_step_needs_a_reset():
