@@ -55,6 +55,7 @@ def interrupt(folder: Path) -> None:
 
 DEPLOY = "from forcegrasp.deploy import GraspController; print(GraspController.load('exported'))"
 GYMNASIUM = "import gymnasium, forcegrasp; print(gymnasium.make('forcegrasp/Grasp-v0').reset(seed=0)[0].shape)"
+FUNCTIONS = "import forcegrasp as fg; print(fg.load('set'), fg.report(fg.compare('set', 'model.yaml'), 'p'))"
 TYPED = "from importlib.resources import files; print((files('forcegrasp') / 'py.typed').read_text())"
 SHIPPED = f"""
 from forcegrasp.cli.main import main
@@ -78,6 +79,7 @@ STEPS = [
     Step("deploy", ["python", "-c", DEPLOY]),
     Step("record", ["forcegrasp", "record", "out=set", "grasps=6", "objects=1", "effects=[force_bias]"], ("set",)),
     Step("fit", ["forcegrasp", "fit", "data=set", "out=model.yaml"], ("model.yaml",)),
+    Step("functions", ["python", "-c", FUNCTIONS], ("p/report.html",)),
     Step("compare", ["forcegrasp", "compare", "data=set", "model=model.yaml", "out=c"], ("c/report.html",)),
     Step(
         "diagnose",

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 class Result(ShortRepr):
     """Base of all results. Errors are in units of the sensor noise: 1 is as good as it gets."""
 
-    data: Any  #: the set, as :func:`forcegrasp.load` returns it
+    data: Any  #: the set, as :func:`forcegrasp.api.load` returns it
     file: str  #: name of its JSON file, without the ending
 
     @property
@@ -62,7 +62,7 @@ class CompareResult(Result):
     """Where a model fails."""
 
     data: Loaded[MeasurementSet]
-    comparison: Comparison  #: all arrays: measured, predicted, difference
+    comparison: Comparison  #: all arrays, measured, predicted and their difference
     model: Model  #: what was judged
     model_name: str
     notes: tuple[str, ...]  #: what to bear in mind

@@ -21,7 +21,7 @@ WIDTH, HEIGHT = 480, 360
 class GraspGymnasiumEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     """Observation: the stacked o(t), ``(30,)`` by default. Action: ``(2,)`` in [−1, 1], scaled to position deltas.
 
-    ``info`` holds the true state of the grasp (see :data:`forcegrasp.env.grasp_env.OBSERVATIONS`;
+    ``info`` holds the true state of the grasp (see ``forcegrasp.env.grasp_env.OBSERVATIONS``;
     nested names are joined by a dot).
 
     Args:

@@ -62,7 +62,7 @@ class MeasurementSet(ShortRepr):
     position_std_m: float | None  #: noise of the positions, if known
     force_std_n: float | None  #: noise of the forces, if known
     grasps: tuple[MeasuredGrasp, ...]
-    fingerprint: str  #: sha256 of all that a result can depend on; see :func:`fingerprint_of_set`
+    fingerprint: str  #: sha256 of all that a result can depend on; see ``fingerprint_of_set``
 
     def summary(self) -> str:
         objects = counted(len({grasp.object for grasp in self.grasps}), "object")

@@ -59,7 +59,7 @@ class BaseParameter:
 
     @property
     def logarithmic(self) -> bool:
-        """Whether it is fitted by its logarithm: it is positive and spans more than a factor of 5."""
+        """Whether it is fitted by its logarithm, as it is positive and spans more than a factor of 5."""
         return self.low > 0 and self.high / self.low > 5
 
 
@@ -99,7 +99,7 @@ class Gripper(ShortRepr):
 
         Args:
           tier: ``"reference"`` is the scene as described; ``"fast"``, where the description has ``fast: sphere``, is
-            :mod:`forcegrasp.physics.fast`; ``"fitting"`` is that with at most twice the step, whose slopes are exact
+            ``forcegrasp.physics.fast``; ``"fitting"`` is that with at most twice the step, whose slopes are exact
             enough for a fit.
 
         Raises:

@@ -23,7 +23,7 @@ def offset_limit_m(radius_m: np.ndarray | float, deformation_m: float) -> np.nda
 
 
 class GraspSampler:
-    """Draws grasps from the ranges of a :class:`GraspConfig`; the ranges may be changed between draws.
+    """Draws grasps from the ranges of a ``GraspConfig``; the ranges may be changed between draws.
 
     Raises:
       ConfigError: if the smallest object could be squeezed flat (paper, eq. 3: d_p < r).

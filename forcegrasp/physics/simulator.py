@@ -50,7 +50,7 @@ class GraspSimulator:
         self.steps = np.zeros(n, dtype=np.int64)  #: control steps since the grasp was reset, ``(n,)``
         self.parameters = GraspParameters(*np.broadcast_to(np.array([[0.5], [-9.0], [0.025], [0.0], [0.1]]), (5, n)))
         self.commanded_position = np.full((n, 2), OPEN_M)  #: q_des of the last step, metres, ``(n, 2)``
-        self.object_speed = np.zeros(n)  #: |o_y(t) − o_y(t−1)|, metres per control step, ``(n,)``
+        self.object_speed = np.zeros(n)  #: ``|o_y(t) − o_y(t−1)|``, metres per control step, ``(n,)``
         self._substeps = round(CONTROL_PERIOD_S / plant.dt)
         self._variation = variation
         if variation is not None:

@@ -13,7 +13,7 @@ def contact_bias(had_contact: Tensor, force_error: Tensor, goal_force: Tensor, o
     """φ of each finger (paper, eq. 7).
 
     1 before the finger's first contact; ``one`` for a finger that waits for the other; with both in contact
-    max(floor, 1 − |Δf| / f_goal).
+    ``max(floor, 1 − |Δf| / f_goal)``.
 
     Args:
       had_contact: h, 0 or 1, ``(*B, 2)``.
