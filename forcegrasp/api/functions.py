@@ -71,7 +71,7 @@ def compare(
         return _analyse(loaded, "compare", model=model)
     given = None if model is None else _model(model)
     comparison, used, notes = workflow.compare(loaded, given, seed, tell)
-    name = str(model) if isinstance(model, (str, Path)) else "a model" if given else "base model, fitted to this set"
+    name = "" if model is None else str(model) if isinstance(model, (str, Path)) else repr(model)
     return CompareResult(loaded, comparison, used, name, (*notes, *used.warnings))
 
 
@@ -126,7 +126,7 @@ def diagnose(
         return _analyse(loaded, "diagnosis", model=model, effects=only)
     given = None if model is None else _model(model)
     diagnosis, _ = workflow.diagnose_set(loaded, given, [effect.name for effect in tried], seed, tell)
-    return DiagnoseResult(loaded, diagnosis, advise(diagnosis), tuple(tried), only)
+    return DiagnoseResult(loaded, diagnosis, advise(diagnosis), tuple(tried), only, given is None)
 
 
 def add(
@@ -162,7 +162,7 @@ def add(
 
 
 def report(result: ModelResult | TableResult, out: str | Path | None = None) -> Path:
-    """Writes a result as the verb does: ``report.html``, which works offline, its figures as JSON, and its model.
+    """Writes a result as the verb does: ``report.html``, which works offline, its figures as JSON, and fitted models.
 
     Args:
       result: what :func:`compare`, :func:`fit`, :func:`diagnose` or :func:`add` returned.
@@ -176,8 +176,8 @@ def report(result: ModelResult | TableResult, out: str | Path | None = None) -> 
     """
     verb = "diagnose" if result.file == "diagnosis" else result.file
     folder = measuring.check_folder(default_out(verb, str(out or "")))
-    if not isinstance(result, TableResult):
-        write_model(result.model, folder / "model.yaml")
+    for name, model in result.models().items():
+        write_model(model, folder / name)
     return measuring.write_files(
         folder, result.file, result.to_dict(), result.title, result.answer, result.sections(), result.data
     )

@@ -51,6 +51,10 @@ class Result(ShortRepr):
         """The sections of the report: what the answer rests on."""
         raise NotImplementedError
 
+    def models(self) -> dict[str, Model]:
+        """The models that lie beside the report, by the names of their files."""
+        return {}
+
     @property
     def name(self) -> str:
         """The set's name."""
@@ -64,7 +68,7 @@ class CompareResult(Result):
     data: Loaded[MeasurementSet]
     comparison: Comparison  #: all arrays, measured, predicted and their difference
     model: Model  #: what was judged
-    model_name: str
+    given: str  #: what that model was given as; empty if it is the base model, fitted to this set
     notes: tuple[str, ...]  #: what to bear in mind
 
     file = "compare"
@@ -88,10 +92,14 @@ class CompareResult(Result):
         return f"Where the model fails: {self.name}"
 
     def to_dict(self) -> dict[str, Any]:
-        return compare_output.compare_json(self.comparison, self.name, self.model_name, list(self.notes))
+        name = self.given or "base model, fitted to this set"
+        return compare_output.compare_json(self.comparison, self.name, name, list(self.notes))
 
     def sections(self) -> list[Section]:
         return compare_output.sections(self.comparison, list(self.notes))
+
+    def models(self) -> dict[str, Model]:
+        return {} if self.given else {measuring.BASE_MODEL: dataclasses.replace(self.model, warnings=self.notes)}
 
     def summary(self) -> str:
         worst = compare_output.worst_cell(self.comparison.cells())
@@ -137,6 +145,9 @@ class FitResult(Result):
     def sections(self) -> list[Section]:
         return fit_output.fit_sections(self.base, self.target, self.model)
 
+    def models(self) -> dict[str, Model]:
+        return {"model.yaml": self.model}
+
     def summary(self) -> str:
         verdict = "converged" if self.converged else f"NOT fitted, {cut(self.base.reason, 100)}"
         parameters = counted(len(self.base.fit.vector), "parameter")
@@ -153,6 +164,7 @@ class DiagnoseResult(Result):
     advice: Advice | None  #: which grasp to record next
     tried: tuple[type[Effect], ...]
     only: tuple[str, ...]  #: the effects that were asked for; empty if all were tried
+    from_base: bool  #: whether it starts from the base model, for none was given
 
     file = "diagnosis"
 
@@ -178,12 +190,16 @@ class DiagnoseResult(Result):
 
     @cached_property
     def model(self) -> Model:
-        """The fitted model with the effects that were found; with "one_of", with the first."""
+        """The fitted model, with the effects that were found; of those that can't be told apart with the first."""
         diagnosis = self.diagnosis
-        if not diagnosis.base.converged:
-            return measuring.base_model(diagnosis.base, diagnosis.target, self.data)
+        if self.verdict not in ("effect", "one_of"):
+            return self._base_model
         numerical = numerical_error(diagnosis.fit, diagnosis.target)
         return workflow.model_of(diagnosis.fit, diagnosis.target, self.data, numerical)
+
+    @cached_property
+    def _base_model(self) -> Model:
+        return measuring.base_model(self.diagnosis.base, self.diagnosis.target, self.data)
 
     @property
     def answer(self) -> str:
@@ -199,6 +215,10 @@ class DiagnoseResult(Result):
 
     def sections(self) -> list[Section]:
         return diagnose_output.sections(self.diagnosis, self.advice, self.tried)
+
+    def models(self) -> dict[str, Model]:
+        base = {measuring.BASE_MODEL: self._base_model} if self.from_base else {}
+        return base | ({"model.yaml": self.model} if self.verdict in ("effect", "one_of") else {})
 
     def summary(self) -> str:
         found = f"{self.verdict} {some(self.effects)}".strip()
@@ -245,6 +265,9 @@ class AddResult(Result):
 
     def sections(self) -> list[Section]:
         return fit_output.add_sections(self.added, self.effect)
+
+    def models(self) -> dict[str, Model]:
+        return {"model.yaml": self.model}
 
     def summary(self) -> str:
         fall = f"error {self.error_before:.2f} → {self.error_after:.2f} × noise"

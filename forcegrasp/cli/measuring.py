@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from forcegrasp.measure import FinalForceTable, MeasurementSet
 
 
+#: The base model that compare and diagnose fit where none is given, beside their report.
+BASE_MODEL = "base_model.yaml"
 #: With an effect added, the error must fall to less than this share.
 LEAST_FALL = 0.995
 

@@ -73,11 +73,19 @@ def test_report_of_a_table_is_the_verbs(verb, table):
     assert result.verdict == "one_of"
 
 
-def test_report_lies_where_the_verb_would_put_it_and_holds_the_model(work):
+def test_report_lies_where_the_verb_would_put_it_and_holds_the_models(work, model):
     path = fg.report(fg.diagnose("my_set"))
     assert re.fullmatch(r"runs/diagnose_[-\d]+_[-\d]+/report\.html", str(path))
     (effect,) = read_model(path.parent / "model.yaml").effects
     assert effect.effect.name == "force_bias"
+    assert not read_model(path.parent / "base_model.yaml").effects
+    unknown = dataclasses.replace(fg.diagnose("my_set", model), diagnosis=work.made_up.diagnosis("unknown"))
+    given, fitted = fg.compare("my_set", model), fg.compare("my_set")
+    made = [list(result.models()) for result in (fitted, given, fg.diagnose("my_set", model), unknown)]
+    assert made == [["base_model.yaml"], [], ["model.yaml"], []]
+    assert not unknown.model.effects
+    assert given.to_dict()["model"] == "model.yaml"
+    assert fg.compare("my_set", given).to_dict()["model"] == repr(given)
 
 
 @pytest.mark.parametrize(("kind", "call"), [("fit_model", fg.fit), ("diagnose_set", fg.diagnose)])

@@ -26,11 +26,11 @@ def results(made_up, table) -> SimpleNamespace:
     data, model = made_up.loaded, made_up.model
     diagnosis = made_up.diagnosis("effect")
     return SimpleNamespace(
-        compare=CompareResult(data, made_up.comparison, model, "m", ("a note",)),
+        compare=CompareResult(data, made_up.comparison, model, "", ("a note",)),
         fit=FitResult(data, made_up.target, made_up.base, model, None),
-        diagnose=DiagnoseResult(data, diagnosis, made_up.advice, tuple(made_up.tried), ()),
-        one_of=DiagnoseResult(data, made_up.diagnosis("one_of"), None, tuple(made_up.tried), ()),
-        not_fitted=DiagnoseResult(data, made_up.diagnosis("not_fitted"), None, (), ()),
+        diagnose=DiagnoseResult(data, diagnosis, made_up.advice, tuple(made_up.tried), (), False),
+        one_of=DiagnoseResult(data, made_up.diagnosis("one_of"), None, tuple(made_up.tried), (), True),
+        not_fitted=DiagnoseResult(data, made_up.diagnosis("not_fitted"), None, (), (), True),
         add=AddResult(data, made_up.added, made_up.tried[0], Path("x.yaml")),
         table=fg.compare(table),
         recorded=Recorded(data.measured, {"radius_m": np.zeros(8)}),
