@@ -105,7 +105,7 @@ def test_pictures_of_several_policies_have_the_same_scales(episode):
 )
 def test_no_renderer(asked, told, episode, monkeypatch):
     """Who named a renderer that is none is not sent to install a library."""
-    monkeypatch.setattr("forcegrasp.evaluate.video.backends", lambda: ("broken",))
+    monkeypatch.setattr("forcegrasp.physics.scene_renderer.backends", lambda: ("broken",))
     monkeypatch.delenv("MUJOCO_GL", raising=False)
     if asked:
         monkeypatch.setenv("MUJOCO_GL", asked)

@@ -13,8 +13,8 @@ from PIL import Image, ImageSequence
 from forcegrasp.compare.comparison import Comparison
 from forcegrasp.compare.figures import WITH, WITHOUT
 from forcegrasp.compare.target import make_target
-from forcegrasp.evaluate.video import NO_RENDERER
 from forcegrasp.measure import MeasuredGrasp, MeasurementSet
+from forcegrasp.physics.scene_renderer import no_renderer
 from tools import readme_pictures
 
 SIGMA = np.array([2.7e-5, 2.7e-5, 0.013, 0.013])
@@ -63,11 +63,11 @@ def test_pictures_move_and_start_over(tmp_path):
 
 
 def test_where_nothing_can_be_rendered_a_line_says_so_and_nothing_is_written(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr("forcegrasp.evaluate.video.backends", lambda: ())
+    monkeypatch.setattr("forcegrasp.physics.scene_renderer.backends", lambda: ())
     monkeypatch.setattr(readme_pictures, "GRASP", ["render", "policies=[force_pi]", "steps=2"])
     monkeypatch.setattr(sys, "argv", ["readme_pictures.py", "--out", str(tmp_path)])
     with pytest.raises(SystemExit) as ended:
         readme_pictures.main()
     assert ended.value.code == 2
-    assert capsys.readouterr().err.strip() == f"forcegrasp: {NO_RENDERER}"
+    assert capsys.readouterr().err.strip() == f"forcegrasp: {no_renderer()}"
     assert not list(tmp_path.iterdir())
