@@ -13,6 +13,7 @@ from forcegrasp.errors import ConfigError, ForcegraspError
 
 if TYPE_CHECKING:
     from forcegrasp.config import TrainConfig
+    from forcegrasp.runs.run_dir import RunDir
 
 #: Why a run of a sweep failed, in its folder.
 FAILURE = "failed.txt"
@@ -27,7 +28,7 @@ NOTES = """
   resume=RUN_DIR     go on with an interrupted run, exactly as if it had not been interrupted
   hydra.run.dir=DIR  where to write the run; runs/TIME_EXPERIMENT_SEED by default
 
-Watch a training with: tensorboard --logdir runs. Ctrl-C saves and ends.
+Watch a training with: tensorboard --logdir runs. Ctrl-C saves and ends; so do SIGTERM, SIGHUP and SIGUSR1.
 """
 
 
@@ -56,10 +57,7 @@ def _run(overrides: list[str]) -> int:
         raise ConfigError(f"{preset} is several runs: add -m to run one after another")
     _check(config)
     _join(config)
-
-    from forcegrasp.runs.run_dir import RunDir
-
-    return _train(config, RunDir.create(run_dir, config, overrides), resume=False)
+    return _begin(config, Path(run_dir), overrides)
 
 
 def _check(config) -> None:
@@ -107,17 +105,20 @@ def _sweep(overrides: list[str]) -> int:
 
     quoted = folder.replace("\\", "\\\\").replace("'", "\\'")
     sys.argv = ["forcegrasp train", "-m", *overrides, f"hydra.sweep.dir='{quoted}'"]
-    if launcher:
-        print(f"the runs' jobs write to {folder}/.submitit")
-    try:
-        job()
-    except Exception as error:
-        if type(error).__module__.startswith("submitit."):
-            reason = " ".join(str(error).splitlines()[:2])
-            raise ForcegraspError(f"{reason}; the same sweep typed again goes on") from error
-        raise
-    finally:  # a sweep that was cut short has something to show, too
-        _draw_curves(Path(folder))
+    from forcegrasp.runs.lock import only_writer
+
+    with only_writer(Path(folder) / "sweep.lock"):
+        if launcher:
+            print(f"the runs' jobs write to {folder}/.submitit")
+        try:
+            job()
+        except Exception as error:
+            if type(error).__module__.startswith("submitit."):
+                reason = " ".join(str(error).splitlines()[:2])
+                raise ForcegraspError(f"{reason}; the same sweep typed again goes on") from error
+            raise
+        finally:  # a sweep that was cut short has something to show, too
+            _draw_curves(Path(folder))
     return _tell_failures(sorted(Path(folder).rglob(FAILURE)))
 
 
@@ -159,6 +160,7 @@ def _sweep_job(composed) -> int:
     except (ForcegraspError, OSError) as error:  # raised here, Hydra would tell of the first one alone
         (path / FAILURE).write_text(f"{error}\n", "utf-8")
         return 2
+    (path / FAILURE).unlink(missing_ok=True)  # of another job that found this one at work
     if status == INTERRUPTED:
         if str(hydra.runtime.choices["hydra/launcher"]).startswith("submitit_"):  # a scheduler ended this job alone
             raise ForcegraspError(f"{path}: stopped and saved; the same sweep typed again goes on")
@@ -171,9 +173,9 @@ def _begin_or_resume(path: Path, config: TrainConfig, overrides: list[str]) -> i
     from forcegrasp.runs.run_dir import RunDir
 
     _join(config)
-    if any(path.glob("checkpoints/*.safetensors")) and RunDir.open(path).config() == config:
+    if RunDir(path).has_checkpoint and RunDir.open(path).config() == config:
         return _resume(path)
-    return _train(config, RunDir.create(path, config, overrides), resume=False)
+    return _begin(config, path, overrides)
 
 
 def single_runs(overrides: list[str]) -> list[list[str]]:
@@ -207,17 +209,29 @@ def _resume(path: Path) -> int:
     run = RunDir.open(path)
     config = run.config()
     (path / FAILURE).unlink(missing_ok=True)  # told when it failed; it gets another chance
-    if run.load()[1]["frames"] >= config.ppo.total_frames:
+    if run.has_checkpoint and run.load()[1]["frames"] >= config.ppo.total_frames:
         print(f"{path}: already trained to the end ({config.ppo.total_frames:,} frames)")
         return 0
     return _train(config, run, resume=True)
 
 
-def _train(config, run, resume: bool) -> int:
-    from forcegrasp.train.loop import train
+def _begin(config: TrainConfig, path: Path, overrides: list[str]) -> int:
+    from forcegrasp.runs.run_dir import RunDir
 
+    run = RunDir.create(path, config, overrides)
     print(f"run directory: {run.path}")
-    if train(config, run, resume):
+    return _train(config, run, resume=False)
+
+
+def _train(config: TrainConfig, run: RunDir, resume: bool) -> int:
+    try:
+        from forcegrasp.train.loop import train
+
+        done = train(config, run, resume)
+    except KeyboardInterrupt:  # before the first batch, or typed twice
+        print(f"interrupted; go on with: forcegrasp train resume={run.path}")
+        return INTERRUPTED
+    if done:
         print(f"trained. Compare it with the hand-written one: forcegrasp evaluate 'policies=[{run.path},force_pi]'")
         return 0
     print(f"stopped and saved; go on with: forcegrasp train resume={run.path}")

@@ -46,7 +46,7 @@ class TrainingLog:
     def _open(self) -> None:
         run, config, frames = self.run, self.config, self.frames
         run.drop_metrics_after(frames)
-        self.writer = SummaryWriter(str(run.tensorboard), purge_step=frames + 1 if frames else None)
+        self.writer = SummaryWriter(str(run.tensorboard), purge_step=frames + 1 if frames else 0)
         if not frames:
             self.writer.add_text("1_about_this_run", card(run, config))
             self.writer.add_text("2_config", "```\n" + run.config_path.read_text("utf-8") + "```")
