@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
@@ -17,6 +18,8 @@ if TYPE_CHECKING:
 
 #: Why a run of a sweep failed, in its folder.
 FAILURE = "failed.txt"
+#: One of a sweep's runs that train side by side was stopped: no further one begins.
+STOPPED = "stopped"
 #: Exit status after Ctrl-C, as shells have it.
 INTERRUPTED = 130
 PURPOSE = "learn a grasp-force policy with PPO"
@@ -111,7 +114,10 @@ def _sweep(overrides: list[str]) -> int:
         if launcher:
             print(f"the runs' jobs write to {folder}/.submitit")
         try:
-            job()
+            if "hydra/launcher=joblib" in overrides:
+                _side_by_side(job, Path(folder) / STOPPED)
+            else:
+                job()
         except Exception as error:
             if type(error).__module__.startswith("submitit."):
                 reason = " ".join(str(error).splitlines()[:2])
@@ -122,10 +128,34 @@ def _sweep(overrides: list[str]) -> int:
     return _tell_failures(sorted(Path(folder).rglob(FAILURE)))
 
 
+def _side_by_side(job: Callable[[], None], stopped: Path) -> None:
+    """Runs a sweep in processes of joblib, which would kill them all at Ctrl-C: here they save and end first."""
+    from forcegrasp.train.stop import stop_signals, tell_workers
+
+    def stop() -> None:
+        stopped.touch()
+        tell_workers()
+
+    stopped.unlink(missing_ok=True)
+    try:
+        with stop_signals(stop):
+            job()
+        if stopped.exists():
+            raise KeyboardInterrupt
+    except Exception as error:
+        if stopped.exists():  # a process that had nothing to save was gone at once, which joblib complains about
+            raise KeyboardInterrupt from error
+        raise
+    finally:
+        stopped.unlink(missing_ok=True)
+
+
 def _tell_failures(files: list[Path]) -> int:
     """Raises ForcegraspError if runs of a sweep failed, after a line about each; returns the exit status 0 if not."""
     for file in files:
-        reason = file.read_text("utf-8").strip().removeprefix(f"{file.parent}: ")
+        reason = file.read_text("utf-8").strip()
+        for name in (file.parent, file.parent.absolute()):
+            reason = reason.removeprefix(f"{name}: ")
         print(f"{file.parent}: {reason}", file=sys.stderr)
     if files:
         raise ForcegraspError(f"{len(files)} of the sweep's runs failed, see above and {FAILURE} in their folders")
@@ -153,6 +183,9 @@ def _sweep_job(composed) -> int:
     import_mujoco()
     hydra, config = HydraConfig.get(), cast("TrainConfig", OmegaConf.to_object(composed))
     overrides = [text for text in hydra.overrides.task if not text.startswith("sweep=")]  # this run is a single one
+    launcher, stopped = str(hydra.runtime.choices["hydra/launcher"]), Path(hydra.sweep.dir) / STOPPED
+    if stopped.exists():
+        return INTERRUPTED
     path = Path(hydra.runtime.output_dir)
     (path / FAILURE).unlink(missing_ok=True)
     try:
@@ -162,8 +195,11 @@ def _sweep_job(composed) -> int:
         return 2
     (path / FAILURE).unlink(missing_ok=True)  # of another job that found this one at work
     if status == INTERRUPTED:
-        if str(hydra.runtime.choices["hydra/launcher"]).startswith("submitit_"):  # a scheduler ended this job alone
+        if launcher.startswith("submitit_"):  # a scheduler ended this job alone
             raise ForcegraspError(f"{path}: stopped and saved; the same sweep typed again goes on")
+        if launcher == "joblib":  # which would kill the others before they have saved
+            stopped.touch()
+            return INTERRUPTED
         raise KeyboardInterrupt  # ends the sweep, not just this run
     return status
 

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import os
 import select
 import signal
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
 
 @contextmanager
-def stop_signals() -> Iterator[list[int]]:
-    """Yields a list that is not empty once the user, a lost terminal or a scheduler asked to stop."""
+def stop_signals(also: Callable[[], None] = lambda: None) -> Iterator[list[int]]:
+    """Yields a list that is not empty once the user, a lost terminal or a scheduler asked to stop.
+
+    Args:
+      also: done at each signal.
+    """
     asked: list[int] = []
 
     def ask(number: int, _frame: Any) -> None:
@@ -21,9 +26,10 @@ def stop_signals() -> Iterator[list[int]]:
         asked.append(number)
         if number == signal.SIGHUP:
             _silence_lost_outputs()
+        also()
 
     # nohup ignores hang-ups, and a scheduler's own job runner may use SIGUSR1: then they are not for us
-    free = [n for n in (signal.SIGHUP, signal.SIGUSR1) if signal.getsignal(n) == signal.SIG_DFL]
+    free = [n for n in (signal.SIGHUP, signal.SIGUSR1) if _is_free(signal.getsignal(n))]
     try:
         before = {number: signal.signal(number, ask) for number in (signal.SIGINT, signal.SIGTERM, *free)}
     except ValueError:  # not the main thread, as in some sweep launchers: they have their own way to stop a job
@@ -33,6 +39,17 @@ def stop_signals() -> Iterator[list[int]]:
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+def _is_free(handler: Any) -> bool:
+    """Whether nobody waits for the signal but this module, for a sweep around a training."""
+    return handler == signal.SIG_DFL or getattr(handler, "__module__", "") == __name__
+
+
+def tell_workers() -> None:
+    """Asks the processes that this one started to save and end; those that a terminal told, too, are told twice."""
+    for worker in multiprocessing.active_children():
+        worker.terminate()
 
 
 def _silence_lost_outputs() -> None:
