@@ -30,7 +30,7 @@ def trials(count: int, seed: int) -> Iterator[Trial]:
         assert status(_type(whole, 0, resume=False)) == 0
         seconds = time.monotonic() - started
         for number in range(count):
-            run, delay = RunDir(Path(folder) / f"{number}"), float(rng.uniform(0.5, 2) * seconds)
+            run, delay = RunDir(Path(folder) / f"{number}"), float(rng.uniform(0.4, 1.4) * seconds)
             begun = [_type(run, writer, resume=False) for writer in (1, 2)]
             statuses = {writer: kill_after(begun[writer - 1], delay * (2 - writer)) for writer in (1, 2)}
             problem = _wrong(run, statuses)
