@@ -260,7 +260,11 @@ def test_signals_that_others_wait_for_are_left_to_them(whole, run, equal, monkey
 
 
 def test_a_second_training_of_a_run_at_work_is_refused(whole, run, equal):
+    tried = []
+
     def second():
+        tried.append(1)
+        assert len(tried) == 1, "it was let in"
         with pytest.raises(CheckpointError, match=f"process {os.getpid()} on .* is training here"):
             train(run.config(), run, resume=True)
         with pytest.raises(CheckpointError, match="is training here"):
