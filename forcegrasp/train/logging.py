@@ -47,6 +47,9 @@ class TrainingLog:
     def _open(self) -> None:
         run, config, frames = self.run, self.config, self.frames
         run.drop_metrics_after(frames)
+        if not frames:
+            for old in run.tensorboard.glob("events.*"):  # of an attempt that came to no checkpoint
+                old.unlink()
         self.writer = SummaryWriter(str(run.tensorboard), purge_step=frames + 1 if frames else None)
         if not frames:
             self.writer.add_text("1_about_this_run", card(run, config))

@@ -236,6 +236,26 @@ def test_creating_over_a_run_is_refused(run):
     assert run.config_path.read_text() == before
 
 
+def test_a_run_without_a_checkpoint_can_be_begun_again(run):
+    run.model_path.write_text("of a file that may have changed since")
+    command = json.loads((run.path / "run.json").read_text())["command"]
+    assert RunDir.create(run.path, TrainConfig(seed=7), ["seed=7", "log.keep=3"]).config() == TrainConfig(seed=7)
+    assert not run.model_path.exists()
+    assert json.loads((run.path / "run.json").read_text())["command"] == [*command, "log.keep=3"]
+    save(run, 1)
+    with pytest.raises(CheckpointError, match=f"already holds a run; continue it with resume={run.path}"):
+        RunDir.create(run.path, TrainConfig(seed=7), [])
+
+
+def test_a_run_with_nothing_but_its_best_goes_on_from_that(run):
+    run.save(5, {"x": torch.tensor([5])}, {"batches": 5}, keep=1, score=1.0)
+    damage(max(run.checkpoints.glob("frames_*")))
+    assert loaded_frames(run) == 5
+    max(run.checkpoints.glob("frames_*")).unlink()
+    assert run.has_checkpoint
+    assert loaded_frames(run) == 5
+
+
 def test_creating_under_a_file_is_refused(tmp_path):
     (tmp_path / "file").touch()
     with pytest.raises(CheckpointError, match="could not make the run directory"):
