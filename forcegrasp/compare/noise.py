@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import ndtri
+from scipy.special import ndtr, ndtri
 
 from forcegrasp.compare.floor import excess, numerical_floor
 from forcegrasp.compare.heldout import rms
@@ -17,6 +17,10 @@ _LAGS = 5
 # Of the mean square beyond the noise that was said, so much may follow from the sample before and still be called
 # noise: no effect that explains less is looked for. And so much may the phases differ by.
 _IN_TIME, _BETWEEN_PHASES = 0.25, 0.5
+# A phase is as was said if its readings are this many times likelier then (logarithm) than drawn from all phases.
+_LIKELIER, _LEAST_SAMPLES = np.log(20.0), 40
+# Quantiles of the sizes of the residuals between which they are counted; an unlikely class is not taken for impossible.
+_CLASSES, _LEAST_SHARE = np.array([0.0, 0.25, 0.5, 0.75, 0.9, 0.97, 1.0]), 1e-3
 # Readings that scatter less than this share of the noise that was said.
 _LESS = 0.8
 # rms ÷ core above which tails are heavy: 1 if the noise is normal, 1.5 with three degrees of freedom.
@@ -63,9 +67,9 @@ def unlike_said(residual: np.ndarray, numerical: Sequence[np.ndarray], target: T
         return Noise(times, core, less) if less.any() else None
     clean, unlike = residual.copy(), np.zeros(len(SIGNALS), bool)
     for k, signal in enumerate(one):
-        said = min(numerical_floor(numerical, target, signal), core[k])
-        scores = _normal_scores(residual[..., k], _there(residual[..., k], target))
-        if _is_white(scores, 1 - (said / times[k]) ** 2, target):
+        values, floor = residual[..., k], numerical_floor(numerical, target, signal)
+        scores, beyond = _normal_scores(values, _there(values, target)), 1 - (min(floor, core[k]) / times[k]) ** 2
+        if _is_white(scores, beyond, target) and not _some_phase_as_said(values / floor, target):
             clean[..., k], unlike[k] = scores, True
     return None if excess(clean, numerical, target) else Noise(times, core, unlike)
 
@@ -105,6 +109,16 @@ def _is_white(scores: np.ndarray, beyond: float, target: Target) -> bool:
     inside = [values for values in inside if len(values)]
     differing = sum(len(values) * (np.mean(values**2) - 1) ** 2 for values in inside) / count
     return _at_most(differing, 2 * len(inside) / count, len(inside)) <= _BETWEEN_PHASES * beyond
+
+
+def _some_phase_as_said(values: np.ndarray, target: Target) -> bool:
+    """Whether in some phase a signal's residuals ÷ floor, ``(G, S)``, are just as was said, while others are not."""
+    sizes = [np.abs(values[(target.phase == k) & np.isfinite(values)]) for k in range(len(PHASES))]
+    edges = np.quantile(np.concatenate(sizes), _CLASSES[1:-1])
+    said = np.maximum(np.diff(np.r_[0.0, 2 * ndtr(edges) - 1, 1.0]), _LEAST_SHARE)
+    evidence = np.log(np.diff(_CLASSES) / said)
+    counts = [np.bincount(np.searchsorted(edges, one), minlength=len(said)) for one in sizes]
+    return any(count @ evidence < -_LIKELIER for count in counts if count.sum() >= _LEAST_SAMPLES)
 
 
 def _at_most(square: float, of_noise: float, terms: int) -> float:
