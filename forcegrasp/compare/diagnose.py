@@ -159,10 +159,10 @@ def diagnose(
             break
         fit = step.candidates[0].fit
         progress(f"found {step.effects[0]}: held-out error {step.error_before:.2f} → {step.error_after:.2f} × noise")
-        if not _left(heldout_residual(fit, target, folds), numerical, target)[0]:
+        if not _left(fit, heldout_residual(fit, target, folds), numerical, target)[0]:
             break
     held = heldout_residual(fit, target, folds)
-    error_after, (left, noise) = rms(held, target), _left(held, numerical, target)
+    error_after, (left, noise) = rms(held, target), _left(fit, held, numerical, target)
     found = [s for s in steps if s.verdict != "none"]
     verdict = conclude([s.verdict for s in found], error_before, error_after, floor, bool(left))
     names = [s.effects[0] for s in found] if verdict in ("effect", "one_of") else []
@@ -175,9 +175,9 @@ def diagnose(
     )  # fmt: skip
 
 
-def _left(held: np.ndarray, numerical: Sequence[np.ndarray], target: Target) -> tuple[str, Noise | None]:
-    """Where residuals are more than noise, in words; and the noise, if it is not what was said."""
-    noise = unlike_said(held, numerical, target)
+def _left(fit: Fit, held: np.ndarray, numerical: Sequence[np.ndarray], target: Target) -> tuple[str, Noise | None]:
+    """Where held-out residuals are more than noise, in words; and the noise, if it is not what was said."""
+    noise = unlike_said(held, numerical, target, fit.predicted)
     return ("" if noise else excess(held, numerical, target)), noise
 
 

@@ -1,4 +1,4 @@
-"""Whether what a model leaves is noise of another size or shape than was said: white, and alike in all phases."""
+"""Whether what a model leaves is noise of another size or shape than was said: white, and alike everywhere."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from scipy.special import ndtr, ndtri
 
 from forcegrasp.compare.floor import excess, numerical_floor
 from forcegrasp.compare.heldout import rms
-from forcegrasp.compare.target import PHASES, SIGNALS, Target
+from forcegrasp.compare.target import SIGNALS, Target
 
 # Lags over which a missing effect would show, in samples.
 _LAGS = 5
 # Of the mean square beyond the noise that was said, so much may follow from the sample before and still be called
-# noise: no effect that explains less is looked for. And so much may the phases differ by.
-_IN_TIME, _BETWEEN_PHASES = 0.25, 0.5
-# A phase is as was said if its readings are this many times likelier then (logarithm) than drawn from all phases.
+# noise: no effect that explains less is looked for. And so much may phases, speeds and forces differ by.
+_IN_TIME, _BETWEEN_GROUPS = 0.25, 0.5
+# A group is as was said if its readings are this many times likelier then (logarithm) than drawn from all groups.
 _LIKELIER, _LEAST_SAMPLES = np.log(20.0), 40
 # Quantiles of the sizes of the residuals between which they are counted; an unlikely class is not taken for impossible.
 _CLASSES, _LEAST_SHARE = np.array([0.0, 0.25, 0.5, 0.75, 0.9, 0.97, 1.0]), 1e-3
@@ -48,7 +48,9 @@ class Noise:
         return bool(np.any(self.unlike & (self.times > 1)) or self.heavy_tails.any())
 
 
-def unlike_said(residual: np.ndarray, numerical: Sequence[np.ndarray], target: Target) -> Noise | None:
+def unlike_said(
+    residual: np.ndarray, numerical: Sequence[np.ndarray], target: Target, predicted: np.ndarray
+) -> Noise | None:
     """The noise, if it is not what was said, and all that residuals show; None if it is, or if they show more than it.
 
     A signal's residuals are judged by their normal scores: each is replaced by the quantile that its size has among
@@ -58,6 +60,7 @@ def unlike_said(residual: np.ndarray, numerical: Sequence[np.ndarray], target: T
       residual: of held-out grasps, in units of the noise, ``(G, S, 4)``.
       numerical: as for :func:`~forcegrasp.compare.floor.numerical_floor`.
       target: the measurements.
+      predicted: signals, ``(G, S, 4)``; by them, for they have no noise, slow and fast samples are told apart.
     """
     one = np.eye(len(SIGNALS), dtype=bool)
     times = np.array([rms(residual, target, signal) for signal in one])
@@ -69,7 +72,8 @@ def unlike_said(residual: np.ndarray, numerical: Sequence[np.ndarray], target: T
     for k, signal in enumerate(one):
         values, floor = residual[..., k], numerical_floor(numerical, target, signal)
         scores, beyond = _normal_scores(values, _there(values, target)), 1 - (min(floor, core[k]) / times[k]) ** 2
-        if _is_white(scores, beyond, target) and not _some_phase_as_said(values / floor, target):
+        groups = _partitions(target, predicted[..., k % 2 :: 2])
+        if _is_white(scores, beyond, groups) and not _some_group_as_said(values / floor, groups):
             clean[..., k], unlike[k] = scores, True
     return None if excess(clean, numerical, target) else Noise(times, core, unlike)
 
@@ -91,33 +95,55 @@ def _normal_scores(values: np.ndarray, there: np.ndarray) -> np.ndarray:
     return scores
 
 
-def _is_white(scores: np.ndarray, beyond: float, target: Target) -> bool:
-    """Whether a signal's normal scores are white in time and alike in all phases, as far as its excess is concerned.
+def _partitions(target: Target, predicted: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Phases, slow and fast, lightly and strongly pressed: where most errors of a model would differ, each ``(G, S)``.
+
+    Args:
+      target: the measurements.
+      predicted: position and force of one finger, ``(G, S, 2)``.
+    """
+    position, force = predicted[..., 0], predicted[..., 1]
+    motion = np.abs(np.diff(position, axis=1, prepend=position[:, :1]))
+    halves = (np.where(x > np.median(x[target.mask]), 1, 0) for x in (motion, force))
+    return target.phase, *(np.where(target.mask, half, -1) for half in halves)
+
+
+def _grouped(values: np.ndarray, partition: np.ndarray) -> list[np.ndarray]:
+    """The numbers among values ``(G, S)`` of each group of a partition, where it has any."""
+    groups = [values[(partition == k) & np.isfinite(values)] for k in range(partition.max() + 1)]
+    return [group for group in groups if len(group)]
+
+
+def _is_white(scores: np.ndarray, beyond: float, partitions: Sequence[np.ndarray]) -> bool:
+    """Whether a signal's normal scores are white in time and alike in all groups, as far as its excess is concerned.
 
     In doubt they are not: what may be there, and too few samples can't tell, counts as if it were.
 
     Args:
       scores: ``(G, S)``; NaN where there are none.
       beyond: share of the mean square that is beyond the noise that was said.
-      target: the measurements.
+      partitions: from :func:`_partitions`.
     """
     count = int(np.isfinite(scores).sum())
     lags = [np.nansum(scores[:, k:] * scores[:, :-k]) / count for k in range(1, _LAGS + 1)]
     if _at_most(np.mean(np.square(lags)), 1 / count, _LAGS) > _IN_TIME * beyond:
         return False
-    inside = [scores[(target.phase == k) & np.isfinite(scores)] for k in range(len(PHASES))]
-    inside = [values for values in inside if len(values)]
-    differing = sum(len(values) * (np.mean(values**2) - 1) ** 2 for values in inside) / count
-    return _at_most(differing, 2 * len(inside) / count, len(inside)) <= _BETWEEN_PHASES * beyond
+    for partition in partitions:
+        groups = _grouped(scores, partition)
+        differing = sum(len(values) * (np.mean(values**2) - 1) ** 2 for values in groups) / count
+        if _at_most(differing, 2 * len(groups) / count, len(groups)) > _BETWEEN_GROUPS * beyond:
+            return False
+    return True
 
 
-def _some_phase_as_said(values: np.ndarray, target: Target) -> bool:
-    """Whether in some phase a signal's residuals ÷ floor, ``(G, S)``, are just as was said, while others are not."""
-    sizes = [np.abs(values[(target.phase == k) & np.isfinite(values)]) for k in range(len(PHASES))]
-    edges = np.quantile(np.concatenate(sizes), _CLASSES[1:-1])
+def _some_group_as_said(values: np.ndarray, partitions: Sequence[np.ndarray]) -> bool:
+    """Whether in some group a signal's residuals ÷ floor, ``(G, S)``, are just as was said, while others are not."""
+    sizes = np.abs(values)
+    edges = np.quantile(sizes[(partitions[0] >= 0) & np.isfinite(sizes)], _CLASSES[1:-1])
     said = np.maximum(np.diff(np.r_[0.0, 2 * ndtr(edges) - 1, 1.0]), _LEAST_SHARE)
     evidence = np.log(np.diff(_CLASSES) / said)
-    counts = [np.bincount(np.searchsorted(edges, one), minlength=len(said)) for one in sizes]
+    groups = [group for partition in partitions for group in _grouped(sizes, partition)]
+    counts = [np.bincount(np.searchsorted(edges, group), minlength=len(said)) for group in groups]
     return any(count @ evidence < -_LIKELIER for count in counts if count.sum() >= _LEAST_SAMPLES)
 
 

@@ -17,6 +17,8 @@ G, S = 8, 150
 ONES = np.ones(4)
 NOTHING = (np.zeros((G, S, 4)),) * 2
 PHASE = np.arange(S) * len(PHASES) // S
+#: Each finger rests, moves, presses, moves and rests; another course than that of the phases.
+GRASPS = np.tile(np.interp(np.arange(S), [0, 40, 80, 110, 150], [0.0, 0.0, 1.0, 1.0, 0.0])[:, None], (G, 1, 4))
 
 
 def make(count: int = G) -> Target:
@@ -40,13 +42,13 @@ def student(seed: int) -> np.ndarray:
 
 @pytest.mark.parametrize("seed", range(5))
 def test_noise_as_said_is_no_finding(seed):
-    assert unlike_said(normal(seed), NOTHING, make()) is None
+    assert unlike_said(normal(seed), NOTHING, make(), GRASPS) is None
 
 
 @pytest.mark.parametrize("seed", range(5))
 @pytest.mark.parametrize("times", [1.3, 3.0])
 def test_noise_of_another_size(times, seed):
-    noise = unlike_said(times * normal(seed), NOTHING, make())
+    noise = unlike_said(times * normal(seed), NOTHING, make(), GRASPS)
     assert noise is not None
     assert noise.unlike.all()
     assert noise.times == pytest.approx(times, rel=0.05)
@@ -58,7 +60,7 @@ def test_noise_of_another_size(times, seed):
 @pytest.mark.parametrize("seed", range(5))
 @pytest.mark.parametrize("scale", [1.0, 1 / np.sqrt(3)])
 def test_heavy_tails(scale, seed):
-    noise = unlike_said(scale * student(seed), NOTHING, make())
+    noise = unlike_said(scale * student(seed), NOTHING, make(), GRASPS)
     assert noise is not None
     assert noise.heavy_tails.all()
     assert noise.stronger
@@ -67,14 +69,14 @@ def test_heavy_tails(scale, seed):
 
 def test_noise_of_one_signal():
     residual = normal(0) * [1, 1, 1, 3]
-    noise = unlike_said(residual, NOTHING, make())
+    noise = unlike_said(residual, NOTHING, make(), GRASPS)
     assert noise is not None
     assert noise.unlike.tolist() == [False, False, False, True]
     assert noise.times[3] == pytest.approx(3, rel=0.05)
 
 
 def test_noise_that_is_smaller():
-    noise = unlike_said(normal(0) * [1, 1, 0.3, 0.3], NOTHING, make())
+    noise = unlike_said(normal(0) * [1, 1, 0.3, 0.3], NOTHING, make(), GRASPS)
     assert noise is not None
     assert (noise.unlike.tolist(), noise.stronger) == ([False, False, True, True], False)
 
@@ -82,7 +84,7 @@ def test_noise_that_is_smaller():
 def test_grasps_that_were_not_held_out_are_left_out():
     residual = 3 * normal(0)
     residual[5:] = np.nan
-    noise = unlike_said(residual, NOTHING, make())
+    noise = unlike_said(residual, NOTHING, make(), GRASPS)
     assert noise is not None
     assert noise.times == pytest.approx(3, rel=0.07)
 
@@ -118,6 +120,17 @@ def wild_while_moving(residual):
     return residual
 
 
+def louder_with_the_force(residual):
+    return residual * np.sqrt(1 + 8 * GRASPS)
+
+
+def wild_in_fast_motion(residual):
+    """As when a reading is now and then the one of the sample before."""
+    moving = np.abs(np.gradient(GRASPS, axis=1)) > 0.01
+    wild = np.random.default_rng(9).random((G, S, 4)) < 0.1
+    return np.where(wild & moving, 20 * residual, residual)
+
+
 def wave(residual):
     return residual + 2 * np.sin(2 * np.pi * np.arange(S) / 4)[:, None]
 
@@ -129,19 +142,29 @@ def one_signal_slow(residual):
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize(
     "spoil",
-    [slow, level, louder_in_one_phase, louder_when_pressed, wild_while_moving, wave, one_signal_slow],
+    [
+        slow,
+        level,
+        louder_in_one_phase,
+        louder_when_pressed,
+        wild_while_moving,
+        wild_in_fast_motion,
+        louder_with_the_force,
+        wave,
+        one_signal_slow,
+    ],
 )
 def test_an_effect_is_not_taken_for_noise(spoil, seed):
     residual = spoil(normal(seed))
     assert excess(residual, NOTHING, make())
-    assert unlike_said(residual, NOTHING, make()) is None
+    assert unlike_said(residual, NOTHING, make(), GRASPS) is None
 
 
 def test_in_doubt_it_is_not_noise():
     """One grasp of 150 samples does not show where so small an excess is from."""
     target, nothing = make(1), tuple(n[:1] for n in NOTHING)
     assert excess(1.2 * normal(0)[:1], nothing, target)
-    assert unlike_said(1.2 * normal(0)[:1], nothing, target) is None
+    assert unlike_said(1.2 * normal(0)[:1], nothing, target, GRASPS[:1]) is None
 
 
 # --- in words ------------------------------------------------------------------------------------------------------
