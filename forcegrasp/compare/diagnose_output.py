@@ -162,7 +162,7 @@ def lines(diagnosis: Diagnosis, advice: Advice | None) -> list[str]:
 def _final_texts(diagnosis: Diagnosis, effect: type[Effect]) -> list[str]:
     """Each parameter of an effect in the final model, with its interval."""
     return [
-        f"{name} {_value(effect, name, value, 4)} ({low:.4g} to {high:.4g}){'' if unit == '1' else f' {unit}'}"
+        f"{name} {_value(effect, name, value, 4)}{'' if unit == '1' else f' {unit}'} (95 %: {low:.4g} to {high:.4g})"
         for name, (value, low, high, unit) in found_parameters(diagnosis).get(effect.name, {}).items()
     ]
 

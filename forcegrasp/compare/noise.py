@@ -16,11 +16,11 @@ from forcegrasp.compare.target import SIGNALS, Target
 _LAGS = 5
 # Of the mean square beyond the noise that was said, so much may follow from the sample before and still be called
 # noise: no effect that explains less is looked for. And so much may phases, speeds and forces differ by.
-_IN_TIME, _BETWEEN_GROUPS = 0.25, 0.5
+_IN_TIME, _BETWEEN_GROUPS = 0.25, 0.35
 # A group is as was said if its readings are this many times likelier then (logarithm) than drawn from all groups.
-_LIKELIER, _LEAST_SAMPLES = np.log(20.0), 40
-# Quantiles of the sizes of the residuals between which they are counted; an unlikely class is not taken for impossible.
-_CLASSES, _LEAST_SHARE = np.array([0.0, 0.25, 0.5, 0.75, 0.9, 0.97, 1.0]), 1e-3
+_LIKELIER, _LEAST_SAMPLES = np.log(3.0), 40
+# Residuals are counted between these quantiles of their sizes, and beyond so many σ; the rarest class is of this share.
+_QUANTILES, _WILD, _LEAST_SHARE = (0.25, 0.5, 0.75, 0.9, 0.97), 4.0, 1e-3
 # Readings that scatter less than this share of the noise that was said.
 _LESS = 0.8
 # rms ÷ core above which tails are heavy: 1 if the noise is normal, 1.5 with three degrees of freedom.
@@ -139,11 +139,16 @@ def _is_white(scores: np.ndarray, beyond: float, partitions: Sequence[np.ndarray
 def _some_group_as_said(values: np.ndarray, partitions: Sequence[np.ndarray]) -> bool:
     """Whether in some group a signal's residuals ÷ floor, ``(G, S)``, are just as was said, while others are not."""
     sizes = np.abs(values)
-    edges = np.quantile(sizes[(partitions[0] >= 0) & np.isfinite(sizes)], _CLASSES[1:-1])
-    said = np.maximum(np.diff(np.r_[0.0, 2 * ndtr(edges) - 1, 1.0]), _LEAST_SHARE)
-    evidence = np.log(np.diff(_CLASSES) / said)
-    groups = [group for partition in partitions for group in _grouped(sizes, partition)]
-    counts = [np.bincount(np.searchsorted(edges, group), minlength=len(said)) for group in groups]
+    everything = sizes[(partitions[0] >= 0) & np.isfinite(sizes)]
+    edges = np.unique([*np.quantile(everything, _QUANTILES), _WILD])
+    said = np.diff(np.r_[0.0, 2 * ndtr(edges) - 1, 1.0])
+
+    def counted(values: np.ndarray) -> np.ndarray:
+        return np.bincount(np.searchsorted(edges, values), minlength=len(said))
+
+    of_all = counted(everything) / len(everything)
+    evidence = np.log(np.maximum(of_all, _LEAST_SHARE) / np.maximum(said, _LEAST_SHARE))
+    counts = [counted(group) for partition in partitions for group in _grouped(sizes, partition)]
     return any(count @ evidence < -_LIKELIER for count in counts if count.sum() >= _LEAST_SAMPLES)
 
 

@@ -374,7 +374,7 @@ def test_one_interval_everywhere(fitted):
         assert found["parameters"]["force_bias"][name] == dataclasses.asdict(fitted_value)
         assert found["ranking"][0]["parameters"][name] == fitted_value.value
         assert found["steps"][0]["ranking"][0]["parameters"][name] == fitted_value.value
-        assert f"{name} {fitted_value.value:.4g} ({fitted_value.low:.4g} to {fitted_value.high:.4g}) N" in lines
+        assert f"{name} {fitted_value.value:.4g} N (95 %: {fitted_value.low:.4g} to {fitted_value.high:.4g})" in lines
         assert f"{name} {fitted_value.value:.3g} N" in shown
 
 

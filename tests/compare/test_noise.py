@@ -17,8 +17,10 @@ G, S = 8, 150
 ONES = np.ones(4)
 NOTHING = (np.zeros((G, S, 4)),) * 2
 PHASE = np.arange(S) * len(PHASES) // S
-#: Each finger rests, moves, presses, moves and rests; another course than that of the phases.
-GRASPS = np.tile(np.interp(np.arange(S), [0, 40, 80, 110, 150], [0.0, 0.0, 1.0, 1.0, 0.0])[:, None], (G, 1, 4))
+#: In each phase the fingers move half of the time; forces rise and fall.
+MOVING = np.arange(S) // 15 % 2 == 0
+FORCE = np.interp(np.arange(S), [0, 40, 80, 110, 150], [0.0, 0.0, 1.0, 1.0, 0.0])
+GRASPS = np.tile(np.stack([np.cumsum(MOVING), np.cumsum(MOVING), FORCE, FORCE], axis=1), (G, 1, 1))
 
 
 def make(count: int = G) -> Target:
@@ -121,14 +123,18 @@ def wild_while_moving(residual):
 
 
 def louder_with_the_force(residual):
-    return residual * np.sqrt(1 + 8 * GRASPS)
+    return residual * np.sqrt(1 + 8 * FORCE)[:, None]
 
 
-def wild_in_fast_motion(residual):
-    """As when a reading is now and then the one of the sample before."""
-    moving = np.abs(np.gradient(GRASPS, axis=1)) > 0.01
-    wild = np.random.default_rng(9).random((G, S, 4)) < 0.1
-    return np.where(wild & moving, 20 * residual, residual)
+def twice_and_more_in_motion(residual):
+    """No phase and no speed is as was said."""
+    return 2 * residual * np.where(MOVING, 2, 1)[:, None]
+
+
+def wild_in_motion(residual):
+    """As when some readings are the one of the sample before: that shows only in motion."""
+    wild = np.random.default_rng(9).random((G, S, 4)) < 0.04
+    return np.where(wild & MOVING[:, None], 20 * residual, residual)
 
 
 def wave(residual):
@@ -148,7 +154,8 @@ def one_signal_slow(residual):
         louder_in_one_phase,
         louder_when_pressed,
         wild_while_moving,
-        wild_in_fast_motion,
+        wild_in_motion,
+        twice_and_more_in_motion,
         louder_with_the_force,
         wave,
         one_signal_slow,

@@ -176,7 +176,7 @@ def test_a_diagnosis_marks_parameters_at_their_bounds(made_up, tmp_path):
         assert any(f"{high:g} (at its bound) N" in cell for cell in cells)
     assert f"{bias:g} (at its bound)" in cells  # the table of the effect's parameters
     lines = diagnose_output.lines(diagnosis, None)
-    assert any(line.startswith(f"  left_n {bias:g} (at its bound) (") for line in lines)
+    assert any(line.startswith(f"  left_n {bias:g} (at its bound) N (95 %: ") for line in lines)
     warning = f"force_bias.left_n ended at its bound {bias:g} N: widen it or doubt the model"
     assert f"warning: {warning}" in lines
     assert warning in plain(diagnose_output.diagnosis_json(diagnosis, None, made_up.tried, "s"), tmp_path)["warnings"]
