@@ -40,7 +40,6 @@ def main(arguments: list[str]) -> int:
     )
     from forcegrasp.compare import diagnose_output, workflow
     from forcegrasp.compare.advice import advise
-    from forcegrasp.compare.floor import numerical_error
     from forcegrasp.effects import catalogue
     from forcegrasp.effects.model_file import read_model, write_model
 
@@ -63,8 +62,7 @@ def main(arguments: list[str]) -> int:
     if diagnosis.verdict in ("effect", "one_of"):
         known = config.model or "model.yaml"
         print(f"add it: forcegrasp add data={data} model={known} effect={diagnosis.effects[0]} out=better.yaml")
-        numerical = numerical_error(diagnosis.fit, diagnosis.target)
-        better = workflow.model_of(diagnosis.fit, diagnosis.target, loaded, numerical)
+        better = workflow.model_of(diagnosis.fit, diagnosis.target, loaded, diagnosis.numerical)
         write_model(better, out / "model.yaml")
         print(f"or take the model with {', '.join(e.effect.name for e in better.effects)}: {out / 'model.yaml'}")
     write_results(

@@ -32,6 +32,11 @@ def amount(value: float, unit: str) -> str:
     return f"{factor * value:.3g} {shown}" if abs(factor * value) < 1000 else f"{factor * value:.0f} {shown}"
 
 
+def value_text(value: float, digits: int, at_bound: bool) -> str:
+    """A fitted value, marked where it ended at its bound."""
+    return f"{value:.{digits}g}" + (" (at its bound)" if at_bound else "")
+
+
 def words(name: str) -> str:
     """A phase's or signal's name in words."""
     return figures.NAMES.get(name, name.replace("_", " "))
