@@ -24,7 +24,7 @@ from forcegrasp.measure import FinalForceTable, MeasurementSet
 from forcegrasp.short_repr import ShortRepr, counted, cut, some
 
 if TYPE_CHECKING:
-    from forcegrasp.compare.report import Section
+    from forcegrasp.reports.html import Section
 
 
 class Result(ShortRepr):

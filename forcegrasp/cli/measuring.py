@@ -16,12 +16,12 @@ if TYPE_CHECKING:
 
     from forcegrasp.compare.base_fit import BaseFit
     from forcegrasp.compare.final_force import TableAnalysis
-    from forcegrasp.compare.report import Section
     from forcegrasp.compare.target import Target
     from forcegrasp.compare.workflow import Added, Loaded
     from forcegrasp.effects import Effect
     from forcegrasp.effects.model_file import Model
     from forcegrasp.measure import FinalForceTable, MeasurementSet
+    from forcegrasp.reports.html import Section
 
 
 #: The base model that compare and diagnose fit where none is given, beside their report.
@@ -76,7 +76,7 @@ def write_files(
     """Writes the report and the JSON file beside it; returns the report's path."""
     import mujoco
 
-    from forcegrasp.compare.report import Section, Text, write_report
+    from forcegrasp.reports.html import Section, Text, write_report
 
     if loaded.warnings:
         sections = [*sections, Section("Odd in this set", [Text(warning) for warning in loaded.warnings])]

@@ -12,8 +12,8 @@ from rich.text import Text as Plain
 from forcegrasp.compare import figures
 from forcegrasp.compare.comparison import Cell, Comparison
 from forcegrasp.compare.heldout import rms
-from forcegrasp.compare.report import Picture, Section, Table, Text
 from forcegrasp.compare.target import PHASES, SIGNALS, UNITS, Target
+from forcegrasp.reports.html import Picture, Section, Table, Text
 
 # Error ÷ floor up to which a model is as good as the data can tell.
 _AT_FLOOR = 1.03

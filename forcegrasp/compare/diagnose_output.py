@@ -30,9 +30,9 @@ from forcegrasp.compare.findings import (
 from forcegrasp.compare.fit import Fit
 from forcegrasp.compare.fit_output import ADVICE, steps_picture, symptom_picture
 from forcegrasp.compare.intervals import listed, reached_bound
-from forcegrasp.compare.report import Picture, Section, Table, Text
 from forcegrasp.compare.target import PHASES
 from forcegrasp.effects import Effect, get_effect
+from forcegrasp.reports.html import Picture, Section, Table, Text
 
 _PRINTED = 5
 

@@ -13,10 +13,10 @@ from scipy.stats import chi2, f, t
 from forcegrasp.compare import final_force_output
 from forcegrasp.compare.final_force_causes import CAUSES, causes_of
 from forcegrasp.compare.final_force_shapes import BASE, FURTHER, Shape, ShapeFit, bootstrap, captured, fit_shape
-from forcegrasp.compare.report import Section
 from forcegrasp.measure.schema import FinalForceTable
 from forcegrasp.physics.gripper import Gripper
 from forcegrasp.physics.parameters import kappa_of_force_scale
+from forcegrasp.reports.html import Section
 from forcegrasp.short_repr import ShortRepr, some
 
 #: Rows that an object must have to be fitted.

@@ -18,12 +18,12 @@ from forcegrasp.compare.compare_output import amount, noise_sentence, value_text
 from forcegrasp.compare.fit import Fit
 from forcegrasp.compare.heldout import heldout_residual, make_folds, rms
 from forcegrasp.compare.intervals import reached_bound
-from forcegrasp.compare.report import Picture, Section, Table, Text
 from forcegrasp.compare.target import SIGNALS, UNITS, Target
 from forcegrasp.compare.workflow import Added
 from forcegrasp.effects import Effect
 from forcegrasp.effects.model_file import Fitted, Model
 from forcegrasp.effects.quantisation import Quantisation
+from forcegrasp.reports.html import Picture, Section, Table, Text
 
 #: What to do about a fit that did not converge.
 ADVICE = (

@@ -17,9 +17,9 @@ from forcegrasp.compare import compare_output, diagnose_output, figures, fit_out
 from forcegrasp.compare.base_fit import BaseFit
 from forcegrasp.compare.diagnose import Step
 from forcegrasp.compare.fit import Fit
-from forcegrasp.compare.report import Picture, Table
 from forcegrasp.compare.workflow import model_of
 from forcegrasp.effects import get_effect
+from forcegrasp.reports.html import Picture, Table
 
 VERDICTS = ("effect", "one_of", "explained", "unknown", "not_fitted")
 

@@ -64,7 +64,7 @@ def write_report(path: str | Path, title: str, lead: str, sections: Sequence[Sec
     """
     path = Path(path)
     environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("forcegrasp.compare", "."), autoescape=True, undefined=jinja2.StrictUndefined
+        loader=jinja2.PackageLoader("forcegrasp.reports", "."), autoescape=True, undefined=jinja2.StrictUndefined
     )
     environment.globals.update(svg=_svg, kind=lambda block: type(block).__name__)
     html = environment.get_template("report.html").render(
