@@ -15,6 +15,7 @@ from tensordict import TensorDictBase
 from forcegrasp.config import EvaluateConfig, RewardConfig
 from forcegrasp.effects.variation import read_tiago_model
 from forcegrasp.env.episodes import FIGURES, summarise
+from forcegrasp.evaluate.colours import policy_colours
 from forcegrasp.evaluate.contestants import load_contestants
 from forcegrasp.evaluate.grids import Grid, kappa_grid, object_grid, read_objects
 from forcegrasp.evaluate.plots import cell_boxes, force_traces
@@ -42,7 +43,7 @@ def evaluate(config: EvaluateConfig, out: str | Path, console: Console | None = 
     model = read_tiago_model(config.model) if config.model else None
     contestants = load_contestants(config.policies)
     baseline = config.baseline if config.baseline in {c.name for c in contestants} else ""
-    grid = _grid(config)
+    grid, colours = _grid(config), policy_colours(c.name for c in contestants)
     out.mkdir(parents=True, exist_ok=True)
     figures: dict[str, dict[str, np.ndarray]] = {}
     for contestant in track(contestants, description="evaluating", console=console, transient=True):
@@ -60,7 +61,8 @@ def evaluate(config: EvaluateConfig, out: str | Path, console: Console | None = 
         )
         summary = summarise(episodes, config.sensors)
         figures[contestant.name] = {k: v.double().numpy().reshape(len(grid.cells), -1) for k, v in summary.items()}
-        force_traces(_spread(episodes), contestant.name).savefig(out / f"traces_{contestant.name}.png", dpi=110)
+        traces = force_traces(_spread(episodes), contestant.name, colours[contestant.name])
+        traces.savefig(out / f"traces_{contestant.name}.png", dpi=110)
     report = {
         "seed": config.seed,
         "trials": grid.trials,

@@ -26,13 +26,16 @@ if TYPE_CHECKING:
 _AHEAD = 0.15
 
 
-def grasp_video(episodes: dict[str, TensorDictBase], sensors: SensorConfig, every: int = 2) -> bytes:
+def grasp_video(
+    episodes: dict[str, TensorDictBase], sensors: SensorConfig, every: int = 2, colours: dict[str, str] | None = None
+) -> bytes:
     """Shows recorded episodes, one below the other, as an animated GIF.
 
     Args:
       episodes: title → one episode ``(T,)`` of an env's rollout; all of the same length.
       sensors: σ_f of the band around the goal, and f_θ that tells when a finger touched.
       every: control steps per picture.
+      colours: title → colour; the titles are names of policies, and have theirs, if not given.
 
     Raises:
       NoRendererError: where there is no OpenGL.
@@ -46,7 +49,7 @@ def grasp_video(episodes: dict[str, TensorDictBase], sensors: SensorConfig, ever
     shown = sorted({*range(0, steps + 1, every), steps})
     rows = []
     with SceneRenderer(SCENE_WIDTH, SCENE_HEIGHT) as renderer:
-        for episode, figure in zip(episodes.values(), draw_grasps(episodes, sensors), strict=True):
+        for episode, figure in zip(episodes.values(), draw_grasps(episodes, sensors, colours), strict=True):
             parameters = episode.get("grasp_parameters")[0].double().numpy()
             fingers = from_the_start(episode, "joint_position")
             objects = from_the_start(episode, "object_position")[:, 0]

@@ -72,7 +72,7 @@ def test_scene_is_where_the_grasp_was(episode):
 
 
 def test_phases_are_marked_when_they_happened(episode):
-    figure = draw_grasp(episode, "close", SensorConfig())
+    figure = draw_grasp(episode, "close", SensorConfig(), "#0072b2")
     forces, moved = figure.axes
     seconds = summarise(episode[None], SensorConfig())
     assert float(seconds["both_contact_s"]) < 31 * 0.04
@@ -94,7 +94,7 @@ def test_pictures_of_several_policies_have_the_same_scales(episode):
     with torch.no_grad():
         other = env.rollout(31, make_controller("nothing"))[0]
     one, two = draw_grasps({"close": episode, "nothing": other}, SensorConfig())
-    alone = draw_grasp(episode, "close", SensorConfig())
+    alone = draw_grasp(episode, "close", SensorConfig(), "#0072b2")
     for axes, same, own in zip(one.axes, two.axes, alone.axes, strict=True):
         assert axes.get_ylim() == same.get_ylim()
         assert axes.get_ylim()[1] >= own.get_ylim()[1]

@@ -46,7 +46,7 @@ def gif() -> bytes:
 @pytest.fixture(scope="module")
 def run(config, gif, tmp_path_factory, trained):
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("forcegrasp.train.logging.grasp_video", lambda *args: gif)
+        patch.setattr("forcegrasp.train.logging.grasp_video", lambda *args, **kwargs: gif)
         return trained(tmp_path_factory.mktemp("log") / "run", config)
 
 
