@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import sys
 from collections.abc import Callable
 from importlib.util import find_spec
@@ -22,6 +23,8 @@ FAILURE = "failed.txt"
 STOPPED = "stopped"
 #: Exit status after Ctrl-C, as shells have it.
 INTERRUPTED = 130
+#: Letters of a model's name in the name of a run.
+_LONGEST = 40
 PURPOSE = "learn a grasp-force policy with PPO"
 NOTES = """
   -m / --multirun    run every combination of comma-separated values:
@@ -29,7 +32,7 @@ NOTES = """
                      forcegrasp train -m sweep=ablation                   the combinations of a preset
                      the same sweep with hydra.sweep.dir=FOLDER goes on with what is in that folder
   resume=RUN_DIR     go on with an interrupted run, exactly as if it had not been interrupted
-  hydra.run.dir=DIR  where to write the run; runs/TIME_EXPERIMENT_SEED by default
+  hydra.run.dir=DIR  where to write the run; runs/TIME_EXPERIMENT_MODEL_SEED by default
 
 Watch a training with: tensorboard --logdir runs. Ctrl-C saves and ends; so do SIGTERM, SIGHUP and SIGUSR1.
 """
@@ -55,12 +58,24 @@ def main(arguments: list[str]) -> int:
 
 
 def _run(overrides: list[str]) -> int:
-    config, run_dir = compose_run("train", overrides)
+    config, run_dir = compose_run("train", _with_name(overrides))
     if preset := next((o for o in overrides if o.startswith("sweep=") and o != "sweep=none"), ""):
         raise ConfigError(f"{preset} is several runs: add -m to run one after another")
     _check(config)
     _join(config)
     return _begin(config, Path(run_dir), overrides)
+
+
+def _with_name(overrides: list[str]) -> list[str]:
+    """The overrides, after one that puts the model, if there is one and the same for all runs, into the run's name."""
+    parsed = [parse_override(text) for text in overrides]
+    models = [one for one in parsed if one.key_or_group == "model"]
+    if not models or models[-1].is_sweep_override() or not str(models[-1].value()):
+        return overrides
+    path = Path(str(models[-1].value()))
+    stem = path.parent.name if path.stem == "model" and path.parent.name else path.stem  # runs/diagnose_TIME/model.yaml
+    name = re.sub(r"[^\w.-]", "_", stem)[:_LONGEST]
+    return [f"hydra.job.name='${{hydra:runtime.choices.experiment}}_{name}'", *overrides]
 
 
 def _check(config) -> None:
@@ -107,7 +122,7 @@ def _sweep(overrides: list[str]) -> int:
         return _sweep_job(composed)
 
     quoted = folder.replace("\\", "\\\\").replace("'", "\\'")
-    sys.argv = ["forcegrasp train", "-m", *overrides, f"hydra.sweep.dir='{quoted}'"]
+    sys.argv = ["forcegrasp train", "-m", *_with_name(overrides), f"hydra.sweep.dir='{quoted}'"]
     from forcegrasp.runs.lock import only_writer
 
     with only_writer(Path(folder) / "sweep.lock"):
@@ -261,6 +276,7 @@ def _begin(config: TrainConfig, path: Path, overrides: list[str]) -> int:
 
 def _train(config: TrainConfig, run: RunDir, resume: bool) -> int:
     try:
+        from forcegrasp.train.board import evaluate_command
         from forcegrasp.train.loop import train
 
         done = train(config, run, resume)
@@ -268,7 +284,7 @@ def _train(config: TrainConfig, run: RunDir, resume: bool) -> int:
         print(f"interrupted; go on with: forcegrasp train resume={run.path}")
         return INTERRUPTED
     if done:
-        print(f"trained. Compare it with the hand-written one: forcegrasp evaluate 'policies=[{run.path},force_pi]'")
+        print(f"trained. Compare it with the hand-written one: {evaluate_command(run, config)}")
         return 0
     print(f"stopped and saved; go on with: forcegrasp train resume={run.path}")
     return INTERRUPTED

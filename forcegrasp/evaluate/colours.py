@@ -38,4 +38,5 @@ def policy_colours(names: Iterable[str]) -> dict[str, str]:
 
 def finger_colours(colour: str) -> tuple[str, str]:
     """Colours of the left and the right finger of a policy: its own, and a darker shade of it."""
-    return colour, to_hex([part / 2 for part in to_rgb(colour)])
+    red, green, blue = to_rgb(colour)
+    return colour, to_hex((red / 2, green / 2, blue / 2))
