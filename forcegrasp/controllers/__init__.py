@@ -7,13 +7,13 @@ from collections.abc import Callable
 from tensordict.nn import TensorDictModuleBase
 
 from forcegrasp.controllers.force_pi import ForcePI
-from forcegrasp.controllers.reference import Constant, Informed
+from forcegrasp.controllers.reference import Constant, InformedFeedForward
 from forcegrasp.errors import ConfigError, closest
 
 #: Name → constructor, as named in ``policies=[...]``.
 CONTROLLERS: dict[str, Callable[[], TensorDictModuleBase]] = {
     "force_pi": ForcePI,
-    "informed": Informed,
+    "informed": InformedFeedForward,
     "close": lambda: Constant(-1.0),
     "nothing": lambda: Constant(0.0),
 }
@@ -30,4 +30,4 @@ def make_controller(name: str) -> TensorDictModuleBase:
     return CONTROLLERS[name]()
 
 
-__all__ = ["CONTROLLERS", "Constant", "ForcePI", "Informed", "make_controller"]
+__all__ = ["CONTROLLERS", "Constant", "ForcePI", "InformedFeedForward", "make_controller"]

@@ -1,4 +1,4 @@
-"""Controllers that mark what is possible: doing nothing, only closing, and knowing the object."""
+"""Controllers to hold others against: doing nothing, only closing, and a feed-forward that knows the object."""
 
 from __future__ import annotations
 
@@ -25,11 +25,12 @@ class Constant(TensorDictModuleBase):
         return tensordict.set("action", torch.full_like(tensordict.get("had_contact"), self.value))
 
 
-class Informed(TensorDictModuleBase):
-    """Knows the object's force scale: waits on first touch, then commands the delta whose force is the goal.
+class InformedFeedForward(TensorDictModuleBase):
+    """Static feed-forward that is told the object's force scale: waits on first touch, then commands one position.
 
-    No controller that must find out the softness by touch can be expected to do better. f = 100 N/m · f_α · Δq in the
-    simulator, hence a = −f_goal / (0.30 N · f_α).
+    f = 100 N/m · f_α · Δq at rest in the simulator, hence a = −f_goal / (0.30 N · f_α) from the second touch on. It
+    looks at no force and makes nothing faster, so that it is no upper bound: the force rises as the servo lets it, and
+    a controller that pushes harder at first can be better.
     """
 
     def __init__(self) -> None:
