@@ -68,8 +68,7 @@ def _run(overrides: list[str]) -> int:
 
 def _with_name(overrides: list[str]) -> list[str]:
     """The overrides, after one that puts the model, if there is one and the same for all runs, into the run's name."""
-    parsed = [parse_override(text) for text in overrides]
-    models = [one for one in parsed if one.key_or_group == "model"]
+    models = [parse_override(text) for text in overrides if text.startswith("model=")]
     if not models or models[-1].is_sweep_override() or not str(models[-1].value()):
         return overrides
     path = Path(str(models[-1].value()))
