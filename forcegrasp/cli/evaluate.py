@@ -12,12 +12,10 @@ PURPOSE = "compare policies and controllers on the same simulated grasps"
 NOTES = """
   'policies=[A,B]' run directories of forcegrasp train; policies that come with the package:
                    {shipped};
-                   or controllers: force_pi (Lach et al. 2022), informed (a feed-forward that is told the object's
-                   force scale), close, nothing
+                   or controllers: force_pi (Lach et al. 2022), informed (a fixed rule), close, nothing
   plan=paper       the paper's simulation experiment; objects: its six objects in the training simulator;
                    virtual_robot: the same on a gripper with effects that the training simulator does not have
-  out=DIR          where to write report.html, figures, tables.md, trials.csv and evaluation.json;
-                   runs/evaluate_TIME by default
+  out=DIR          where to write report.html and what it was made from; runs/evaluate_TIME by default
 """
 
 

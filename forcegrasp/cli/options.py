@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import textwrap
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from importlib.resources import files
 from typing import Any
 
@@ -62,9 +62,12 @@ def compose(verb: str, overrides: list[str]) -> Any:
     return compose_run(verb, overrides)[0]
 
 
-def compose_run(verb: str, overrides: list[str]) -> tuple[Any, str]:
-    """Like :func:`compose`, and also returns where Hydra would put the run (``hydra.run.dir``)."""
-    config, hydra = _compose(verb, overrides)
+def compose_run(verb: str, overrides: list[str], own: Sequence[str] = ()) -> tuple[Any, str]:
+    """Like :func:`compose`, and also returns where Hydra would put the run (``hydra.run.dir``).
+
+    ``own`` are overrides of the program's, not the user's: they come first and are not checked.
+    """
+    config, hydra = _compose(verb, overrides, own)
     return config, _folder("hydra.run.dir", hydra["run"]["dir"])
 
 
@@ -82,7 +85,7 @@ def compose_sweep(overrides: list[str]) -> tuple[dict[str, str], str]:
     return swept, _folder("hydra.sweep.dir", hydra["sweep"]["dir"])
 
 
-def _compose(verb: str, overrides: list[str]) -> tuple[Any, dict[str, Any]]:
+def _compose(verb: str, overrides: list[str], own: Sequence[str] = ()) -> tuple[Any, dict[str, Any]]:
     """Returns the verb's configuration, checked, and Hydra's own: run, sweep and sweeper."""
     from hydra import compose as hydra_compose
     from hydra import initialize_config_module
@@ -101,7 +104,7 @@ def _compose(verb: str, overrides: list[str]) -> tuple[Any, dict[str, Any]]:
     GlobalHydra.instance().clear()
     try:
         with initialize_config_module("forcegrasp.conf", version_base="1.3"):
-            full = [_full_name(verb, override) for override in overrides]
+            full = [*own, *(_full_name(verb, override) for override in overrides)]
             composed = hydra_compose(verb, overrides=full, return_hydra_config=True)
         HydraConfig.instance().set_config(composed)
         hydra = {"run": {"dir": str(composed.hydra.run.dir)}, "sweeper": composed.hydra.sweeper}

@@ -58,7 +58,7 @@ def main(arguments: list[str]) -> int:
 
 
 def _run(overrides: list[str]) -> int:
-    config, run_dir = compose_run("train", _with_name(overrides))
+    config, run_dir = compose_run("train", overrides, _run_name(overrides))
     if preset := next((o for o in overrides if o.startswith("sweep=") and o != "sweep=none"), ""):
         raise ConfigError(f"{preset} is several runs: add -m to run one after another")
     _check(config)
@@ -66,15 +66,15 @@ def _run(overrides: list[str]) -> int:
     return _begin(config, Path(run_dir), overrides)
 
 
-def _with_name(overrides: list[str]) -> list[str]:
-    """The overrides, after one that puts the model, if there is one and the same for all runs, into the run's name."""
+def _run_name(overrides: list[str]) -> list[str]:
+    """An override that puts the model, if there is one and the same for all runs, into the run's name; else none."""
     models = [parse_override(text) for text in overrides if text.startswith("model=")]
     if not models or models[-1].is_sweep_override() or not str(models[-1].value()):
-        return overrides
+        return []
     path = Path(str(models[-1].value()))
     stem = path.parent.name if path.stem == "model" and path.parent.name else path.stem  # runs/diagnose_TIME/model.yaml
     name = re.sub(r"[^\w.-]", "_", stem)[:_LONGEST]
-    return [f"hydra.job.name='${{hydra:runtime.choices.experiment}}_{name}'", *overrides]
+    return [f"hydra.job.name='${{hydra:runtime.choices.experiment}}_{name}'"]
 
 
 def _check(config) -> None:
@@ -121,7 +121,7 @@ def _sweep(overrides: list[str]) -> int:
         return _sweep_job(composed)
 
     quoted = folder.replace("\\", "\\\\").replace("'", "\\'")
-    sys.argv = ["forcegrasp train", "-m", *_with_name(overrides), f"hydra.sweep.dir='{quoted}'"]
+    sys.argv = ["forcegrasp train", "-m", *_run_name(overrides), *overrides, f"hydra.sweep.dir='{quoted}'"]
     from forcegrasp.runs.lock import only_writer
 
     with only_writer(Path(folder) / "sweep.lock"):

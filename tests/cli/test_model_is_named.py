@@ -10,7 +10,7 @@ import pytest
 
 from forcegrasp.cli.main import main
 from forcegrasp.cli.options import compose_run
-from forcegrasp.cli.train import _with_name
+from forcegrasp.cli.train import _run_name
 from forcegrasp.config import TrainConfig
 from forcegrasp.runs.run_dir import RunDir
 from forcegrasp.train.board import card, evaluate_command
@@ -26,13 +26,11 @@ MODEL = Path(__file__).parents[1] / "config" / "model.yaml"
         (["model=better.yaml"], "ib_better_s0"),
         (["model=runs/diagnose_1/model.yaml", "experiment=no_ib", "seed=3"], "no_ib_diagnose_1_s3"),
         (["model='my models/a $b c.yaml'"], "ib_a__b_c_s0"),
-        (["model=better.yaml", "hydra.job.name=mine"], "mine_s0"),
         (["model=a.yaml,b.yaml"], "ib_s0"),  # of several, each run's config.yaml tells
     ],
 )
 def test_name_of_a_run(given, name):
-    overrides = _with_name(given)
-    folder = compose_run("train", [text for text in overrides if "," not in text])[1]
+    folder = compose_run("train", [text for text in given if "," not in text], _run_name(given))[1]
     assert re.fullmatch(rf"runs/\d{{4}}-\d\d-\d\d_\d\d-\d\d-\d\d_{name}", folder)
 
 
