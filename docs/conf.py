@@ -16,7 +16,11 @@ HERE = Path(__file__).parent
 project = "forcegrasp"
 author = "the forcegrasp authors"
 version = release = __version__
-extensions = ["myst_parser"]
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
+autodoc_member_order = "bysource"
+autodoc_inherit_docstrings = False  # torchrl's methods are told by torchrl
+autodoc_typehints = "none"  # the docstrings say what is taken
+add_module_names = False
 html_theme = "furo"
 html_title = f"forcegrasp {__version__}"
 html_show_copyright = False
@@ -26,6 +30,8 @@ myst_heading_anchors = 4
 nitpicky = True
 
 CONTENTS = ("index", "README")
+#: A heading of the reference that is a module; what the module's docstrings say goes below it.
+MODULE = re.compile(r"^## `(forcegrasp\.[\w.]+)`\n", re.MULTILINE)
 LINK = re.compile(r"\]\(([^)#:]+\.md)\)")
 
 
@@ -34,7 +40,7 @@ def setup(app) -> None:
 
 
 def read(_app, name: str, source: list[str]) -> None:
-    """Gives a contents page its navigation, and makes downloads of links to Markdown outside docs/."""
+    """Gives contents pages navigation and the reference its docstrings; links outside docs/ become downloads."""
     page = HERE / f"{name}.md"
 
     def outside(link: re.Match) -> str:
@@ -43,7 +49,14 @@ def read(_app, name: str, source: list[str]) -> None:
 
     if page.stem in CONTENTS:
         source[0] += navigation(page, source[0])
+    if name == "reference":
+        source[0] = MODULE.sub(documented, source[0])
     source[0] = LINK.sub(outside, source[0])
+
+
+def documented(heading: re.Match) -> str:
+    """A heading with what the docstrings of its module say."""
+    return f"{heading[0]}\n```{{eval-rst}}\n.. automodule:: {heading[1]}\n   :members:\n```\n"
 
 
 def navigation(page: Path, text: str) -> str:

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from not_tested import pytest_terminal_summary  # noqa: F401  (a hook: pytest calls it)
 
 from forcegrasp.config import GraspConfig
 from forcegrasp.physics import GraspParameters, GraspSampler

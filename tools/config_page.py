@@ -9,6 +9,7 @@ import argparse
 import dataclasses
 import inspect
 import math
+import shlex
 from collections.abc import Iterable, Iterator
 from importlib.resources import files
 from pathlib import Path
@@ -23,8 +24,8 @@ from forcegrasp.cli.options import SCHEMAS, groups
 MANY = 100_000
 HEAD = """# Configuration
 
-Every option of every verb, with its default, what it may be and where the default comes from. `forcegrasp VERB --help`
-says the same in the terminal. This page is made by `python tools/config_page.py`.
+Every option of every verb, with its default, what it may be and where the default comes from.
+`forcegrasp VERB --help --all` says the same in the terminal. This page is made by `python tools/config_page.py`.
 
 ```sh
 forcegrasp train experiment=ib reward.object_weight=2 'grasp.kappa=[0.3,0.6]'    # NAME=VALUE; quotes around a list
@@ -148,7 +149,8 @@ def what(verb: str, group: str, name: str) -> Iterator[str]:
     swept = content.pop("hydra", {}).get("sweeper", {}).get("params", {})
     whole = text.startswith("# @package _global_")
     for key, value in flat(swept | content, "" if whole else f"{group}."):
-        yield f"`{key}={shown(value)}`"
+        setting = f"{key}={shown(value)}"
+        yield f"`{shlex.quote(setting) if '[' in setting else setting}`"
 
 
 def flat(content: dict, prefix: str) -> Iterator[tuple[str, Any]]:

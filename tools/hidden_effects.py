@@ -88,8 +88,7 @@ def run_job(job: Job) -> dict:
         loaded = refuse_table(workflow.load(folder / "set"), "fit")
         diagnosis, _ = workflow.diagnose_set(loaded, None, [], 0, lambda text: None)
         seconds, processor = time.perf_counter() - started, time.process_time() - busy
-        numerical = workflow.numerical_error(diagnosis.fit, diagnosis.target)
-        model = workflow.model_of(diagnosis.fit, diagnosis.target, loaded, numerical)
+        model = workflow.model_of(diagnosis.fit, diagnosis.target, loaded, diagnosis.numerical)
     finally:
         shutil.rmtree(folder, ignore_errors=True)
     return {

@@ -40,10 +40,11 @@ def judge(row: dict, right: set[str]) -> str:
         return "first" if verdict == "explained" else "missed" if verdict == "unknown" else "wrong"
     if row["group"] == "outside":
         return "first" if verdict == "unknown" else "wrong" if named else "missed"
+    if row["group"] == "two":
+        first = {effects[0] for found, effects in row["steps"] if found != "none"} if named else set()
+        return "first" if first == right else "in set" if right & set(named) else "wrong" if named else "missed"
     if verdict == "one_of":
         return "first" if named[0] in right else "in set" if right & set(named) else "wrong"
-    if row["group"] == "two":
-        return "first" if set(named) == right else "in set" if right & set(named) else "wrong" if named else "missed"
     return "first" if named and named[0] in right else "wrong" if named else "missed"
 
 

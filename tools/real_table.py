@@ -12,9 +12,9 @@ import numpy as np
 
 from forcegrasp.compare.final_force import analyse_table
 from forcegrasp.compare.final_force_output import draw
-from forcegrasp.compare.report import write_report
 from forcegrasp.measure.schema import FinalForceTable, fingerprint_of_table
 from forcegrasp.physics.gripper_file import load_gripper
+from forcegrasp.reports.html import write_report
 
 SOURCE = (
     "Lach et al. 2023, Towards Transferring Tactile-based Continuous Force Control Policies from Simulation to Robot,"

@@ -19,7 +19,7 @@ from pathlib import Path
 from unittest import mock
 
 from forcegrasp.cli.main import main
-from forcegrasp.compare import report
+from forcegrasp.reports import html as report
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGE = ROOT / "docs" / "compare-your-data.md"

@@ -55,6 +55,7 @@ def interrupt(folder: Path) -> None:
 
 DEPLOY = "from forcegrasp.deploy import GraspController; print(GraspController.load('exported'))"
 GYMNASIUM = "import gymnasium, forcegrasp; print(gymnasium.make('forcegrasp/Grasp-v0').reset(seed=0)[0].shape)"
+FUNCTIONS = "import forcegrasp as fg; print(fg.load('set'), fg.report(fg.compare('set', 'model.yaml'), 'p'))"
 TYPED = "from importlib.resources import files; print((files('forcegrasp') / 'py.typed').read_text())"
 SHIPPED = f"""
 from forcegrasp.cli.main import main
@@ -66,17 +67,19 @@ STEPS = [
     Step("doctor", ["forcegrasp", "doctor"]),
     Step("effects", ["forcegrasp", "effects"]),
     Step("effects NAME", ["forcegrasp", "effects", "backlash"]),
+    Step("completion", ["forcegrasp", "completion", "bash"]),
     Step("train", ["forcegrasp", "train", *TINY, "hydra.run.dir=run"], ("run/run.json", "run/metrics.csv")),
     Step("train resume=", ["forcegrasp", "train", "resume=run"], prepare=interrupt),
     Step("train -m", ["forcegrasp", "train", "-m", *TINY, "seed=0,1", "hydra.sweep.dir=sweep"], ("sweep/curves.png",)),
     Step("curves", ["forcegrasp", "curves", "sweep", "out=curves"], ("curves/curves.json",)),
-    Step("evaluate", ["forcegrasp", "evaluate", "policies=[run,force_pi]", *SMALL, "out=e"], ("e/evaluation.json",)),
+    Step("evaluate", ["forcegrasp", "evaluate", "policies=[run,force_pi]", *SMALL, "out=e"], ("e/report.html",)),
     Step("evaluate shipped", ["python", "-c", SHIPPED], ("shipped/evaluation.json",)),
     Step("render", ["forcegrasp", "render", "policy=run", "steps=8", "out=g.gif"], ("g.gif",), or_says="no OpenGL"),
     Step("export", ["forcegrasp", "export", "run", "out=exported"], ("exported/policy.onnx",)),
     Step("deploy", ["python", "-c", DEPLOY]),
     Step("record", ["forcegrasp", "record", "out=set", "grasps=6", "objects=1", "effects=[force_bias]"], ("set",)),
     Step("fit", ["forcegrasp", "fit", "data=set", "out=model.yaml"], ("model.yaml",)),
+    Step("functions", ["python", "-c", FUNCTIONS], ("p/report.html",)),
     Step("compare", ["forcegrasp", "compare", "data=set", "model=model.yaml", "out=c"], ("c/report.html",)),
     Step(
         "diagnose",

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from forcegrasp.cli.options import compose, help_text
 from forcegrasp.cli.results import default_out, narrator, need
-from forcegrasp.errors import ConfigError
 
 PURPOSE = "add an effect to a model, fit it again, and see the error fall"
 NOTES = """
@@ -13,8 +12,6 @@ NOTES = """
   effect=NAME      see forcegrasp effects; forcegrasp diagnose tells which
   out=better.yaml  is written if the error on held-out grasps falls; the report goes into runs/add_TIME
 """
-#: The error must fall to less than this share.
-LEAST_FALL = 0.995
 
 
 def main(arguments: list[str]) -> int:
@@ -33,7 +30,9 @@ def main(arguments: list[str]) -> int:
         check_effects,
         check_file,
         check_folder,
+        refuse_one_grasp,
         refuse_table,
+        refuse_useless,
         tell_warnings,
         write_results,
     )
@@ -44,17 +43,11 @@ def main(arguments: list[str]) -> int:
     folder = check_folder(default_out("add", ""))
     path = check_file(folder / "model.yaml" if not config.out else need(config.out, "out", "better.yaml"))
     loaded = refuse_table(workflow.load(data), "add")
-    if len(loaded.measured.grasps) < 2:
-        raise ConfigError(f"data={data}: has one grasp, so that none can be held out to tell whether the error falls")
+    refuse_one_grasp(loaded)
     model = read_model(old)
     tell_warnings(loaded)
     added = workflow.add_effect(loaded, model, effect, narrator())
-    before, after = added.error_before, added.error_after
-    if not after < LEAST_FALL * before:
-        raise ConfigError(
-            f"effect={effect.name}: the error on held-out grasps does not fall ({before:.3f} × noise without,"
-            f" {after:.3f} × with it); not written. To see what helps: forcegrasp diagnose data={data} model={old}"
-        )
+    refuse_useless(added, effect, f"forcegrasp diagnose data={data} model={old}")
     lead = fit_output.add_answer(added, effect)
     console = Console(highlight=False)
     console.print(fit_output.printed_fall(added, effect))

@@ -12,7 +12,7 @@ NOTES = """
   data=my_set      a folder with meta.yaml, grasps.csv and samples.csv (or samples.parquet); or, for a table of final
                    forces, with meta.yaml and table.csv
   model=FILE       what forcegrasp fit or add wrote; its parameters are fitted again
-  effects=[A,B]    see forcegrasp effects
+  'effects=[A,B]'  see forcegrasp effects
 
   The verdict is one of: effect (one or several, in the order found), one_of (these data can't tell which), explained
   (nothing is missing), unknown (none of the effects), not_fitted (the base model can't be fitted to these data).
@@ -40,7 +40,6 @@ def main(arguments: list[str]) -> int:
     )
     from forcegrasp.compare import diagnose_output, workflow
     from forcegrasp.compare.advice import advise
-    from forcegrasp.compare.floor import numerical_error
     from forcegrasp.effects import catalogue
     from forcegrasp.effects.model_file import read_model, write_model
 
@@ -63,8 +62,7 @@ def main(arguments: list[str]) -> int:
     if diagnosis.verdict in ("effect", "one_of"):
         known = config.model or "model.yaml"
         print(f"add it: forcegrasp add data={data} model={known} effect={diagnosis.effects[0]} out=better.yaml")
-        numerical = numerical_error(diagnosis.fit, diagnosis.target)
-        better = workflow.model_of(diagnosis.fit, diagnosis.target, loaded, numerical)
+        better = workflow.model_of(diagnosis.fit, diagnosis.target, loaded, diagnosis.numerical)
         write_model(better, out / "model.yaml")
         print(f"or take the model with {', '.join(e.effect.name for e in better.effects)}: {out / 'model.yaml'}")
     write_results(

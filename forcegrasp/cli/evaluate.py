@@ -10,12 +10,12 @@ from forcegrasp.errors import ConfigError
 
 PURPOSE = "compare policies and controllers on the same simulated grasps"
 NOTES = """
-  policies=[A,B]   run directories of forcegrasp train; policies that come with the package: {shipped};
-                   or controllers: force_pi (Lach et al. 2022), informed (knows the object's force scale: the mark to
-                   reach), close, nothing
+  'policies=[A,B]' run directories of forcegrasp train; policies that come with the package:
+                   {shipped};
+                   or controllers: force_pi (Lach et al. 2022), informed (a fixed rule), close, nothing
   plan=paper       the paper's simulation experiment; objects: its six objects in the training simulator;
                    virtual_robot: the same on a gripper with effects that the training simulator does not have
-  out=DIR          where to write figures, tables.md, trials.csv and evaluation.json; runs/evaluate_TIME by default
+  out=DIR          where to write report.html and what it was made from; runs/evaluate_TIME by default
 """
 
 
@@ -24,7 +24,8 @@ def main(arguments: list[str]) -> int:
     if any(a in ("-h", "--help") for a in arguments):
         from forcegrasp.policies import shipped_policies
 
-        print(help_text("evaluate", PURPOSE, NOTES.format(shipped=", ".join(shipped_policies()) or "none")), end="")
+        notes = NOTES.format(shipped=", ".join(shipped_policies()) or "none")
+        print(help_text("evaluate", PURPOSE, notes, everything="--all" in arguments), end="")
         return 0
     config = compose("evaluate", arguments)
     out = Path(config.out or f"runs/evaluate_{time.strftime('%Y-%m-%d_%H-%M-%S')}")

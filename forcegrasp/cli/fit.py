@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
-
 from forcegrasp.cli.options import compose, help_text
 from forcegrasp.cli.results import default_out, narrator, need
 
@@ -24,9 +22,15 @@ def main(arguments: list[str]) -> int:
 
     from rich.console import Console
 
-    from forcegrasp.cli.measuring import check_file, check_folder, refuse_table, tell_warnings, write_results
+    from forcegrasp.cli.measuring import (
+        base_model,
+        check_file,
+        check_folder,
+        refuse_table,
+        tell_warnings,
+        write_results,
+    )
     from forcegrasp.compare import fit_output, workflow
-    from forcegrasp.compare.floor import numerical_error
     from forcegrasp.effects.model_file import write_model
 
     folder = check_folder(default_out("fit", ""))
@@ -34,9 +38,7 @@ def main(arguments: list[str]) -> int:
     loaded = refuse_table(workflow.load(data), "fit")
     tell_warnings(loaded)
     target, _, base = workflow.fit_model(loaded, config.seed, narrator())
-    model = workflow.model_of(base.fit, target, loaded, numerical_error(base.fit, target))
-    if not base.converged:
-        model = dataclasses.replace(model, warnings=(f"the fit did not converge: {base.reason}", *model.warnings))
+    model = base_model(base, target, loaded)
     lead = fit_output.fit_answer(base, target)
     console = Console(highlight=False)
     console.print(fit_output.printed_parameters(model))

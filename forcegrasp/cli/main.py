@@ -7,6 +7,7 @@ import os
 import sys
 
 from forcegrasp import __version__
+from forcegrasp.cli.terminal import in_a_line, show_everything
 from forcegrasp.errors import ForcegraspError, closest
 
 VERBS = {
@@ -22,6 +23,7 @@ VERBS = {
     "render": "play one grasp and show it as a video: the scene, the forces, the object's displacement",
     "effects": "list the physical effects that a simulator may lack, or explain one",
     "doctor": "check this installation and say what to do where something is wrong",
+    "completion": "print a script that completes verbs, options and values in bash, zsh or fish",
 }
 
 USAGE = """forcegrasp {version}: simulate tactile grasping, train grasp-force controllers, compare them
@@ -51,46 +53,53 @@ from measurements to a better model (a set is a folder of CSV files; forcegrasp 
   forcegrasp add data=my_set model=model.yaml effect=backlash out=better.yaml
   forcegrasp compare data=my_set model=better.yaml         the error fell
 
-Every verb explains its options with --help. Exit status: 0 done, 1 the doctor found something to mend, 2 bad input,
-130 interrupted (and saved).
+Every verb explains its common options with --help, all of them with --help --all. Exit status: 0 done, 1 the doctor
+found something to mend, 2 bad input, 130 interrupted (and saved).
 """
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Runs one verb; returns the exit status."""
+    show_everything()
     arguments = sys.argv[1:] if arguments is None else arguments
     if not arguments or arguments[0] in ("-h", "--help", "help"):
-        verbs = "\n".join(f"  {name:<10} {what}" for name, what in VERBS.items())
+        verbs = "\n".join(f"  {name:<11} {what}" for name, what in VERBS.items())
         print(USAGE.format(version=__version__, verbs=verbs), end="")
         return 0 if arguments else 2
     if arguments[0] == "--version":
         print(__version__)
         return 0
     verb, *rest = arguments
+    if "--all" in rest:
+        rest.append("--help")  # --all alone asks for all of the help, too
     try:
         if verb not in VERBS:
             raise ForcegraspError(f"no verb {verb!r}{closest(verb, VERBS)}")
-        if verb != "doctor" and not {"-h", "--help"} & set(rest):
+        for argument in rest:
+            if argument != in_a_line(argument):
+                told = "a line break, a control character, or bytes that are no text in this locale"
+                raise ForcegraspError(f"{argument!r}: has {told}; rename what it names")
+        if verb not in ("doctor", "completion") and not {"-h", "--help"} & set(rest):
             import_mujoco()
         return importlib.import_module(f"forcegrasp.cli.{verb}").main(rest)
     except ImportError as error:
         if (error.name or "").startswith("forcegrasp"):
             raise  # a fault of this project's, not of the installation
-        print(f"forcegrasp: {_in_a_line(error)}; see what is wrong with: forcegrasp doctor", file=sys.stderr)
+        print(
+            f"forcegrasp: {' '.join(str(error).split()).rstrip('.')}; see what is wrong with: forcegrasp doctor",
+            file=sys.stderr,
+        )
         return 2
     except ForcegraspError as error:
-        print(f"forcegrasp: {error}", file=sys.stderr)
+        print(f"forcegrasp: {in_a_line(str(error))}", file=sys.stderr)
         return 2
     except OSError as error:
-        print(f"forcegrasp: {error.filename or 'file system'}: {error.strerror or error}", file=sys.stderr)
+        told = f"{error.filename or 'file system'}: {error.strerror or error}"
+        print(f"forcegrasp: {in_a_line(told)}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         print("forcegrasp: interrupted", file=sys.stderr)
         return 130
-
-
-def _in_a_line(error: Exception) -> str:
-    return " ".join(str(error).split()).rstrip(".")
 
 
 def import_mujoco() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,10 +14,20 @@ from forcegrasp.errors import ConfigError, closest
 if TYPE_CHECKING:
     from typing_extensions import TypeIs
 
-    from forcegrasp.compare.report import Section
-    from forcegrasp.compare.workflow import Loaded
+    from forcegrasp.compare.base_fit import BaseFit
+    from forcegrasp.compare.final_force import TableAnalysis
+    from forcegrasp.compare.target import Target
+    from forcegrasp.compare.workflow import Added, Loaded
     from forcegrasp.effects import Effect
+    from forcegrasp.effects.model_file import Model
     from forcegrasp.measure import FinalForceTable, MeasurementSet
+    from forcegrasp.reports.html import Section
+
+
+#: The base model that compare and diagnose fit where none is given, beside their report.
+BASE_MODEL = "base_model.yaml"
+#: With an effect added, the error must fall to less than this share.
+LEAST_FALL = 0.995
 
 
 def check_folder(folder: Path) -> Path:
@@ -55,9 +66,17 @@ def write_results(
     out: Path, name: str, content: dict[str, Any], title: str, lead: str, sections: Sequence[Section], loaded: Loaded
 ) -> None:
     """Writes the report and the JSON file beside it, and says where."""
+    report = write_files(out, name, content, title, lead, sections, loaded)
+    print(f"report: {report}, figures: {out / f'{name}.json'}")
+
+
+def write_files(
+    out: Path, name: str, content: dict[str, Any], title: str, lead: str, sections: Sequence[Section], loaded: Loaded
+) -> Path:
+    """Writes the report and the JSON file beside it; returns the report's path."""
     import mujoco
 
-    from forcegrasp.compare.report import Section, Text, write_report
+    from forcegrasp.reports.html import Section, Text, write_report
 
     if loaded.warnings:
         sections = [*sections, Section("Odd in this set", [Text(warning) for warning in loaded.warnings])]
@@ -65,8 +84,18 @@ def write_results(
     facts = {"set": str(measured.path), "gripper": measured.gripper, "source": measured.source}
     facts |= {"fingerprint": measured.fingerprint, "mujoco": mujoco.__version__}
     write_json(out / f"{name}.json", content)
-    report = write_report(out / "report.html", title, lead, sections, facts)
-    print(f"report: {report}, figures: {out / f'{name}.json'}")
+    return write_report(out / "report.html", title, lead, sections, facts)
+
+
+def base_model(base: BaseFit, target: Target, loaded: Loaded[MeasurementSet]) -> Model:
+    """A fitted base model, which says if it is not to be believed."""
+    from forcegrasp.compare.floor import numerical_error
+    from forcegrasp.compare.workflow import model_of
+
+    model = model_of(base.fit, target, loaded, numerical_error(base.fit, target))
+    if base.converged:
+        return model
+    return dataclasses.replace(model, warnings=(f"the fit did not converge: {base.reason}", *model.warnings))
 
 
 def is_table(loaded: Loaded) -> TypeIs[Loaded[FinalForceTable]]:
@@ -102,12 +131,7 @@ def report_table(loaded: Loaded[FinalForceTable], name: str, out: Path, **unused
     Raises:
       ConfigError: if one of those is given.
     """
-    for option, value in unused.items():
-        if value:
-            raise ConfigError(
-                f"{option}: {loaded.measured.path} is a table of final forces, which is held against the static law and"
-                f" all shapes that effects give it; leave {option}= out"
-            )
+    refuse_options(loaded, **unused)
     from forcegrasp.compare.final_force import analyse_table
 
     tell_warnings(loaded)
@@ -115,11 +139,48 @@ def report_table(loaded: Loaded[FinalForceTable], name: str, out: Path, **unused
     for line in analysis.lines():
         print(line)
     content = analysis.compare_json() if name == "compare" else analysis.diagnosis_json()
+    title, lead = table_title(loaded, name), table_answer(analysis)
+    write_results(out, name, content, title, lead, analysis.sections(), loaded)
+
+
+def refuse_options(loaded: Loaded[FinalForceTable], **unused: object) -> None:
+    """Raises ConfigError if an option is given that means nothing to a table of final forces."""
+    for option, value in unused.items():
+        if value:
+            raise ConfigError(
+                f"{option}: {loaded.measured.path} is a table of final forces, which is held against the static law and"
+                f" all shapes that effects give it; leave {option}= out"
+            )
+
+
+def table_title(loaded: Loaded[FinalForceTable], name: str) -> str:
+    """Heading of a table's report."""
     question = "Where the static law fails" if name == "compare" else "What the static law lacks"
+    return f"{question}: {loaded.measured.name}"
+
+
+def table_answer(analysis: TableAnalysis) -> str:
+    """What a table of final forces says, in words."""
     lead = f"{analysis.verdict.replace('_', ' ').capitalize()}: {analysis.reason}."
-    if analysis.effects:
-        lead += f" It could be any of {', '.join(analysis.effects)}."
-    write_results(out, name, content, f"{question}: {loaded.measured.name}", lead, analysis.sections(), loaded)
+    return f"{lead} It could be any of {', '.join(analysis.effects)}." if analysis.effects else lead
+
+
+def refuse_one_grasp(loaded: Loaded[MeasurementSet]) -> None:
+    """Raises ConfigError about a set of one grasp, of which none can be held out."""
+    if len(loaded.measured.grasps) < 2:
+        raise ConfigError(
+            f"data={loaded.measured.path}: has one grasp, so that none can be held out to tell whether the error falls"
+        )
+
+
+def refuse_useless(added: Added, effect: type[Effect], way: str) -> None:
+    """Raises ConfigError about an effect that does not lower the error on held-out grasps; ``way`` finds one."""
+    before, after = added.error_before, added.error_after
+    if not after < LEAST_FALL * before:
+        raise ConfigError(
+            f"effect={effect.name}: the error on held-out grasps does not fall ({before:.3f} × noise without,"
+            f" {after:.3f} × with it); not written. To see what helps: {way}"
+        )
 
 
 def check_effects(option: str, names: Sequence[str]) -> list[type[Effect]]:

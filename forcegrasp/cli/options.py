@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator
+import textwrap
+from collections.abc import Iterator, Sequence
 from importlib.resources import files
 from typing import Any
 
@@ -36,6 +37,20 @@ SCHEMAS: dict[str, type] = {
     "curves": CurvesConfig,
     "render": RenderConfig,
 }
+#: What a training takes of Hydra's own options. Others name search paths, callbacks and classes, that is, code.
+LAUNCHERS = ["basic", "joblib", "submitit_local", "submitit_slurm"]
+LAUNCHER_OPTIONS = (
+    *("n_jobs", "partition", "account", "qos", "constraint", "exclude", "array_parallelism", "timeout_min"),
+    *("max_num_timeout", "cpus_per_task", "mem_gb", "gpus_per_node", "gres"),
+)
+HYDRA_OPTIONS = ("hydra.run.dir", "hydra.sweep.dir", *(f"hydra.launcher.{name}" for name in LAUNCHER_OPTIONS))
+
+#: Options of sections that a short help shows; those without a section are always there.
+COMMON = (
+    *("physics.threads", "grasp.kappa", "grasp.steps", "sensors.force_std_n"),
+    *("ppo.total_frames", "ppo.grasps", "ppo.learning_rate", "log.video_every"),
+)
+HELP_WIDTH = 100
 
 
 def compose(verb: str, overrides: list[str]) -> Any:
@@ -47,9 +62,12 @@ def compose(verb: str, overrides: list[str]) -> Any:
     return compose_run(verb, overrides)[0]
 
 
-def compose_run(verb: str, overrides: list[str]) -> tuple[Any, str]:
-    """Like :func:`compose`, and also returns where Hydra would put the run (``hydra.run.dir``)."""
-    config, hydra = _compose(verb, overrides)
+def compose_run(verb: str, overrides: list[str], own: Sequence[str] = ()) -> tuple[Any, str]:
+    """Like :func:`compose`, and also returns where Hydra would put the run (``hydra.run.dir``).
+
+    ``own`` are overrides of the program's, not the user's: they come first and are not checked.
+    """
+    config, hydra = _compose(verb, overrides, own)
     return config, _folder("hydra.run.dir", hydra["run"]["dir"])
 
 
@@ -67,7 +85,7 @@ def compose_sweep(overrides: list[str]) -> tuple[dict[str, str], str]:
     return swept, _folder("hydra.sweep.dir", hydra["sweep"]["dir"])
 
 
-def _compose(verb: str, overrides: list[str]) -> tuple[Any, dict[str, Any]]:
+def _compose(verb: str, overrides: list[str], own: Sequence[str] = ()) -> tuple[Any, dict[str, Any]]:
     """Returns the verb's configuration, checked, and Hydra's own: run, sweep and sweeper."""
     from hydra import compose as hydra_compose
     from hydra import initialize_config_module
@@ -79,12 +97,14 @@ def _compose(verb: str, overrides: list[str]) -> tuple[Any, dict[str, Any]]:
 
     register_schemas()
     choices, known = groups(verb), [name for name, _, _ in leaves(SCHEMAS[verb])]
+    if verb == "train":
+        choices, known = choices | {"hydra/launcher": LAUNCHERS}, [*known, *HYDRA_OPTIONS]
     for override in overrides:
         _check_override(verb, override, choices, known)
     GlobalHydra.instance().clear()
     try:
         with initialize_config_module("forcegrasp.conf", version_base="1.3"):
-            full = [_full_name(verb, override) for override in overrides]
+            full = [*own, *(_full_name(verb, override) for override in overrides)]
             composed = hydra_compose(verb, overrides=full, return_hydra_config=True)
         HydraConfig.instance().set_config(composed)
         hydra = {"run": {"dir": str(composed.hydra.run.dir)}, "sweeper": composed.hydra.sweeper}
@@ -115,7 +135,7 @@ def register_schemas() -> None:
 def groups(verb: str) -> dict[str, list[str]]:
     """Config groups of a verb and their choices, from conf/; a group of one verb alone lies in conf/VERB."""
     conf = files("forcegrasp.conf")
-    text = (conf / f"{verb}.yaml").read_text()
+    text = (conf / f"{verb}.yaml").read_text("utf-8")
     own = conf / verb
     folders = {f.name: f for f in conf.iterdir() if f.is_dir() and f"- {f.name}:" in text}
     folders |= {f.name: f for f in own.iterdir()} if own.is_dir() else {}
@@ -149,12 +169,16 @@ def parse_override(override: str) -> Any:
       ConfigError: if it can't be read.
     """
     from hydra.core.override_parser.overrides_parser import OverridesParser
+    from hydra.core.override_parser.types import Glob
     from hydra.errors import HydraException
 
     try:
-        return OverridesParser.create().parse_override(override)
+        parsed = OverridesParser.create().parse_override(override)
     except HydraException as error:
         raise ConfigError(f"{override!r}: can't be read ({str(error).splitlines()[0]})") from error
+    if isinstance(parsed.value(), Glob):
+        raise ConfigError(f"{override!r}: glob() is not known here; write the values one by one, as in a,b,c")
+    return parsed
 
 
 def _check_override(verb: str, override: str, choices: dict[str, list[str]], known: list[str]) -> None:
@@ -168,8 +192,9 @@ def _check_override(verb: str, override: str, choices: dict[str, list[str]], kno
         for choice in value.split(","):
             if choice.strip() not in choices[key]:
                 raise ConfigError(f"no {key} named {choice.strip()!r}{closest(choice.strip(), choices[key])}")
-    elif key not in known and not key.startswith(("hydra.", "hydra/")):
-        raise ConfigError(f"no option {key!r}{closest(key, [*known, *choices])}")
+    elif key not in known:
+        own = [name for name in [*known, *choices] if name.startswith("hydra") == key.startswith("hydra")]
+        raise ConfigError(f"no option {key!r}{closest(key, own or known)}")
     if parse_override(override).is_sweep_override():
         sweep = "; to run one after another, add -m" if verb == "train" else ""
         raise ConfigError(f"{override!r}: several values; a list is written [a,b]{sweep}")
@@ -185,10 +210,14 @@ def _one_line(error: Exception) -> str:
     return f"{key}: {text}" if key and key not in text else text
 
 
-def help_text(verb: str, purpose: str, notes: str = "", plain: str = "") -> str:
-    """The verb's help: groups, then every option with default, unit, meaning and source.
+def help_text(verb: str, purpose: str, notes: str = "", plain: str = "", everything: bool = True) -> str:
+    """The verb's help: groups, then options.
 
-    ``plain`` is what the verb takes without ``key=``.
+    Args:
+      verb: its name.
+      purpose, notes: what it is for, and what is no option of it.
+      plain: what it takes without ``key=``.
+      everything: every option with default, unit, meaning and source; else a line for each that is common.
     """
     usage = f"usage: forcegrasp {verb} {plain and f'[{plain}] '}[key=value ...]"
     lines = [f"forcegrasp {verb}: {purpose}", "", usage, ""]
@@ -199,14 +228,17 @@ def help_text(verb: str, purpose: str, notes: str = "", plain: str = "") -> str:
         lines += ["presets (a preset sets several options; options given beside it win)", *presets]
     else:
         lines.pop()
+    return "\n".join([*lines, *(_every_option(verb) if everything else _common_options(verb))]) + "\n"
+
+
+def _every_option(verb: str) -> Iterator[str]:
     section = None
     for name, entry, default in leaves(SCHEMAS[verb]):
         head = name.rpartition(".")[0]
         if head != section:
             section = head
-            lines += ["", head or "general"]
+            yield from ("", head or "general")
         meta = entry.metadata
-        shown = str(default).replace("'", "").replace(" ", "")
         detail = (
             meta["doc"]
             + (f" [{meta['unit']}]" if meta["unit"] else "")
@@ -214,6 +246,21 @@ def help_text(verb: str, purpose: str, notes: str = "", plain: str = "") -> str:
         )
         if not all(choice in detail for choice in meta["choices"]):
             detail += f": {' or '.join(meta['choices'])}"
-        option = f"  {name}={shown}"
-        lines.append(f"{option}\n{'':<6}{detail}")
-    return "\n".join(lines) + "\n"
+        yield f"  {_with_default(name, default)}\n{'':<6}{detail}"
+
+
+def _common_options(verb: str) -> Iterator[str]:
+    options = list(leaves(SCHEMAS[verb]))
+    shown = [option for option in options if "." not in option[0] or option[0] in COMMON]
+    yield from ("", "common options")
+    for name, entry, default in shown:
+        unit = f" [{entry.metadata['unit']}]" if entry.metadata["unit"] else ""
+        head, text = _with_default(name, default), entry.metadata["doc"] + unit
+        first, *more = textwrap.wrap(f"  {head:<27} {text}", HELP_WIDTH, subsequent_indent=" " * 30)
+        yield "\n".join([first, *more])
+    sections = sorted({name.partition(".")[0] for name, _, _ in options if "." in name})
+    yield f"\n{len(options) - len(shown)} more of {', '.join(sections)}:\n  forcegrasp {verb} --help --all"
+
+
+def _with_default(name: str, default: Any) -> str:
+    return f"{name}={str(default).replace(chr(39), '').replace(' ', '')}"

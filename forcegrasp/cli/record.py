@@ -11,7 +11,7 @@ from forcegrasp.errors import ConfigError
 
 PURPOSE = "make a measurement set from the simulator, with effects hidden in it if you like"
 NOTES = """
-  effects=[backlash,'force_lag time_constant_s=0.1']
+  "effects=[backlash,'force_lag time_constant_s=0.1']"
                    effects of a typical size, or of the size given; forcegrasp effects lists them. The set does not tell
                    them: what forcegrasp diagnose says can be held against them
 """

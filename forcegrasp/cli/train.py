@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+import re
 import sys
+from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
@@ -13,11 +15,16 @@ from forcegrasp.errors import ConfigError, ForcegraspError
 
 if TYPE_CHECKING:
     from forcegrasp.config import TrainConfig
+    from forcegrasp.runs.run_dir import RunDir
 
 #: Why a run of a sweep failed, in its folder.
 FAILURE = "failed.txt"
+#: One of a sweep's runs that train side by side was stopped: no further one begins.
+STOPPED = "stopped"
 #: Exit status after Ctrl-C, as shells have it.
 INTERRUPTED = 130
+#: Letters of a model's name in the name of a run.
+_LONGEST = 40
 PURPOSE = "learn a grasp-force policy with PPO"
 NOTES = """
   -m / --multirun    run every combination of comma-separated values:
@@ -25,16 +32,16 @@ NOTES = """
                      forcegrasp train -m sweep=ablation                   the combinations of a preset
                      the same sweep with hydra.sweep.dir=FOLDER goes on with what is in that folder
   resume=RUN_DIR     go on with an interrupted run, exactly as if it had not been interrupted
-  hydra.run.dir=DIR  where to write the run; runs/TIME_EXPERIMENT_SEED by default
+  hydra.run.dir=DIR  where to write the run; runs/TIME_EXPERIMENT_MODEL_SEED by default
 
-Watch a training with: tensorboard --logdir runs. Ctrl-C saves and ends.
+Watch a training with: tensorboard --logdir runs. Ctrl-C saves and ends; so do SIGTERM, SIGHUP and SIGUSR1.
 """
 
 
 def main(arguments: list[str]) -> int:
     """Runs the verb; returns the exit status."""
     if any(a in ("-h", "--help") for a in arguments):
-        print(help_text("train", PURPOSE, NOTES), end="")
+        print(help_text("train", PURPOSE, NOTES, everything="--all" in arguments), end="")
         return 0
     resume = [a for a in arguments if a.startswith("resume=")]
     multirun = [a for a in arguments if a in ("-m", "--multirun")]
@@ -51,15 +58,23 @@ def main(arguments: list[str]) -> int:
 
 
 def _run(overrides: list[str]) -> int:
-    config, run_dir = compose_run("train", overrides)
+    config, run_dir = compose_run("train", overrides, _run_name(overrides))
     if preset := next((o for o in overrides if o.startswith("sweep=") and o != "sweep=none"), ""):
         raise ConfigError(f"{preset} is several runs: add -m to run one after another")
     _check(config)
     _join(config)
+    return _begin(config, Path(run_dir), overrides)
 
-    from forcegrasp.runs.run_dir import RunDir
 
-    return _train(config, RunDir.create(run_dir, config, overrides), resume=False)
+def _run_name(overrides: list[str]) -> list[str]:
+    """An override that puts the model, if there is one and the same for all runs, into the run's name; else none."""
+    models = [parse_override(text) for text in overrides if text.startswith("model=")]
+    if not models or models[-1].is_sweep_override() or not str(models[-1].value()):
+        return []
+    path = Path(str(models[-1].value()))
+    stem = path.parent.name if path.stem == "model" and path.parent.name else path.stem  # runs/diagnose_TIME/model.yaml
+    name = re.sub(r"[^\w.-]", "_", stem)[:_LONGEST]
+    return [f"hydra.job.name='${{hydra:runtime.choices.experiment}}_{name}'"]
 
 
 def _check(config) -> None:
@@ -114,25 +129,55 @@ def _sweep(overrides: list[str]) -> int:
         return _sweep_job(composed)
 
     quoted = folder.replace("\\", "\\\\").replace("'", "\\'")
-    sys.argv = ["forcegrasp train", "-m", *overrides, f"hydra.sweep.dir='{quoted}'"]
-    if launcher:
-        print(f"the runs' jobs write to {folder}/.submitit")
-    try:
-        job()
-    except Exception as error:
-        if type(error).__module__.startswith("submitit."):
-            reason = " ".join(str(error).splitlines()[:2])
-            raise ForcegraspError(f"{reason}; the same sweep typed again goes on") from error
-        raise
-    finally:  # a sweep that was cut short has something to show, too
-        _draw_curves(Path(folder))
+    sys.argv = ["forcegrasp train", "-m", *_run_name(overrides), *overrides, f"hydra.sweep.dir='{quoted}'"]
+    from forcegrasp.runs.lock import only_writer
+
+    with only_writer(Path(folder) / "sweep.lock"):
+        if launcher:
+            print(f"the runs' jobs write to {folder}/.submitit")
+        try:
+            if "hydra/launcher=joblib" in overrides:
+                _side_by_side(job, Path(folder) / STOPPED)
+            else:
+                job()
+        except Exception as error:
+            if type(error).__module__.startswith("submitit."):
+                reason = " ".join(str(error).splitlines()[:2])
+                raise ForcegraspError(f"{reason}; the same sweep typed again goes on") from error
+            raise
+        finally:  # a sweep that was cut short has something to show, too
+            _draw_curves(Path(folder))
     return _tell_failures(sorted(Path(folder).rglob(FAILURE)))
+
+
+def _side_by_side(job: Callable[[], None], stopped: Path) -> None:
+    """Runs a sweep in processes of joblib, which would kill them all at Ctrl-C: here they save and end first."""
+    from forcegrasp.train.stop import stop_signals, tell_workers
+
+    def stop() -> None:
+        stopped.touch()
+        tell_workers()
+
+    stopped.unlink(missing_ok=True)
+    try:
+        with stop_signals(stop):
+            job()
+        if stopped.exists():
+            raise KeyboardInterrupt
+    except Exception as error:
+        if stopped.exists():  # a process that had nothing to save was gone at once, which joblib complains about
+            raise KeyboardInterrupt from error
+        raise
+    finally:
+        stopped.unlink(missing_ok=True)
 
 
 def _tell_failures(files: list[Path]) -> int:
     """Raises ForcegraspError if runs of a sweep failed, after a line about each; returns the exit status 0 if not."""
     for file in files:
-        reason = file.read_text("utf-8").strip().removeprefix(f"{file.parent}: ")
+        reason = file.read_text("utf-8").strip()
+        for name in (file.parent, file.parent.absolute()):
+            reason = reason.removeprefix(f"{name}: ")
         print(f"{file.parent}: {reason}", file=sys.stderr)
     if files:
         raise ForcegraspError(f"{len(files)} of the sweep's runs failed, see above and {FAILURE} in their folders")
@@ -154,10 +199,15 @@ def _sweep_job(composed) -> int:
     from omegaconf import OmegaConf
 
     from forcegrasp.cli.main import import_mujoco
+    from forcegrasp.cli.terminal import show_everything
 
-    import_mujoco()  # a launcher may have started a process of its own
+    show_everything()  # a launcher may have started a process of its own
+    import_mujoco()
     hydra, config = HydraConfig.get(), cast("TrainConfig", OmegaConf.to_object(composed))
     overrides = [text for text in hydra.overrides.task if not text.startswith("sweep=")]  # this run is a single one
+    launcher, stopped = str(hydra.runtime.choices["hydra/launcher"]), Path(hydra.sweep.dir) / STOPPED
+    if stopped.exists():
+        return INTERRUPTED
     path = Path(hydra.runtime.output_dir)
     (path / FAILURE).unlink(missing_ok=True)
     try:
@@ -165,9 +215,13 @@ def _sweep_job(composed) -> int:
     except (ForcegraspError, OSError) as error:  # raised here, Hydra would tell of the first one alone
         (path / FAILURE).write_text(f"{error}\n", "utf-8")
         return 2
+    (path / FAILURE).unlink(missing_ok=True)  # of another job that found this one at work
     if status == INTERRUPTED:
-        if str(hydra.runtime.choices["hydra/launcher"]).startswith("submitit_"):  # a scheduler ended this job alone
+        if launcher.startswith("submitit_"):  # a scheduler ended this job alone
             raise ForcegraspError(f"{path}: stopped and saved; the same sweep typed again goes on")
+        if launcher == "joblib":  # which would kill the others before they have saved
+            stopped.touch()
+            return INTERRUPTED
         raise KeyboardInterrupt  # ends the sweep, not just this run
     return status
 
@@ -177,9 +231,9 @@ def _begin_or_resume(path: Path, config: TrainConfig, overrides: list[str]) -> i
     from forcegrasp.runs.run_dir import RunDir
 
     _join(config)
-    if any(path.glob("checkpoints/*.safetensors")) and RunDir.open(path).config() == config:
+    if RunDir(path).has_checkpoint and RunDir.open(path).config() == config:
         return _resume(path)
-    return _train(config, RunDir.create(path, config, overrides), resume=False)
+    return _begin(config, path, overrides)
 
 
 def single_runs(overrides: list[str]) -> list[list[str]]:
@@ -213,18 +267,31 @@ def _resume(path: Path) -> int:
     run = RunDir.open(path)
     config = run.config()
     (path / FAILURE).unlink(missing_ok=True)  # told when it failed; it gets another chance
-    if run.load()[1]["frames"] >= config.ppo.total_frames:
+    if run.has_checkpoint and run.load()[1]["frames"] >= config.ppo.total_frames:
         print(f"{path}: already trained to the end ({config.ppo.total_frames:,} frames)")
         return 0
     return _train(config, run, resume=True)
 
 
-def _train(config, run, resume: bool) -> int:
-    from forcegrasp.train.loop import train
+def _begin(config: TrainConfig, path: Path, overrides: list[str]) -> int:
+    from forcegrasp.runs.run_dir import RunDir
 
+    run = RunDir.create(path, config, overrides)
     print(f"run directory: {run.path}")
-    if train(config, run, resume):
-        print(f"trained. Compare it with the hand-written one: forcegrasp evaluate 'policies=[{run.path},force_pi]'")
+    return _train(config, run, resume=False)
+
+
+def _train(config: TrainConfig, run: RunDir, resume: bool) -> int:
+    try:
+        from forcegrasp.train.board import evaluate_command
+        from forcegrasp.train.loop import train
+
+        done = train(config, run, resume)
+    except KeyboardInterrupt:  # before the first batch, or typed twice
+        print(f"interrupted; go on with: forcegrasp train resume={run.path}")
+        return INTERRUPTED
+    if done:
+        print(f"trained. Compare it with the hand-written one: {evaluate_command(run, config)}")
         return 0
     print(f"stopped and saved; go on with: forcegrasp train resume={run.path}")
     return INTERRUPTED

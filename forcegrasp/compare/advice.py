@@ -11,10 +11,11 @@ from forcegrasp.compare.predict import Case, predict
 from forcegrasp.measure.plans import MENU, OFF_CENTRE, PERIOD_S, SAMPLES, make_command
 from forcegrasp.measure.replay import Replay
 from forcegrasp.measure.schema import MeasuredGrasp
+from forcegrasp.short_repr import ShortRepr
 
 
-@dataclass(frozen=True)
-class Advice:
+@dataclass(frozen=True, repr=False)
+class Advice(ShortRepr):
     """The next grasp, and what to expect of it."""
 
     grasp: str  #: its name on the menu

@@ -11,6 +11,7 @@ from forcegrasp.compare.fit import Fit, Simulators, fit_exactly, fit_once
 from forcegrasp.compare.geometry import guess
 from forcegrasp.compare.problem import Problem
 from forcegrasp.compare.target import Target
+from forcegrasp.short_repr import ShortRepr
 
 #: Number of starts.
 STARTS = 3
@@ -24,8 +25,8 @@ _SAME_BEYOND = 0.2
 _FLAT = 5.0
 
 
-@dataclass(frozen=True)
-class BaseFit:
+@dataclass(frozen=True, repr=False)
+class BaseFit(ShortRepr):
     """The best of several fits, with the gate that a diagnosis must pass."""
 
     fit: Fit

@@ -12,8 +12,8 @@ from rich.text import Text as Plain
 from forcegrasp.compare import figures
 from forcegrasp.compare.comparison import Cell, Comparison
 from forcegrasp.compare.heldout import rms
-from forcegrasp.compare.report import Picture, Section, Table, Text
 from forcegrasp.compare.target import PHASES, SIGNALS, UNITS, Target
+from forcegrasp.reports.html import Picture, Section, Table, Text
 
 # Error ÷ floor up to which a model is as good as the data can tell.
 _AT_FLOOR = 1.03
@@ -30,6 +30,11 @@ def amount(value: float, unit: str) -> str:
     """A small length or force with its unit."""
     shown, factor = {"m": ("µm", 1e6), "N": ("mN", 1e3)}.get(unit, (unit, 1.0))
     return f"{factor * value:.3g} {shown}" if abs(factor * value) < 1000 else f"{factor * value:.0f} {shown}"
+
+
+def value_text(value: float, digits: int, at_bound: bool) -> str:
+    """A fitted value, marked where it ended at its bound."""
+    return f"{value:.{digits}g}" + (" (at its bound)" if at_bound else "")
 
 
 def words(name: str) -> str:

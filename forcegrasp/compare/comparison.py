@@ -8,6 +8,7 @@ import numpy as np
 
 from forcegrasp.compare.heldout import rms
 from forcegrasp.compare.target import PHASES, SIGNALS, UNITS, Target, contacts
+from forcegrasp.short_repr import ShortRepr
 
 #: What a residual is held against, in reports and where nothing explains it.
 COVARIATES = ("time_since_contact_s", "velocity_m_s", "direction", "force_n", "command_m", "position_m", "time_s")
@@ -27,8 +28,8 @@ class Cell:
     unit: str
 
 
-@dataclass(frozen=True)
-class Comparison:
+@dataclass(frozen=True, repr=False)
+class Comparison(ShortRepr):
     """A model against a measurement set."""
 
     target: Target
@@ -36,6 +37,9 @@ class Comparison:
     residual: np.ndarray  #: (measured − predicted) ÷ noise, ``(G, S, 4)``
     heldout: np.ndarray  #: the same for grasps held out of the fit; NaN where there are none
     floor: float  #: error ÷ noise that a perfect model would leave
+
+    def summary(self) -> str:
+        return f"error {self.floor_ratio():.2f} × noise, a perfect model {self.floor:.2f}"
 
     def cells(self) -> list[Cell]:
         """One cell for each signal and phase that occurs."""

@@ -11,11 +11,14 @@ from forcegrasp.compare.base_fit import BaseFit, rms_error
 from forcegrasp.compare.fit import Fit, Simulators, fit_exactly
 from forcegrasp.compare.floor import beyond_fit, cells, excess, numerical_error, numerical_floor
 from forcegrasp.compare.heldout import heldout_residual, log_likelihood, make_folds, rms
+from forcegrasp.compare.noise import Noise, unlike_said
 from forcegrasp.compare.refine import refine
 from forcegrasp.compare.score import Background, Score, Signatures, null_gains
 from forcegrasp.compare.target import Target
+from forcegrasp.compare.verdict import conclude, explained_share
 from forcegrasp.effects import Effect
 from forcegrasp.effects.quantisation import Quantisation
+from forcegrasp.short_repr import ShortRepr, counted, some
 
 #: Largest number of effects that are looked for.
 MOST_EFFECTS = 6
@@ -25,8 +28,6 @@ ALARM = 0.01
 LEAST_GAIN, LEAST_GAIN_AT_FLOOR = 0.02, 0.1
 #: An effect must explain this share of the mean square beyond the noise.
 LEAST_SHARE = 0.25
-#: Effects must explain this share of it together to be the answer; below it is "unknown".
-EXPLAINED = 0.5
 # Refitted per step: signatures only rank.
 _REFITTED = 5
 # Of these the best ones are fitted to the end.
@@ -45,8 +46,8 @@ _PARALLEL = 0.995
 _NEARLY = 0.95
 
 
-@dataclass(frozen=True, eq=False)
-class Candidate:
+@dataclass(frozen=True, eq=False, repr=False)
+class Candidate(ShortRepr):
     """One effect, refitted together with everything else."""
 
     effect: type[Effect]
@@ -59,6 +60,10 @@ class Candidate:
     largest_fall: float  #: largest share by which the error of a signal in a phase falls
     signature: np.ndarray  #: unit vector, ``(N,)``
 
+    def summary(self) -> str:
+        sizes = some(f"{name} {value:.3g}" for name, value in self.parameters().items())
+        return f"{self.effect.name}: error {self.error_after:.2f} × noise, gain {self.heldout_gain:+.0f}, {sizes}"
+
     @property
     def heldout_gain(self) -> float:
         """Change of the held-out log-likelihood, all grasps together."""
@@ -70,8 +75,8 @@ class Candidate:
         return dict(zip((p.name for p in self.effect.parameters), map(float, self.fit.values[-count:]), strict=True))
 
 
-@dataclass(frozen=True)
-class Step:
+@dataclass(frozen=True, repr=False)
+class Step(ShortRepr):
     """One round of the search."""
 
     verdict: str  #: "effect", "one_of" or "none"
@@ -81,13 +86,17 @@ class Step:
     error_before: float
     error_after: float
 
+    def summary(self) -> str:
+        told = f"error {self.error_before:.2f} → {self.error_after:.2f} × noise"
+        return f"{self.verdict}: {some(self.effects)}; {told}, {counted(len(self.candidates), 'candidate')}"
 
-@dataclass(frozen=True)
-class Diagnosis:
+
+@dataclass(frozen=True, repr=False)
+class Diagnosis(ShortRepr):
     """What the data say that the model lacks."""
 
     verdict: str  #: "effect", "one_of", "explained", "unknown" or "not_fitted"
-    effects: tuple[str, ...]
+    effects: tuple[str, ...]  #: those in the model, in the order found; with "one_of" then the rivals of each
     steps: tuple[Step, ...]
     base: BaseFit
     fit: Fit  #: with the effects that were found
@@ -95,9 +104,25 @@ class Diagnosis:
     folds: tuple[np.ndarray, ...]
     error_before: float
     error_after: float
-    numerical: tuple[np.ndarray, ...] = field(default=())  #: each ``(G, S, 4)``
+    numerical: tuple[np.ndarray, ...] = field(default=())  #: of the final fit, each ``(G, S, 4)``
     floor: float = 1.0  #: error that sensor noise and the model's own numerical error leave
     left: str = ""  #: where there is more than that, in words; empty if nowhere
+    noise: Noise | None = None  #: what the noise is, if the residuals show that it is not what was said
+
+    @property
+    def preferred(self) -> tuple[str, ...]:
+        """The effects that were found and are in the final model: of those that can't be told apart the first."""
+        return tuple(step.effects[0] for step in self.steps if step.verdict != "none")
+
+    @property
+    def explained(self) -> float:
+        """Share of the held-out mean square beyond the noise that the effects found explain."""
+        noise = self.error_after if self.noise is not None and not self.left else 1.0
+        return float(np.clip(explained_share(self.error_before, self.error_after, noise), 0.0, 1.0))
+
+    def summary(self) -> str:
+        told = f"error {self.error_before:.2f} → {self.error_after:.2f} × noise, floor {self.floor:.2f}"
+        return f"{self.verdict}: {some(self.effects)}; {told}"
 
     def heldout(self) -> np.ndarray:
         """Residuals of held-out grasps under the final fit, ``(G, S, 4)``."""
@@ -128,7 +153,8 @@ def diagnose(
     error_before = rms(heldout_residual(fit, target, folds) * (target.sigma / target.sensor_sigma), target)
     if not base.converged:
         return Diagnosis("not_fitted", (), (), base, fit, target, folds, error_before, error_before)
-    numerical = beyond_fit(fit, numerical_error(fit, target))
+    of_base = numerical_error(fit, target)
+    numerical = beyond_fit(fit, of_base)
     floor = numerical_floor(numerical, target)
     steps: list[Step] = []
     if target.quantum.any():
@@ -146,31 +172,26 @@ def diagnose(
             break
         fit = step.candidates[0].fit
         progress(f"found {step.effects[0]}: held-out error {step.error_before:.2f} → {step.error_after:.2f} × noise")
-        if not excess(heldout_residual(fit, target, folds), numerical, target):
+        if not _left(fit, heldout_residual(fit, target, folds), numerical, target)[0]:
             break
     held = heldout_residual(fit, target, folds)
-    error_after, left = rms(held, target), excess(held, numerical, target)
+    error_after, (left, noise) = rms(held, target), _left(fit, held, numerical, target)
     found = [s for s in steps if s.verdict != "none"]
-    verdict = _verdict(found, error_before, error_after, left)
-    names = tuple(s.effects[0] for s in found) if verdict == "effect" else ()
+    verdict = conclude([s.verdict for s in found], error_before, error_after, floor, bool(left))
+    names = [s.effects[0] for s in found] if verdict in ("effect", "one_of") else []
     if verdict == "one_of":
-        names = found[0].effects
+        names += [name for s in found for name in s.effects[1:]]
+    of_final = of_base if fit is base.fit else numerical_error(fit, target)
     return Diagnosis(
-        verdict, names, tuple(steps), base, fit, target, folds, error_before, error_after, numerical, floor, left
-    )
+        verdict, tuple(dict.fromkeys(names)), tuple(steps), base, fit, target, folds, error_before, error_after,
+        of_final, floor, left, noise,
+    )  # fmt: skip
 
 
-def _verdict(found: list[Step], before: float, after: float, left: str) -> str:
-    if not found:
-        return "unknown" if left else "explained"
-    if left and _share(before, after) < EXPLAINED:
-        return "unknown"
-    return "one_of" if len(found) == 1 and found[0].verdict == "one_of" else "effect"
-
-
-def _share(before: float, after: float) -> float:
-    """Share of the mean square beyond the noise that is gone."""
-    return (before**2 - after**2) / max(before**2 - 1, 1e-9)
+def _left(fit: Fit, held: np.ndarray, numerical: Sequence[np.ndarray], target: Target) -> tuple[str, Noise | None]:
+    """Where held-out residuals are more than noise, in words; and the noise, if it is not what was said."""
+    noise = unlike_said(held, numerical, target, fit.predicted)
+    return ("" if noise else excess(held, numerical, target)), noise
 
 
 def _look_further(
@@ -275,8 +296,9 @@ class _Round:
         after = heldout_residual(refit, target, self.folds)
         gains = log_likelihood(after) - log_likelihood(held)
         fall = max((1 - rms(after, target, w) / rms(held, target, w) for _, w in cells(target)), default=0.0)
-        before, behind = rms(held, target), rms(after, target)
-        return Candidate(effect, variant, refit, p_family, gains, behind, _share(before, behind), fall, signature)
+        error = rms(after, target)
+        share = explained_share(rms(held, target), error)
+        return Candidate(effect, variant, refit, p_family, gains, error, share, fall, signature)
 
 
 def _convincing(candidate: Candidate, least_gain: float) -> bool:

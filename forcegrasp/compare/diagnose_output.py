@@ -12,22 +12,27 @@ from rich.text import Text as Plain
 
 from forcegrasp.compare import figures
 from forcegrasp.compare.advice import Advice
-from forcegrasp.compare.compare_output import (
-    covariate_words,
-    dependence_section,
-    noise_sentence,
-    words,
-    worst_cell,
-)
-from forcegrasp.compare.comparison import Comparison
+from forcegrasp.compare.compare_output import dependence_section, noise_sentence, value_text, words, worst_cell
 from forcegrasp.compare.diagnose import Candidate, Diagnosis, Step
+from forcegrasp.compare.diagnose_words import lacks, left_sentence, noise_words, preference
+from forcegrasp.compare.findings import (
+    candidate_json,
+    candidate_parameters,
+    final_warnings,
+    found_parameters,
+    found_steps,
+    no_trace,
+    noise_json,
+    ranking,
+    remaining,
+    where,
+)
 from forcegrasp.compare.fit import Fit
 from forcegrasp.compare.fit_output import ADVICE, steps_picture, symptom_picture
-from forcegrasp.compare.intervals import intervals, standard_errors
-from forcegrasp.compare.report import Picture, Section, Table, Text
+from forcegrasp.compare.intervals import listed, reached_bound
 from forcegrasp.compare.target import PHASES
 from forcegrasp.effects import Effect, get_effect
-from forcegrasp.effects.quantisation import Quantisation
+from forcegrasp.reports.html import Picture, Section, Table, Text
 
 _PRINTED = 5
 
@@ -38,7 +43,9 @@ def diagnosis_json(diagnosis: Diagnosis, advice: Advice | None, tried: Sequence[
         "set": name,
         "verdict": diagnosis.verdict,
         "effects": list(diagnosis.effects),
-        "steps": [_step_json(step) for step in diagnosis.steps],
+        "preferred": list(diagnosis.preferred),
+        "explained_share": diagnosis.explained,
+        "steps": [_step_json(step, diagnosis) for step in diagnosis.steps],
         "ranking": ranking(diagnosis),
         "no_trace": no_trace(diagnosis, tried),
         "parameters": {
@@ -58,132 +65,44 @@ def diagnosis_json(diagnosis: Diagnosis, advice: Advice | None, tried: Sequence[
         "where": where(diagnosis),
         "reason": diagnosis.base.reason,
         "noise_given": diagnosis.target.sigma_known,
+        "noise": noise_json(diagnosis),
+        "warnings": final_warnings(diagnosis),
     }  # fmt: skip
 
 
-def _step_json(step: Step) -> dict[str, Any]:
+def _step_json(step: Step, diagnosis: Diagnosis) -> dict[str, Any]:
     return {
         "verdict": step.verdict,
         "effects": list(step.effects),
+        "preferred_because": preference(step),
         "error_before": step.error_before,
         "error_after": step.error_after,
-        "ranking": [_candidate_json(c) for c in step.candidates],
+        "ranking": [candidate_json(c, diagnosis) for c in step.candidates],
     }
-
-
-def _candidate_json(candidate: Candidate) -> dict[str, Any]:
-    return {
-        "effect": candidate.effect.name,
-        "variant": candidate.variant,
-        "p_family": candidate.p_family,
-        "heldout_gain": candidate.heldout_gain,
-        "floor_ratio_after": candidate.error_after,
-        "parameters": candidate.parameters(),
-    }
-
-
-def ranking(diagnosis: Diagnosis) -> list[dict[str, Any]]:
-    """Effects of the first step, best first: those that were refitted, and then those whose signatures were poor."""
-    nothing = dict.fromkeys(("p_family", "heldout_gain", "floor_ratio_after", "parameters"))
-    rows: list[dict[str, Any]] = []
-    for step in diagnosis.steps:
-        if step.verdict != "none" and not step.candidates:  # found by counting values, without a fit
-            values = {name: entry[0] for name, entry in found_parameters(diagnosis)[step.effects[0]].items()}
-            found = nothing | {"floor_ratio_after": step.error_after, "parameters": values}
-            rows.append({"effect": step.effects[0], "variant": "", **found})
-    first = _first_search(diagnosis)
-    if first is None:
-        return rows
-    rows += [_candidate_json(c) for c in first.candidates]
-    seen = {row["effect"] for row in rows}
-    for score in first.scores:
-        if score.effect.name not in seen:
-            seen.add(score.effect.name)
-            rows.append({"effect": score.effect.name, "variant": score.variant, **nothing})
-    return rows
-
-
-def no_trace(diagnosis: Diagnosis, tried: Sequence[type[Effect]]) -> list[str]:
-    """Effects that change nothing in these grasps at any size, so that nothing can be said about them."""
-    first = _first_search(diagnosis)
-    if first is None:
-        return []
-    scored = {score.effect.name for score in first.scores}
-    known = {effect.name for effect, _ in diagnosis.base.fit.problem.effects}
-    return [e.name for e in tried if e.name not in scored | known and len(e.trials())]
-
-
-def _first_search(diagnosis: Diagnosis) -> Step | None:
-    return next((step for step in diagnosis.steps if step.scores), None)
-
-
-def remaining(diagnosis: Diagnosis) -> Comparison:
-    """What the final model leaves, as a comparison."""
-    fit = diagnosis.fit
-    return Comparison(diagnosis.target, fit.predicted, fit.residual, diagnosis.heldout(), diagnosis.floor)
-
-
-def where(diagnosis: Diagnosis) -> dict[str, Any]:
-    """Where the final model's largest error is, what it goes with, and how much of the rest a model could explain."""
-    left = remaining(diagnosis)
-    cell = worst_cell(left.cells())
-    kind = cell.signal.partition("_")[0]
-    return {
-        "phase": cell.phase,
-        "signal": cell.signal,
-        "ratio": cell.ratio,
-        f"rms_{cell.unit.lower()}": cell.rms,
-        "explained_by": {name: share for name, of, share in left.explanations() if of == kind},
-        "explainable": max(0.0, 1 - 1 / left.floor_ratio() ** 2),
-    }
-
-
-def found_steps(diagnosis: Diagnosis) -> list[tuple[Step, Fit]]:
-    """The steps that found something, each with the fit that it started from."""
-    found, fit = [], diagnosis.base.fit
-    for step in diagnosis.steps:
-        if step.verdict != "none":
-            found.append((step, fit))
-            fit = step.candidates[0].fit if step.candidates else fit
-    return found
-
-
-def found_parameters(diagnosis: Diagnosis) -> dict[str, dict[str, tuple[float, float, float, str]]]:
-    """Value, 95 % interval and unit of the parameters of all effects in the final model."""
-    fit = diagnosis.fit
-    found: dict[str, dict[str, tuple[float, float, float, str]]] = {}
-    errors = standard_errors(fit, list(diagnosis.numerical))
-    for entry, numbers in zip(fit.problem.entries, intervals(fit, errors), strict=True):
-        if entry.effect >= 0:
-            effect = fit.problem.effects[entry.effect][0].name
-            found.setdefault(effect, {})[entry.parameter] = (*numbers, entry.unit)
-    if diagnosis.target.quantum.any():
-        steps = zip(Quantisation.parameters, map(float, diagnosis.target.quantum[[0, 2]]), strict=True)
-        found[Quantisation.name] = {p.name: (step, step, step, p.unit) for p, step in steps}
-    return found
 
 
 def answer(diagnosis: Diagnosis) -> str:
     """The verdict in words."""
-    d, cell = diagnosis, worst_cell(remaining(diagnosis).cells())
-    fall = f"The error on held-out grasps falls from {d.error_before:.2f} to {d.error_after:.2f} × the sensor noise"
-    found = [step.effects[0] for step, _ in found_steps(d)]
+    d, cell, noise = diagnosis, worst_cell(remaining(diagnosis).cells()), noise_words(diagnosis)
+    found = listed(d.preferred) if d.preferred else ""
     place = f"{words(cell.signal)}, {words(cell.phase)} ({cell.ratio:.1f} × noise)"
-    if d.verdict == "effect":
-        rest = "" if not d.left else f" What is left is largest in {place}."
-        return f"The model lacks {_list(d.effects, 'and')}. {fall}; up to {d.floor:.2f} is noise.{rest}"
-    if d.verdict == "one_of":
-        return f"The model lacks {_list(d.effects, 'or')}: these data can't tell which. {fall} with the first of them."
+    if d.verdict in ("effect", "one_of"):
+        fall = f"With {found} the error on held-out grasps falls from {d.error_before:.2f} to {d.error_after:.2f} ×"
+        rest = f"What is left is largest in {place}." if d.left else noise
+        return f"{lacks(d)} {fall} the sensor noise; up to {d.floor:.2f} is noise. {rest}".rstrip()
     if d.verdict == "explained":
+        of_noise = f"the error on held-out grasps is {d.error_before:.2f} × the sensor noise"
+        if noise:
+            return f"The model explains these data: they show no missing effect; {of_noise}. {noise}"
         return (
-            f"The model explains these data: the error on held-out grasps is {d.error_before:.2f} × the sensor noise,"
-            f" and up to {d.floor:.2f} is noise and the simulation's own error. They show no missing effect."
+            f"The model explains these data: {of_noise}, and up to {d.floor:.2f} is noise and the simulation's own"
+            " error. They show no missing effect."
         )
     if d.verdict == "unknown":
-        best = f" {_list(found, 'and')} would only take it down to {d.error_after:.2f} ×." if found else ""
+        best = f"{found} would only take it down to {d.error_after:.2f} ×" if found else "no effect explains it"
         return (
             f"Something is missing, and it is none of the effects I know: the error on held-out grasps is"
-            f" {d.error_before:.2f} × the sensor noise, and no effect explains it.{best} Look at {place}."
+            f" {d.error_before:.2f} × the sensor noise, and {best}. Look at {place}."
         )
     return f"No diagnosis, for the base model is not fitted: {d.base.reason}. To do: {ADVICE}."
 
@@ -198,7 +117,7 @@ def printed(diagnosis: Diagnosis) -> Printed | None:
             fall = f"{step.error_before:.2f} → {step.error_after:.2f}"
             table.add_row(*(Plain(cell, "bold") for cell in (str(number), step.effects[0], "", "", fall, "")))
         for place, candidate in enumerate(step.candidates[:_PRINTED]):
-            name, gain, p, values = _texts(candidate)
+            name, gain, p, values = _texts(candidate, diagnosis)
             cells = ("" if place else str(number), name, gain, p, _error_text(step, candidate), values)
             chosen = candidate.effect.name in step.effects
             table.add_row(*(Plain(cell, "bold" if chosen else "") for cell in cells))
@@ -209,12 +128,20 @@ def _error_text(step: Step, candidate: Candidate) -> str:
     return f"{step.error_before:.2f} → {candidate.error_after:.2f}"
 
 
-def _texts(candidate: Candidate) -> tuple[str, str, str, str]:
+def _texts(candidate: Candidate, diagnosis: Diagnosis) -> tuple[str, str, str, str]:
     """Effect, gain, p, parameters."""
-    units = {p.name: "" if p.unit == "1" else f" {p.unit}" for p in candidate.effect.parameters}
-    values = ", ".join(f"{name} {value:.3g}{units[name]}" for name, value in candidate.parameters().items())
+    found = candidate_parameters(candidate, diagnosis)
+    values = ", ".join(
+        f"{p.name} {_value(candidate.effect, p.name, found[p.name], 3)}{'' if p.unit == '1' else f' {p.unit}'}"
+        for p in candidate.effect.parameters
+    )
     name = f"{candidate.effect.name} {candidate.variant}".strip()
     return name, f"{candidate.heldout_gain:+.0f}", f"{candidate.p_family:.2g}", values
+
+
+def _value(effect: type[Effect], name: str, value: float, digits: int) -> str:
+    p = next(p for p in effect.parameters if p.name == name)
+    return value_text(value, digits, reached_bound(value, p.low, p.high, p.logarithmic, p.null) is not None)
 
 
 def lines(diagnosis: Diagnosis, advice: Advice | None) -> list[str]:
@@ -223,26 +150,21 @@ def lines(diagnosis: Diagnosis, advice: Advice | None) -> list[str]:
     for step, _ in found_steps(diagnosis):
         effect = get_effect(step.effects[0])
         told.append(f"{effect.name}: {effect.symptom}")
-        told += [f"  it could also be: {_list(step.effects[1:], 'or')}"] if len(step.effects) > 1 else []
+        told += [f"  {text}" for text in _final_texts(diagnosis, effect)]
+        told += [f"  it could also be: {listed(step.effects[1:], 'or')}"] if len(step.effects) > 1 else []
     if diagnosis.verdict in ("unknown", "effect", "one_of"):
         told.append(left_sentence(diagnosis))
     if advice is not None:
         told.append(advice.sentence())
-    return [*told, noise_sentence(diagnosis.target)]
+    return [*told, noise_sentence(diagnosis.target), *(f"warning: {warning}" for warning in final_warnings(diagnosis))]
 
 
-def left_sentence(diagnosis: Diagnosis) -> str:
-    """Where the rest of the error is, in words."""
-    rest = where(diagnosis)
-    place = f"{words(rest['signal'])}, {words(rest['phase'])}: {rest['ratio']:.1f} × noise"
-    if not diagnosis.left:
-        return f"what is left is noise; it is largest in {place}"
-    name, share = next(iter(rest["explained_by"].items()))
-    goes = f", of which {share:.0%} goes with {covariate_words(name)}" if share > 0.05 else ""
-    return (
-        f"what is left is largest in {place}{goes}; a better model could explain {rest['explainable']:.0%} of the"
-        " remaining mean square error at most"
-    )
+def _final_texts(diagnosis: Diagnosis, effect: type[Effect]) -> list[str]:
+    """Each parameter of an effect in the final model, with its interval."""
+    return [
+        f"{name} {_value(effect, name, value, 4)}{'' if unit == '1' else f' {unit}'} (95 %: {low:.4g} to {high:.4g})"
+        for name, (value, low, high, unit) in found_parameters(diagnosis).get(effect.name, {}).items()
+    ]
 
 
 def sections(diagnosis: Diagnosis, advice: Advice | None, tried: Sequence[type[Effect]]) -> list[Section]:
@@ -267,26 +189,27 @@ def _step_section(number: int, step: Step, before: Fit, diagnosis: Diagnosis) ->
         seen,
     ]
     rows = [
-        (name, f"{value:.4g}", f"{low:.4g} to {high:.4g}", "" if unit == "1" else unit)
+        (name, _value(effect, name, value, 4), f"{low:.4g} to {high:.4g}", "" if unit == "1" else unit)
         for name, (value, low, high, unit) in found_parameters(diagnosis).get(effect.name, {}).items()
     ]
     if rows:
         blocks.append(Table((f"parameter of {effect.name}", "value", "95 % interval", "unit"), rows))
     alone = len(step.candidates) <= 1
     blocks.append(Text("What else it could be:" + (" no other effect comes near." if alone else ""), strong=True))
-    blocks += [_candidates_table(step)] if step.candidates else []
+    blocks += [_candidates_table(step, diagnosis)] if step.candidates else []
     if len(step.effects) > 1:
-        blocks.append(Text(f"{_list(step.effects, 'and')} can't be told apart by these data."))
-    blocks.append(Text(f"Looks like {_list(effect.look_alikes, 'and')}. What separates them: {effect.separates}."
+        blocks.append(Text(f"{listed(step.effects, 'and')} can't be told apart by these data."))
+    blocks.append(Text(f"Looks like {listed(effect.look_alikes, 'and')}. What separates them: {effect.separates}."
                        if effect.look_alikes else f"What is its own: {effect.separates}."))  # fmt: skip
     return Section(f"{number}. {' or '.join(step.effects)}", blocks)
 
 
-def _candidates_table(step: Step) -> Table:
-    head = ("effect", "held-out gain", "p (family-wise)", "error ÷ noise", "parameters")
+def _candidates_table(step: Step, diagnosis: Diagnosis) -> Table:
+    values = "parameters (of effects in the final model: there; of others: as fitted in this step)"
+    head = ("effect", "held-out gain", "p (family-wise)", "error ÷ noise", values)
     rows = []
     for c in step.candidates:
-        name, gain, p, values = _texts(c)
+        name, gain, p, values = _texts(c, diagnosis)
         rows.append((name, gain, p, _error_text(step, c), values))
     marked = frozenset(i for i, c in enumerate(step.candidates) if c.effect.name in step.effects)
     return Table(head, rows, marked)
@@ -354,9 +277,3 @@ def _left_sections(diagnosis: Diagnosis) -> list[Section]:
         Text(f"S{noise_sentence(target)[1:]}."),
     ]
     return [Section("What is left", blocks), dependence_section(left, "What the rest goes with")]
-
-
-def _list(names: Sequence[str], word: str) -> str:
-    """a, b and c."""
-    *first, last = names
-    return f"{', '.join(first)} {word} {last}" if first else last

@@ -13,10 +13,11 @@ from scipy.stats import chi2, f, t
 from forcegrasp.compare import final_force_output
 from forcegrasp.compare.final_force_causes import CAUSES, causes_of
 from forcegrasp.compare.final_force_shapes import BASE, FURTHER, Shape, ShapeFit, bootstrap, captured, fit_shape
-from forcegrasp.compare.report import Section
 from forcegrasp.measure.schema import FinalForceTable
 from forcegrasp.physics.gripper import Gripper
 from forcegrasp.physics.gripper_parts import Training
+from forcegrasp.reports.html import Section
+from forcegrasp.short_repr import ShortRepr, some
 
 #: Rows that an object must have to be fitted.
 LEAST_ROWS = 4
@@ -31,16 +32,16 @@ _LARGEST_STEP_N = 0.1
 _SEED = 20230
 
 
-@dataclass(frozen=True)
-class Rows:
+@dataclass(frozen=True, repr=False)
+class Rows(ShortRepr):
     """The rows of one object that are fitted."""
 
     delta_m: np.ndarray  #: ``(n,)``
     force_n: np.ndarray  #: ``(n,)``
 
 
-@dataclass(frozen=True)
-class Candidate:
+@dataclass(frozen=True, repr=False)
+class Candidate(ShortRepr):
     """One shape on all objects, each with its own parameters."""
 
     shape: Shape
@@ -60,8 +61,8 @@ class Candidate:
         return np.concatenate([fit.residual for fit in self.fits.values()])
 
 
-@dataclass(frozen=True)
-class TableAnalysis:
+@dataclass(frozen=True, repr=False)
+class TableAnalysis(ShortRepr):
     """A table of final forces against the base model's static law, and what else would describe it."""
 
     table: FinalForceTable
@@ -81,6 +82,9 @@ class TableAnalysis:
     slope_ratio: tuple[float, float, float] | None = None  #: largest ÷ smallest slope with its 95 % interval
     shared: dict[str, float] = field(default_factory=dict)  #: rms error, N, with one onset "travel" or one "force"
     training: Training | None = None  #: of the gripper, if its objects' force scale follows the softness κ
+
+    def summary(self) -> str:
+        return f"{self.verdict}: {some(self.effects) or self.reason}"
 
     @property
     def best(self) -> Candidate | None:

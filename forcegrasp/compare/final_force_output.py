@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from forcegrasp.compare.figures import plain
 from forcegrasp.compare.final_force_causes import CAUSES, MENU, NO_TRACE, Onset, grasps_for
-from forcegrasp.compare.report import Picture, Section, Table, Text
+from forcegrasp.reports.html import Picture, Section, Table, Text
 
 if TYPE_CHECKING:
     from forcegrasp.compare.final_force import Candidate, TableAnalysis

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import least_squares
 
+from forcegrasp.short_repr import ShortRepr
+
 _GRID = 201
 # Rows are left out one by one up to this many; more of them in groups, to bound the time.
 _FOLDS = 60
@@ -38,8 +40,8 @@ class Shape:
         return _orthonormal(self.columns(x, self.grid(x)))
 
 
-@dataclass(frozen=True)
-class ShapeFit:
+@dataclass(frozen=True, repr=False)
+class ShapeFit(ShortRepr):
     """A shape fitted to the rows of one object."""
 
     shape: Shape

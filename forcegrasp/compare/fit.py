@@ -11,6 +11,7 @@ from forcegrasp.compare.predict import predict
 from forcegrasp.compare.problem import Problem
 from forcegrasp.compare.target import Target
 from forcegrasp.measure.replay import Replay
+from forcegrasp.short_repr import ShortRepr, counted
 
 # Slopes are measured anew after so many steps; in between they follow the values (Broyden 1965), if they are few.
 _SLOPES_LAST, _FEW = 3, 16
@@ -33,8 +34,8 @@ class Simulators:
         self.cheap = self.exact if gripper.fast == "none" else Replay(gripper, grasps, tier="fitting")
 
 
-@dataclass(frozen=True)
-class Fit:
+@dataclass(frozen=True, repr=False)
+class Fit(ShortRepr):
     """Fitted parameters with all that an evidence needs. N residuals (G · S · 4), p entries."""
 
     problem: Problem
@@ -45,6 +46,9 @@ class Fit:
     correction: np.ndarray  #: exact minus cheap prediction, ``(G, S, 4)``
     gradient: float  #: largest |slope| of the cost along one coordinate, in its own standard error; 0 at an optimum
     evaluations: int
+
+    def summary(self) -> str:
+        return f"{counted(len(self.vector), 'parameter')}, sum of squared residuals {self.cost:.4g}"
 
     @property
     def cost(self) -> float:

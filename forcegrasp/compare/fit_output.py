@@ -14,15 +14,16 @@ from rich.text import Text as Plain
 
 from forcegrasp.compare import figures
 from forcegrasp.compare.base_fit import BaseFit, rms_error
-from forcegrasp.compare.compare_output import amount, noise_sentence, words
+from forcegrasp.compare.compare_output import amount, noise_sentence, value_text, words
 from forcegrasp.compare.fit import Fit
 from forcegrasp.compare.heldout import heldout_residual, make_folds, rms
-from forcegrasp.compare.report import Picture, Section, Table, Text
+from forcegrasp.compare.intervals import reached_bound
 from forcegrasp.compare.target import SIGNALS, UNITS, Target
 from forcegrasp.compare.workflow import Added
 from forcegrasp.effects import Effect
 from forcegrasp.effects.model_file import Fitted, Model
 from forcegrasp.effects.quantisation import Quantisation
+from forcegrasp.reports.html import Picture, Section, Table, Text
 
 #: What to do about a fit that did not converge.
 ADVICE = (
@@ -40,6 +41,13 @@ class Row:
     low: float  #: bound
     high: float
     logarithmic: bool
+    null: float = float("nan")  #: where an effect's parameter does nothing; base parameters have no such value
+
+    @property
+    def text(self) -> str:
+        """The value, marked where it ended at its bound."""
+        bound = reached_bound(self.fitted.value, self.low, self.high, self.logarithmic, self.null)
+        return value_text(self.fitted.value, 4, bound is not None)
 
     def place(self, value: float) -> float:
         """Where a value lies between the bounds, 0 to 1."""
@@ -59,7 +67,8 @@ def parameter_rows(model: Model) -> Iterator[Row]:
             yield Row(f"{name}{suffix}", fitted, p.low, p.high, p.logarithmic)
     for found in model.effects:
         for p in found.effect.parameters:
-            yield Row(f"{found.effect.name}.{p.name}", found.parameters[p.name], p.low, p.high, p.logarithmic)
+            name, fitted = f"{found.effect.name}.{p.name}", found.parameters[p.name]
+            yield Row(name, fitted, p.low, p.high, p.logarithmic, p.null)
 
 
 def parameters_json(model: Model) -> dict[str, Any]:
@@ -83,7 +92,7 @@ def printed_parameters(model: Model, most: int = 20) -> Printed:
 
 def _texts(row: Row) -> tuple[str, str, str, str]:
     f = row.fitted
-    return row.name, f"{f.value:.4g}", f"{f.low:.4g} to {f.high:.4g}", "" if f.unit == "1" else f.unit
+    return row.name, row.text, f"{f.low:.4g} to {f.high:.4g}", "" if f.unit == "1" else f.unit
 
 
 def parameters_section(model: Model) -> Section:

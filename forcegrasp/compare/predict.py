@@ -9,10 +9,11 @@ import numpy as np
 
 from forcegrasp.effects import Effect
 from forcegrasp.measure.replay import EffectOn, Motion, Replay, join
+from forcegrasp.short_repr import ShortRepr
 
 
-@dataclass(frozen=True)
-class Applied:
+@dataclass(frozen=True, repr=False)
+class Applied(ShortRepr):
     """An effect with one set of parameters, on all grasps. ``values``: ``(parameters,)``."""
 
     effect: type[Effect]
@@ -20,8 +21,8 @@ class Applied:
     values: np.ndarray
 
 
-@dataclass(frozen=True)
-class Case:
+@dataclass(frozen=True, repr=False)
+class Case(ShortRepr):
     """A whole model of a set: base parameters of each grasp, and effects."""
 
     base: dict[str, np.ndarray]  #: name → ``(G,)``

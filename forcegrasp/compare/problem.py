@@ -11,10 +11,11 @@ from forcegrasp.compare.predict import Applied, Case
 from forcegrasp.effects import Effect
 from forcegrasp.measure.schema import MeasuredGrasp
 from forcegrasp.physics.gripper import Gripper
+from forcegrasp.short_repr import ShortRepr
 
 
-@dataclass(frozen=True)
-class Entry:
+@dataclass(frozen=True, repr=False)
+class Entry(ShortRepr):
     """One number that a fit may change."""
 
     name: str  #: for people: "rho_m of sponge", "backlash.gap_m"

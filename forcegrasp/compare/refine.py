@@ -11,14 +11,15 @@ from forcegrasp.compare.fit import Fit, Simulators, fit_once
 from forcegrasp.compare.problem import Problem
 from forcegrasp.compare.score import Background, Score, best_sizes
 from forcegrasp.compare.target import Target
+from forcegrasp.short_repr import ShortRepr
 
 # At its best size an effect promises nearly what a fit will gain: one that promises less than this share of the best
 # gain has lost.
 _LOST = 0.4
 
 
-@dataclass(frozen=True, eq=False)
-class Refined:
+@dataclass(frozen=True, eq=False, repr=False)
+class Refined(ShortRepr):
     """A rough fit with one more effect."""
 
     score: Score  #: the signature that it started from

@@ -12,6 +12,7 @@ from forcegrasp.compare.fit import Fit, Simulators
 from forcegrasp.compare.predict import Applied, Case, predict
 from forcegrasp.compare.target import Target
 from forcegrasp.effects import Effect
+from forcegrasp.short_repr import ShortRepr
 
 # A signature stands for all smaller sizes, and for sizes up to this much larger than the one it was simulated with.
 _REACH = 3.0
@@ -23,8 +24,8 @@ _Found = tuple[np.ndarray, float, np.ndarray] | None
 _SIZES = (0.45, 0.67, 1.0, 1.4, 1.9, 2.6)
 
 
-@dataclass(frozen=True)
-class Score:
+@dataclass(frozen=True, repr=False)
+class Score(ShortRepr):
     """The best signature of one effect and variant."""
 
     effect: type[Effect]

@@ -10,6 +10,7 @@ import numpy as np
 from forcegrasp.compare.quantised import find_step
 from forcegrasp.errors import MeasurementError
 from forcegrasp.measure.schema import MeasuredGrasp, MeasurementSet
+from forcegrasp.short_repr import ShortRepr
 
 #: The signals, in the order of every array's last axis.
 SIGNALS = ("position_l", "position_r", "force_l", "force_r")
@@ -22,8 +23,8 @@ _QUANTUM = 1.0
 _HELD_S, _YOUNG_S = 0.3, 0.2
 
 
-@dataclass(frozen=True)
-class Target:
+@dataclass(frozen=True, repr=False)
+class Target(ShortRepr):
     """Measured signals of all grasps, padded to the longest.
 
     Shapes: G grasps, S samples, 4 signals (:data:`SIGNALS`).

@@ -27,6 +27,7 @@ from forcegrasp.errors import ConfigError, MeasurementError
 from forcegrasp.measure import FinalForceTable, MeasurementSet, check_set, check_table, read_set
 from forcegrasp.physics.gripper import Gripper
 from forcegrasp.physics.gripper_file import load_gripper
+from forcegrasp.short_repr import ShortRepr, counted
 
 #: A diagnosis needs so many grasps: with fewer, nothing can be held out.
 LEAST_GRASPS = 6
@@ -37,16 +38,19 @@ Progress = Callable[[str], None]
 Measured = TypeVar("Measured", bound=MeasurementSet | FinalForceTable, covariant=True)
 
 
-@dataclass(frozen=True)
-class Loaded(Generic[Measured]):
+@dataclass(frozen=True, repr=False)
+class Loaded(ShortRepr, Generic[Measured]):
     """A measurement set that was read and checked."""
 
     measured: Measured
     gripper: Gripper
     warnings: list[str]
 
+    def summary(self) -> str:
+        return f"{self.measured.summary()}; {counted(len(self.warnings), 'warning')}"
 
-def load(path: Path) -> Loaded[MeasurementSet] | Loaded[FinalForceTable]:
+
+def load(path: str | Path) -> Loaded[MeasurementSet] | Loaded[FinalForceTable]:
     """Reads and checks a set.
 
     Raises:
@@ -133,8 +137,8 @@ def diagnose_set(
     return diagnose(target, base, simulators, chosen, rng, progress), simulators
 
 
-@dataclass(frozen=True)
-class Added:
+@dataclass(frozen=True, repr=False)
+class Added(ShortRepr):
     """A model with an effect added, against the same model without it."""
 
     target: Target
@@ -143,6 +147,9 @@ class Added:
     error_before: float  #: held-out rms residual ÷ noise
     error_after: float
     model: Model
+
+    def summary(self) -> str:
+        return f"error {self.error_before:.2f} → {self.error_after:.2f} × noise, {self.model!r}"
 
 
 def add_effect(loaded: Loaded[MeasurementSet], model: Model, effect: type[Effect], progress: Progress) -> Added:

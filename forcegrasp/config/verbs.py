@@ -135,6 +135,7 @@ class EvaluateConfig:
         source="paper, Fig. 2",
     )
     out: str = option("", "where to write; runs/evaluate_TIME if empty")
+    detail: bool = option(False, "print all tables, not just the summary; report.html has them anyway")
     baseline: str = option("force_pi", "policy that the others are held against, if it takes part")
     objects: str = option(
         "", "file of objects to grasp instead of a grid of softness values; `paper` has the six of its Table 1"

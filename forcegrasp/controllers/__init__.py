@@ -7,7 +7,7 @@ from collections.abc import Callable
 from tensordict.nn import TensorDictModuleBase
 
 from forcegrasp.controllers.force_pi import ForcePI
-from forcegrasp.controllers.reference import Constant, Informed
+from forcegrasp.controllers.reference import Constant, InformedFeedForward
 from forcegrasp.errors import ConfigError, closest
 from forcegrasp.physics.gripper import Gripper
 from forcegrasp.physics.gripper_file import default_gripper
@@ -15,7 +15,7 @@ from forcegrasp.physics.gripper_file import default_gripper
 #: Name → constructor, as named in ``policies=[...]``.
 CONTROLLERS: dict[str, Callable[[Gripper], TensorDictModuleBase]] = {
     "force_pi": ForcePI,
-    "informed": Informed,
+    "informed": InformedFeedForward,
     "close": lambda gripper: Constant(-1.0),
     "nothing": lambda gripper: Constant(0.0),
 }
@@ -32,4 +32,4 @@ def make_controller(name: str, gripper: Gripper | None = None) -> TensorDictModu
     return CONTROLLERS[name](gripper or default_gripper())
 
 
-__all__ = ["CONTROLLERS", "Constant", "ForcePI", "Informed", "make_controller"]
+__all__ = ["CONTROLLERS", "Constant", "ForcePI", "InformedFeedForward", "make_controller"]

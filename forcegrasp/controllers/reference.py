@@ -1,4 +1,4 @@
-"""Controllers that mark what is possible: doing nothing, only closing, and knowing the object."""
+"""Controllers to hold others against: doing nothing, only closing, and a feed-forward that knows the object."""
 
 from __future__ import annotations
 
@@ -26,11 +26,12 @@ class Constant(TensorDictModuleBase):
         return tensordict.set("action", torch.full_like(tensordict.get("joint_position"), self.value))
 
 
-class Informed(TensorDictModuleBase):
-    """Knows the object's force scale: waits on first touch, then commands the delta whose force is the goal.
+class InformedFeedForward(TensorDictModuleBase):
+    """Static feed-forward that is told the object's force scale: waits on first touch, then commands one position.
 
-    No controller that must find out the softness by touch can be expected to do better. f = f_max · f_α · Δq / Δq_max in the
-    simulator, hence a = −f_goal / (f_max · f_α).
+    f = f_max · f_α · Δq / Δq_max at rest in the simulator, hence a = −f_goal / (f_max · f_α) once every reading has shown
+    contact. It looks at no force and makes nothing faster, so that it is no upper bound: the force rises as the servo lets
+    it, and a controller that pushes harder at first can be better.
     """
 
     def __init__(self, gripper: Gripper | None = None) -> None:

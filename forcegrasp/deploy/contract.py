@@ -51,7 +51,7 @@ class Contract:
     frames: int = 3  #: o(t) stacked, the oldest first; at the start the first one repeated
     position_scale_per_m: float = 2 / 0.045  #: position part = scale · q + offset
     position_offset: float = -1.0
-    contact_threshold_n: float = 0.05  #: f_θ: a finger has had contact once its force exceeded this
+    contact_threshold_n: float = 0.05  #: f_θ; a finger has had contact once its force exceeded this
     inductive_bias: bool = True  #: whether Δq is scaled by φ (paper, eq. 7)
     bias_one_contact: float = 0.1  #: φ of a finger that waits for the other
     bias_floor: float = 0.9  #: smallest φ with both fingers in contact

@@ -19,7 +19,7 @@ from forcegrasp.doctor.packages import installed
 DATA = {
     "conf": ("train.yaml", "evaluate.yaml", "experiment/ib.yaml", "budget/quick.yaml"),
     "assets": ("tiago.xml", "tiago.yaml"),
-    "compare": ("report.html",),
+    "reports": ("report.html",),
 }
 AGAIN = "install it again: pip install . in a checkout, or make setup"
 

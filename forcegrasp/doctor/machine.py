@@ -56,7 +56,7 @@ def check_memory() -> Iterator[Finding]:
 
 def _available() -> int | None:
     try:
-        lines = MEMORY.read_text().splitlines()
+        lines = MEMORY.read_text("utf-8").splitlines()
     except OSError:
         return None
     return next((1024 * int(line.split()[1]) for line in lines if line.startswith("MemAvailable:")), None)

@@ -62,7 +62,7 @@ def check_physics() -> Iterator[Finding]:
 
 def check_renderer() -> Iterator[Finding]:
     """What videos are made with: tried in turn in a process each, as videos are."""
-    from forcegrasp.evaluate.video import NO_RENDERER, backends
+    from forcegrasp.physics.scene_renderer import backends, no_renderer
 
     asked = os.environ.get("MUJOCO_GL")
     if asked in ("disable", "disabled", "off", "false", "0"):
@@ -72,5 +72,5 @@ def check_renderer() -> Iterator[Finding]:
         if "rendered" in run_python("-c", _RENDER, MUJOCO_GL=backend).output:
             yield fine("videos", f"rendered with {backend}")
             return
-    remedy = "unset MUJOCO_GL, or mend what it names" if asked else NO_RENDERER.partition("; ")[2]
-    yield warning("videos", f"nothing renders ({', '.join(backends())} tried); all else works without", remedy)
+    told = f"nothing renders ({', '.join(backends())} tried); all else works without"
+    yield warning("videos", told, no_renderer().partition("; ")[2])

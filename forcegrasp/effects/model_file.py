@@ -20,6 +20,7 @@ from forcegrasp.effects import Effect, get_effect
 from forcegrasp.errors import ConfigError, closest
 from forcegrasp.physics.gripper import Gripper
 from forcegrasp.physics.gripper_file import load_gripper
+from forcegrasp.short_repr import ShortRepr, counted, cut, some
 from forcegrasp.whole_file import write_whole
 
 FORMAT = "forcegrasp-model/1"
@@ -39,13 +40,17 @@ class Fitted:
     unit: str = ""
 
 
-@dataclass(frozen=True)
-class FoundEffect:
+@dataclass(frozen=True, repr=False)
+class FoundEffect(ShortRepr):
     """An effect of a model, with its parameters."""
 
     effect: type[Effect]
     variant: str
     parameters: dict[str, Fitted]
+
+    def summary(self) -> str:
+        sizes = [f"{name} {fitted.value:.4g} {fitted.unit}" for name, fitted in self.parameters.items()]
+        return f"{self.effect.name} {self.variant}".strip() + f": {some(sizes)}"
 
     @property
     def values(self) -> np.ndarray:
@@ -53,8 +58,8 @@ class FoundEffect:
         return np.array([self.parameters[p.name].value for p in self.effect.parameters])
 
 
-@dataclass(frozen=True)
-class Model:
+@dataclass(frozen=True, repr=False)
+class Model(ShortRepr):
     """A gripper's fitted base parameters, and the effects that were found."""
 
     gripper: Gripper
@@ -65,13 +70,18 @@ class Model:
     data: dict[str, str] = field(default_factory=dict)  #: set and fingerprint
     warnings: tuple[str, ...] = ()
 
+    def summary(self) -> str:
+        effects = some(e.effect.name for e in self.effects) or "none"
+        return f"{cut(self.gripper.name)}, effects: {effects}; {counted(len(self.warnings), 'warning')}"
 
-def write_model(model: Model, path: Path) -> None:
+
+def write_model(model: Model, path: str | Path) -> None:
     """Writes a model as YAML, whole or not at all.
 
     Raises:
       ConfigError: if the file can't be written.
     """
+    path = Path(path)
     content: dict[str, Any] = {
         "format": FORMAT,
         "gripper": _gripper_name(model.gripper),
@@ -103,14 +113,13 @@ def write_model(model: Model, path: Path) -> None:
         raise ConfigError(f"{path}: could not write the model ({error.strerror})") from error
 
 
-def read_model(path: Path) -> Model:
+def read_model(path: str | Path) -> Model:
     """Reads a model; ``virtual_robot`` is the one that comes with the package.
 
     Raises:
       ConfigError: names the file, the key, and what it must be.
     """
-    if str(path) == SHIPPED:
-        path = Path(str(files("forcegrasp.assets") / f"{SHIPPED}.yaml"))
+    path = Path(str(files("forcegrasp.assets") / f"{SHIPPED}.yaml")) if str(path) == SHIPPED else Path(path)
     try:
         raw = plain_yaml.load(path)
     except (OSError, plain_yaml.PlainYamlError) as error:

@@ -13,15 +13,16 @@ from forcegrasp.physics.gripper import Gripper
 from forcegrasp.physics.plant import Plant
 
 
-def read_model_of(gripper: Gripper, path: Path | str) -> Model:
-    """Reads a model of this gripper.
+def read_model_of(gripper: Gripper, source: Model | str | Path) -> Model:
+    """Returns a model of this gripper, from its file unless it is one.
 
     Raises:
       ConfigError: if it can't be read, or is of another gripper.
     """
-    model = read_model(Path(path))
+    model = source if isinstance(source, Model) else read_model(Path(source))
     if model.gripper.name != gripper.name:
-        raise ConfigError(f"model={path}: is of gripper {model.gripper.name}, and gripper={gripper.name} is asked for")
+        name = "model" if isinstance(source, Model) else f"model={source}"
+        raise ConfigError(f"{name}: is of gripper {model.gripper.name}, and gripper={gripper.name} is asked for")
     return model
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 from torchrl.envs import TransformedEnv
@@ -19,6 +20,7 @@ from forcegrasp.config import (
     validate,
 )
 from forcegrasp.effects.model_file import Model
+from forcegrasp.effects.variation import read_model_of
 from forcegrasp.env.grasp_env import GraspEnv
 from forcegrasp.errors import ConfigError
 from forcegrasp.physics import GraspParameters, Gripper, load_gripper
@@ -55,30 +57,30 @@ def build_env(
     action: ActionConfig | None = None,
     reward: RewardConfig | None = None,
     sampler: Callable[[np.random.Generator, np.ndarray], GraspParameters] | None = None,
-    model: Model | None = None,
+    model: Model | str | Path | None = None,
     seed: int = 0,
 ) -> TransformedEnv:
     """Returns ``n`` grasps with ``observation`` ``(n, size · frames)`` in and ``action`` ``(n, motors)`` in [−1, 1] out.
 
     Readings come first (noise), then what is computed from readings (contact, error), then memory, then the stacked
     observation; on the way back the action is denormalised, then biased. Parts left out use their defaults, and options
-    left out the gripper's (by name, or the path of its description).
-    A ``model`` fitted to measurements brings its base parameters and effects, drawn anew for every grasp.
+    left out the gripper's (by name, or the path of its description). A ``model`` fitted to measurements, or its file,
+    brings its base parameters and effects, drawn anew for every grasp.
 
     Raises:
-      ConfigError: if an option is out of its range, or the gripper reads no forces.
+      ConfigError: if an option is out of its range, the gripper reads no forces, or the model can't be read or is of
+        another gripper.
     """
     if not isinstance(gripper, Gripper):
         gripper = load_gripper(gripper)
     if not gripper.forces:
-        raise ConfigError(
-            f"gripper={gripper.name}: {NO_FORCES}"
-        )
+        raise ConfigError(f"gripper={gripper.name}: {NO_FORCES}")
     sensors, observation = complete(sensors or SensorConfig(), gripper), observation or ObservationConfig()
     action, reward = complete(action or ActionConfig(), gripper), reward or RewardConfig()
     for name, part in (("sensors", sensors), ("observation", observation), ("action", action)):
         validate(part, f"{name}.")
-    grasps = GraspEnv(n, physics, grasp, reward, sampler, model=model, gripper=gripper)
+    known = None if model is None else read_model_of(gripper, model)
+    grasps = GraspEnv(n, physics, grasp, reward, sampler, model=known, gripper=gripper)
     transforms: list[Transform] = [
         ObservationNoise(
             in_keys=["measured_position", "measured_force"],

@@ -37,7 +37,7 @@ OBSERVATIONS = {
 
 
 class GraspEnv(EnvBase):
-    """``n`` grasps at once. Action: ``joint_delta``, u = Δq_des, m or rad, ``(n, motors)``; see :data:`OBSERVATIONS`.
+    """``n`` grasps at once. Action: ``joint_delta``, u = Δq_des, m or rad, ``(n, motors)``; see ``OBSERVATIONS``.
 
     The reward is α₁ r_force + α₂ r_obj of paper eq. 11, from the true state; r_act needs the policy's own actions and
     is added by :class:`~forcegrasp.transforms.ActionChangePenalty`. An episode is truncated, never terminated.

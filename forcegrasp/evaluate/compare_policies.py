@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import torch
+from matplotlib.figure import Figure
 from rich.console import Console
 from rich.progress import track
 from tensordict import TensorDictBase
@@ -15,36 +16,40 @@ from tensordict import TensorDictBase
 from forcegrasp.config import EvaluateConfig, RewardConfig
 from forcegrasp.effects.variation import read_tiago_model
 from forcegrasp.env.episodes import FIGURES, summarise
+from forcegrasp.evaluate.colours import policy_colours
 from forcegrasp.evaluate.contestants import load_contestants
 from forcegrasp.evaluate.grids import Grid, kappa_grid, object_grid, read_objects
+from forcegrasp.evaluate.page import write_page
 from forcegrasp.evaluate.plots import cell_boxes, force_traces
 from forcegrasp.evaluate.rollouts import roll_out
 from forcegrasp.evaluate.statistics import Bootstrap
-from forcegrasp.evaluate.tables import markdown, print_report
+from forcegrasp.evaluate.summary import print_summary, simulator_notes
+from forcegrasp.evaluate.tables import markdown
 from forcegrasp.gpu import check_engine
 
 #: Figures of which more is better; of the others less is.
 _MORE_IS_BETTER = ("force_reward_normalised", "force_reward_paper", "force_reward_measured")
 
 
-def evaluate(config: EvaluateConfig, out: Path, console: Console | None = None) -> dict:
-    """Rolls every policy out on the same grasps; prints tables and writes everything into ``out``.
+def evaluate(config: EvaluateConfig, out: str | Path, console: Console | None = None) -> dict:
+    """Rolls every policy out on the same grasps; prints a summary and writes everything into ``out``.
 
-    Writes ``evaluation.json`` (the returned summary), ``tables.md``, ``trials.csv`` (one row per trial),
-    ``force_reward.png``, ``displacement.png``, and ``traces_<policy>.png``.
+    Writes ``report.html``, ``evaluation.json`` (the returned summary), ``tables.md``, ``trials.csv`` (one row per
+    trial), ``force_reward.png``, ``displacement.png``, and ``traces_<policy>.png``.
 
     Raises:
       ConfigError, CheckpointError, MeasurementError, PhysicsError: with what to do about it.
     """
-    console = console or Console()
+    out, console = Path(out), console or Console()
     torch.set_num_threads(1)
     check_engine(config.physics)
     model = read_tiago_model(config.model) if config.model else None
     contestants = load_contestants(config.policies)
     baseline = config.baseline if config.baseline in {c.name for c in contestants} else ""
-    grid = _grid(config)
+    grid, colours = _grid(config), policy_colours(c.name for c in contestants)
     out.mkdir(parents=True, exist_ok=True)
     figures: dict[str, dict[str, np.ndarray]] = {}
+    traces: dict[str, Figure] = {}
     for contestant in track(contestants, description="evaluating", console=console, transient=True):
         episodes = roll_out(
             contestant.policy,
@@ -60,7 +65,7 @@ def evaluate(config: EvaluateConfig, out: Path, console: Console | None = None) 
         )
         summary = summarise(episodes, config.sensors)
         figures[contestant.name] = {k: v.double().numpy().reshape(len(grid.cells), -1) for k, v in summary.items()}
-        force_traces(_spread(episodes), contestant.name).savefig(out / f"traces_{contestant.name}.png", dpi=110)
+        traces[contestant.name] = force_traces(_spread(episodes), contestant.name, colours[contestant.name])
     report = {
         "seed": config.seed,
         "trials": grid.trials,
@@ -70,22 +75,32 @@ def evaluate(config: EvaluateConfig, out: Path, console: Console | None = None) 
         "what": grid.what,
         "cells": grid.cells,
         "baseline": baseline,
+        "notes": simulator_notes(config.model, contestants),
         "policies": _describe(figures, baseline, config.seed),
     }
     (out / "tables.md").write_text(markdown(report), "utf-8")
     (out / "evaluation.json").write_text(json.dumps(report, indent=1, ensure_ascii=False) + "\n", "utf-8")
     _write_trials(out / "trials.csv", grid, figures)
-    rewards = {name: values["force_reward_normalised"] for name, values in figures.items()}
-    cell_boxes(rewards, grid.cells, grid.what, f"force reward of an episode ({config.grasp.steps} at best)").savefig(
-        out / "force_reward.png", dpi=130
-    )
-    moved = {name: np.maximum(values["displacement_total_mm"], 1e-3) for name, values in figures.items()}
-    cell_boxes(moved, grid.cells, grid.what, "object moved in all [mm]", log=True).savefig(
-        out / "displacement.png", dpi=130
-    )
-    print_report(report, console)
-    console.print(f"figures, trials and summary are in {out}", highlight=False)
+    boxes = _boxes(figures, grid, config.grasp.steps)
+    for name, figure in boxes.items():
+        figure.savefig(out / f"{name}.png", dpi=130)
+    for name, figure in traces.items():
+        figure.savefig(out / f"traces_{name}.png", dpi=110)
+    page = write_page(out / "report.html", report, boxes, traces)
+    print_summary(report, console, config.detail)
+    more = "" if config.detail else ", which has all tables, as has detail=true"
+    console.print(f"report: {page}{more}", highlight=False, markup=False, soft_wrap=True)
     return report
+
+
+def _boxes(figures: dict[str, dict[str, np.ndarray]], grid: Grid, steps: int) -> dict[str, Figure]:
+    """Box plots by the name of their file."""
+    rewards = {name: values["force_reward_normalised"] for name, values in figures.items()}
+    moved = {name: np.maximum(values["displacement_total_mm"], 1e-3) for name, values in figures.items()}
+    return {
+        "force_reward": cell_boxes(rewards, grid.cells, grid.what, f"force reward of an episode ({steps} at best)"),
+        "displacement": cell_boxes(moved, grid.cells, grid.what, "object moved in all [mm]", log=True),
+    }
 
 
 def _grid(config: EvaluateConfig) -> Grid:
@@ -115,7 +130,7 @@ def _describe(figures: dict[str, dict[str, np.ndarray]], baseline: str, seed: in
 def _write_trials(path: Path, grid: Grid, figures: dict[str, dict[str, np.ndarray]]) -> None:
     columns = ["policy", "cell", "kappa", "b2", "radius_m", "offset_m", "goal_force_n", *FIGURES]
     cells = np.repeat(grid.cells, grid.trials)
-    with open(path, "w", newline="") as file:
+    with open(path, "w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file)
         writer.writerow(columns)
         for name, values in figures.items():

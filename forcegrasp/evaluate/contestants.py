@@ -12,6 +12,7 @@ from forcegrasp.controllers import CONTROLLERS, make_controller
 from forcegrasp.errors import ConfigError, closest
 from forcegrasp.policies import shipped_policies
 from forcegrasp.runs.policy import load_policy
+from forcegrasp.runs.run_dir import RunDir
 
 
 @dataclass
@@ -22,6 +23,8 @@ class Contestant:
     policy: TensorDictModuleBase
     action: ActionConfig
     observation: ObservationConfig
+    model: str = ""  #: what it was trained with, as it was named then
+    model_file: Path | None = None  #: the run's own copy of it, if there is one
 
 
 def load_contestants(names: list[str]) -> list[Contestant]:
@@ -48,7 +51,16 @@ def load_contestants(names: list[str]) -> list[Contestant]:
             policy, config = load_policy(name)
         if label in contestants:
             raise ConfigError(f"policies: {label} is named twice")
-        contestants[label] = Contestant(label, policy, config.action, config.observation)
+        parts = config.action, config.observation
+        contestants[label] = Contestant(label, policy, *parts, config.model, _model_file(name, config))
     if len(paths) < len(names):
         raise ConfigError(f"policies={names}: one is named twice")
     return list(contestants.values())
+
+
+def _model_file(name: str, config: TrainConfig) -> Path | None:
+    if not config.model or name in shipped_policies():
+        return None
+    path = Path(name)
+    copy = RunDir(path.parent.parent if path.suffix == ".safetensors" else path).model_path
+    return copy if copy.is_file() else None

@@ -6,18 +6,18 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from forcegrasp.evaluate.colours import policy_colours
 from forcegrasp.evaluate.curve_groups import CURVES, Group
-from forcegrasp.evaluate.plots import PALETTE
 
 
 def draw_curves(groups: list[Group], frames: np.ndarray) -> Figure:
     """Means over seeds against ``frames`` ``(n,)``, with their 95 % t-intervals; thin lines are single seeds."""
     figure = Figure(figsize=(11, 7.6), layout="constrained")
     panels = figure.subplots(2, 2, sharex=True)
-    end = _end_of_curriculum(groups)
+    end, colours = _end_of_curriculum(groups), policy_colours(group.label for group in groups)
     for axes, (column, heading, _) in zip(panels.flat, CURVES, strict=True):
-        for group, colour in zip(groups, PALETTE * len(groups), strict=False):
-            _draw_group(axes, group, column, frames, colour)
+        for group in groups:
+            _draw_group(axes, group, column, frames, colours[group.label])
         axes.set_title(heading, fontsize=10)
         axes.grid(alpha=0.25)
         low, high = _limits(groups, column)

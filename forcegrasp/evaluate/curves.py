@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -22,14 +23,14 @@ SHORT = ("force\nreward,\nnormalised", "force\nreward,\npaper's", "object\nmoved
 POINTS = 200
 
 
-def learning_curves(folders: list[Path], out: Path, console: Console | None = None) -> dict[str, Any]:
+def learning_curves(folders: Sequence[str | Path], out: str | Path, console: Console | None = None) -> dict[str, Any]:
     """Draws ``curves.png``, writes ``curves.json`` (which is returned) and prints the end of training per group.
 
     Raises:
       CheckpointError: if there is no run, or one can't be read.
     """
-    console = console or Console()
-    runs, notes = find_histories(folders, [column for column, *_ in CURVES])
+    out, console = Path(out), console or Console()
+    runs, notes = find_histories([Path(folder) for folder in folders], [column for column, *_ in CURVES])
     groups, left_out = group_runs(runs)
     cut = [f"{r.path} unfinished: {r.frames[-1]:,.0f} of {r.total:,} frames" for r in runs if not r.finished]
     frames = np.linspace(min(r.frames[0] for r in runs), max(r.frames[-1] for r in runs), POINTS)
@@ -38,7 +39,7 @@ def learning_curves(folders: list[Path], out: Path, console: Console | None = No
         "interval": "95 % t-interval of the mean over seeds",
         "last": LAST,
         "notes": [*notes, *left_out, *cut],
-        "groups": {group.label: _summary(group, frames) for group in groups},
+        "groups": {group.label: summary(group, frames) for group in groups},
     }
     out.mkdir(parents=True, exist_ok=True)
     (out / "curves.json").write_text(json.dumps(report, indent=1, ensure_ascii=False) + "\n", "utf-8")
@@ -52,7 +53,7 @@ def learning_curves(folders: list[Path], out: Path, console: Console | None = No
     return report
 
 
-def _summary(group: Group, frames: np.ndarray) -> dict[str, Any]:
+def summary(group: Group, frames: np.ndarray) -> dict[str, Any]:
     summary: dict[str, Any] = {
         "runs": [{"path": str(r.path), "seed": r.seed, "frames": int(r.frames[-1])} for r in group.runs],
         "averaged_seeds": [run.seed for run in group.averaged],

@@ -8,41 +8,47 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from tensordict import TensorDictBase
 
+from forcegrasp.evaluate.colours import finger_colours, policy_colours
 from forcegrasp.physics.model import CONTROL_PERIOD_S
 
 matplotlib.use("Agg")
-LEFT, RIGHT, GOAL = "#0072b2", "#d55e00", "#444444"
-#: One colour per policy, in order (Okabe and Ito's palette, told apart by the colour-blind).
-PALETTE = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#999999", "#f0e442")
+GOAL = "#444444"
 
 
-def _draw_forces(axes: Axes, episode: TensorDictBase) -> None:
+def _draw_forces(axes: Axes, episode: TensorDictBase, colour: str) -> None:
     after = episode.get("next")
     time = np.arange(1, len(after["force"]) + 1) * CONTROL_PERIOD_S
-    for finger, (colour, name) in enumerate(((LEFT, "left"), (RIGHT, "right"))):
-        axes.plot(time, after["sensed_force"][:, finger], color=colour, lw=0.6, alpha=0.4)
-        axes.plot(time, after["force"][:, finger], color=colour, lw=1.4, label=name)
+    for finger, (shade, name) in enumerate(zip(finger_colours(colour), ("left", "right"), strict=True)):
+        axes.plot(time, after["sensed_force"][:, finger], color=shade, lw=0.6, alpha=0.4)
+        axes.plot(time, after["force"][:, finger], color=shade, lw=1.4, label=name)
     axes.axhline(float(after["goal_force"][0]), color=GOAL, ls="--", lw=1, label="goal")
     axes.set_xlim(0, time[-1])
 
 
-def force_traces(episodes: TensorDictBase, title: str) -> Figure:
-    """Forces of up to six episodes ``(n, T)`` against their goals; thin lines are the noisy readings."""
+def force_traces(episodes: TensorDictBase, title: str, colour: str) -> Figure:
+    """Whole forces of up to six episodes ``(n, T)`` against their goals; thin lines are the noisy readings.
+
+    Args:
+      episodes: as an env's ``rollout`` gives them.
+      title: whose they are.
+      colour: of that policy; the right finger has another shade of it.
+    """
     n = min(6, len(episodes))
     rows = (n + 2) // 3
     figure = Figure(figsize=(10, 2.7 * rows + 0.5), layout="constrained")
     grid = figure.subplots(rows, min(n, 3), squeeze=False).reshape(-1)
     for axes, episode in zip(grid, episodes, strict=False):
-        _draw_forces(axes, episode)
+        _draw_forces(axes, episode, colour)
         kappa, _, radius, offset, goal = episode["grasp_parameters"][0].tolist()
-        axes.set_title(f"κ {kappa:.2f} · r {radius * 1e3:.0f} mm · o_y {offset * 1e3:+.0f} mm", fontsize=9)
-        axes.set_ylim(-0.1 * goal, 2.1 * goal)
+        grasp = f"κ {kappa:.2f} · r {radius * 1e3:.0f} mm · o_y {offset * 1e3:+.0f} mm"
+        overshoot = max(0.0, float(episode["next", "force"].max()) / goal - 1)
+        axes.set_title(f"{grasp}\novershoot {overshoot:.0%} of the goal", fontsize=9)
         axes.set_xlabel("time [s]")
         axes.set_ylabel("force [N]")
     for axes in grid[n:]:
         axes.remove()
-    grid[0].legend(fontsize=8, loc="lower right")
-    figure.suptitle(title)
+    grid[0].legend(fontsize=8, loc="upper right")
+    figure.suptitle(title.replace("$", r"\$"))  # no mathematics in it
     return figure
 
 
@@ -68,8 +74,9 @@ def cell_boxes(results: dict[str, np.ndarray], cells: list[str], xlabel: str, yl
     figure = Figure(figsize=(max(8, 0.9 * len(cells)), 4.2), layout="constrained")
     axes = figure.subplots()
     width = 0.8 / len(results)
-    handles = []
-    for index, (values, colour) in enumerate(zip(results.values(), PALETTE * len(results), strict=False)):
+    handles, colours = [], policy_colours(results)
+    for index, (name, values) in enumerate(results.items()):
+        colour = colours[name]
         places = np.arange(len(cells)) + (index + 0.5) * width - 0.4
         boxes = axes.boxplot(
             list(values),

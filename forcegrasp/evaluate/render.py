@@ -17,13 +17,14 @@ from forcegrasp.evaluate.video import grasp_video
 from forcegrasp.physics.model import CONTROL_PERIOD_S
 
 
-def render(config: RenderConfig, out: Path) -> dict[str, dict[str, float]]:
+def render(config: RenderConfig, out: str | Path) -> dict[str, dict[str, float]]:
     """Writes the video and prints what happened; returns every policy's figures of the episode.
 
     Raises:
       ConfigError, CheckpointError, PhysicsError: with what to do about it.
       NoRendererError: where there is no OpenGL.
     """
+    out = Path(out)
     torch.set_num_threads(1)
     grasp = draw_one_grasp(config)
     model = read_tiago_model(config.model) if config.model else None

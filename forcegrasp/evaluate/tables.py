@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from rich import box
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
@@ -23,6 +24,8 @@ FIGURES = (
     ("final_force_error_n", "force error over the last second, N", 4),
 )
 _BY_CELL = 5
+#: Columns of a terminal in which numbers of the short table need not be folded.
+NARROW = 80
 
 
 @dataclass(frozen=True)
@@ -34,15 +37,28 @@ class Sheet:
     rows: list[list[str]]
 
 
-def print_report(report: dict, console: Console) -> None:
-    """Shows every table of an evaluation's report."""
-    for sheet in sheets(report):
-        table = Table(title=escape(sheet.title))
-        for index, name in enumerate(sheet.header):
-            table.add_column(escape(name), justify="right" if index else "left", overflow="fold")
-        for row in sheet.rows:
-            table.add_row(*map(escape, row))
-        console.print(table)
+def print_sheet(sheet: Sheet, console: Console) -> None:
+    """Shows a table; what is too wide is folded, never cut off."""
+    table = Table(title=escape(sheet.title))
+    _fill(table, sheet)
+    console.print(table)
+
+
+def print_short(sheet: Sheet, console: Console) -> None:
+    """Shows a table whose numbers fit; of its names, long ones are folded."""
+    table = Table(box=box.SIMPLE_HEAD, padding=(0, 1), show_edge=False)
+    _fill(table, sheet, no_wrap=console.width >= NARROW)
+    console.print(table)
+
+
+def _fill(table: Table, sheet: Sheet, no_wrap: bool = False) -> None:
+    for index, name in enumerate(sheet.header):
+        number = index > 0
+        table.add_column(
+            escape(name), justify="right" if number else "left", overflow="fold", no_wrap=number and no_wrap
+        )
+    for row in sheet.rows:
+        table.add_row(*map(escape, row))
 
 
 def markdown(report: dict) -> str:
@@ -76,14 +92,14 @@ def sheets(report: dict) -> Iterator[Sheet]:
             f"{heading}: mean ± half of its 95 % interval",
             [report["what"], *names],
             [
-                [cell, *(_half(cells[name][index], digits) for name in names)]
+                [cell, *(half_interval(cells[name][index], digits) for name in names)]
                 for index, cell in enumerate(report["cells"])
             ],
         )
     if report["what"] == "object":
         yield _as_in_the_paper(report)
-    if report["baseline"]:
-        others = [name for name in names if name != report["baseline"]]
+    others = [name for name in names if name != report["baseline"]]
+    if report["baseline"] and others:
         yield Sheet(
             f"probability of being better than {report['baseline']} [95 % interval]",
             ["figure", *others],
@@ -115,7 +131,8 @@ def _overall(found: dict, digits: int) -> str:
     )
 
 
-def _half(found: dict, digits: int) -> str:
+def half_interval(found: dict, digits: int) -> str:
+    """A mean and half of its 95 % interval."""
     return f"{found['mean']:.{digits}f} ± {(found['high'] - found['low']) / 2:.{digits}f}"
 
 

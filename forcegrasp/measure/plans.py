@@ -8,6 +8,7 @@ import numpy as np
 
 from forcegrasp.physics.gripper import Gripper
 from forcegrasp.physics.sampling import offset_limits_m
+from forcegrasp.short_repr import ShortRepr
 
 #: Seconds between two commands of a plan, and the length of a grasp (paper: 25 Hz, 6 s).
 PERIOD_S, SAMPLES = 0.04, 150
@@ -15,8 +16,8 @@ PERIOD_S, SAMPLES = 0.04, 150
 _REST = 8
 
 
-@dataclass(frozen=True)
-class PlannedGrasp:
+@dataclass(frozen=True, repr=False)
+class PlannedGrasp(ShortRepr):
     """A grasp to record: all motors are given the same command, the object may stand off the centre."""
 
     object: int

@@ -17,6 +17,7 @@ from forcegrasp.measure.schema import MeasuredGrasp, MeasurementSet, fingerprint
 from forcegrasp.physics.gripper import Gripper
 from forcegrasp.physics.gripper_parts import BaseParameter
 from forcegrasp.physics.sensors import is_rounding, with_noise
+from forcegrasp.short_repr import ShortRepr
 
 # Objects' radii, as shares of half the opening: both fingers reach them, and they fit in.
 _RADII = (0.4, 0.75)
@@ -24,8 +25,8 @@ _RADII = (0.4, 0.75)
 _OBJECT_FACTOR = 2.0
 
 
-@dataclasses.dataclass(frozen=True)
-class Recorded:
+@dataclasses.dataclass(frozen=True, repr=False)
+class Recorded(ShortRepr):
     """A set, and the truth that its files don't tell."""
 
     measured: MeasurementSet

@@ -13,6 +13,7 @@ from forcegrasp.measure.schema import MeasuredGrasp
 from forcegrasp.physics.gripper import Gripper
 from forcegrasp.physics.plant import Plant, write_base
 from forcegrasp.physics.sensors import ReadingEffects
+from forcegrasp.short_repr import ShortRepr
 
 #: Threads of the engine; 0 uses every core. Programs that run several diagnoses side by side set it to 1.
 THREADS = 0
@@ -24,8 +25,8 @@ _CHUNK = 8_000_000
 _REMEMBERED = 6
 
 
-@dataclass(frozen=True)
-class EffectOn:
+@dataclass(frozen=True, repr=False)
+class EffectOn(ShortRepr):
     """An effect on some rows. ``values``: ``(len(rows), parameters)``."""
 
     effect: type[Effect]
@@ -34,8 +35,8 @@ class EffectOn:
     values: np.ndarray
 
 
-@dataclass(frozen=True)
-class Motion:
+@dataclass(frozen=True, repr=False)
+class Motion(ShortRepr):
     """What happened in simulated rows, at the physics rate; not yet what sensors say of it."""
 
     grasp: np.ndarray  #: index of the measured grasp each row replays, ``(n,)``
@@ -44,8 +45,8 @@ class Motion:
     object_position: np.ndarray  #: metres, ``(n, steps)``
 
 
-@dataclass(frozen=True)
-class Readings:
+@dataclass(frozen=True, repr=False)
+class Readings(ShortRepr):
     """What sensors say at the sample times; after a grasp's last sample, its last reading again."""
 
     position: np.ndarray  #: m or rad, ``(n, samples, motors)``

@@ -10,6 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
+from forcegrasp.short_repr import ShortRepr, counted, cut
+
 FORMAT = "forcegrasp-measurements/1"
 SPLITS = ("fit", "check")
 FINGERS = ("left", "right")
@@ -21,8 +23,8 @@ SIGNALS = ("t_s", *COMMAND, *POSITION, *FORCE)
 OBJECT = "o_y_m"
 
 
-@dataclass(frozen=True)
-class MeasuredGrasp:
+@dataclass(frozen=True, repr=False)
+class MeasuredGrasp(ShortRepr):
     """One recorded grasp of T samples. Columns of two are left and right finger; 0 m is closed, forces press if ≥ 0."""
 
     name: str
@@ -38,6 +40,9 @@ class MeasuredGrasp:
     object_m: np.ndarray | None  #: ``(T,)``, object position along the grasp axis; None if not measured
     rows: np.ndarray | None = field(default=None, compare=False)  #: ``(T,)``, where the samples stand in their file
 
+    def summary(self) -> str:
+        return f"{cut(self.name)} on {cut(self.object)}, {counted(len(self.time_s), 'sample')}"
+
     def signals(self) -> dict[str, np.ndarray]:
         """Every measured signal by its column name, each ``(T,)``."""
         columns = [self.time_s, *self.command_m.T, *self.position_m.T, *self.force_n.T]
@@ -45,8 +50,8 @@ class MeasuredGrasp:
         return named if self.object_m is None else named | {OBJECT: self.object_m}
 
 
-@dataclass(frozen=True)
-class MeasurementSet:
+@dataclass(frozen=True, repr=False)
+class MeasurementSet(ShortRepr):
     """Grasps that were recorded with one gripper."""
 
     path: Path  #: the folder, or what the set was converted from
@@ -57,11 +62,15 @@ class MeasurementSet:
     position_std_m: float | None  #: noise of the positions, if known
     force_std_n: float | None  #: noise of the forces, if known
     grasps: tuple[MeasuredGrasp, ...]
-    fingerprint: str  #: sha256 of all that a result can depend on; see :func:`fingerprint_of_set`
+    fingerprint: str  #: sha256 of all that a result can depend on; see ``fingerprint_of_set``
+
+    def summary(self) -> str:
+        objects = counted(len({grasp.object for grasp in self.grasps}), "object")
+        return f"{cut(self.name)}: {counted(len(self.grasps), 'grasp')} of {objects}, gripper {cut(self.gripper)}"
 
 
-@dataclass(frozen=True)
-class FinalForceTable:
+@dataclass(frozen=True, repr=False)
+class FinalForceTable(ShortRepr):
     """Final forces only: n squeezes, each by a commanded position delta."""
 
     path: Path
@@ -74,6 +83,10 @@ class FinalForceTable:
     delta_q_m: np.ndarray  #: ``(n,)``
     final_force_n: np.ndarray  #: ``(n,)``
     fingerprint: str  #: sha256 of all that a result can depend on
+
+    def summary(self) -> str:
+        objects = counted(len(set(self.objects)), "object")
+        return f"{cut(self.name)}: {counted(len(self.objects), 'squeeze')} of {objects}, gripper {cut(self.gripper)}"
 
 
 def fingerprint_of_set(

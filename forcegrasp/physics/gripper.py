@@ -17,6 +17,7 @@ from forcegrasp.physics.gripper_parts import BaseParameter, Channel, Finger, Mot
 from forcegrasp.physics.guard import silence_log
 from forcegrasp.physics.opening import OpeningLaw, measure_opening, straight_law
 from forcegrasp.physics.scene_file import check_scene
+from forcegrasp.short_repr import ShortRepr, counted, cut
 
 #: Physics tiers, and how much larger than the scene's own their steps may be.
 TIERS = {"reference": 1, "fitting": 2, "fast": 4}
@@ -32,8 +33,8 @@ NO_FORCES = (
 )
 
 
-@dataclass(frozen=True)
-class Gripper:
+@dataclass(frozen=True, repr=False)
+class Gripper(ShortRepr):
     """A gripper with one or two motors and two sides that press on an object between them, as a MuJoCo scene."""
 
     name: str
@@ -53,6 +54,9 @@ class Gripper:
     #: Sizes of effects in the catalogue are for a stroke and a motor force of 1; these are the gripper's.
     position_scale: float
     force_scale: float
+
+    def summary(self) -> str:
+        return f"{cut(self.name)}, {counted(len(self.parameters), 'parameter')}"
 
     @property
     def stroke(self) -> float:
@@ -134,7 +138,7 @@ class Gripper:
 
         Args:
           tier: ``"reference"`` is the scene as described; ``"fast"``, where the description has ``fast: sphere``, is
-            :mod:`forcegrasp.physics.fast`; ``"fitting"`` is that with at most twice the step, whose slopes are exact
+            ``forcegrasp.physics.fast``; ``"fitting"`` is that with at most twice the step, whose slopes are exact
             enough for a fit.
 
         Raises:

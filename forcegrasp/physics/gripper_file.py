@@ -32,7 +32,7 @@ _SCOPES = ("gripper", "object", "grasp")
 _PERIOD_S, _STEP = 0.04, 1 / 15
 
 
-def load_gripper(name: str, folder: Path | None = None) -> Gripper:
+def load_gripper(name: str | Path, folder: str | Path = "") -> Gripper:
     """Returns a gripper by name (``tiago``) or by the path of its description.
 
     Args:
@@ -42,12 +42,13 @@ def load_gripper(name: str, folder: Path | None = None) -> Gripper:
     Raises:
       ConfigError: if there is no such gripper, or its description can't be right; names the file and the line's key.
     """
+    name = str(name)
     if re.fullmatch(r"\w+", name):
         known = shipped_grippers()
         if name not in known:
             raise ConfigError(f"gripper={name}: no such gripper{closest(name, known)}; or give a description's path")
         return _load(shipped_folder() / f"{name}.yaml")
-    return _load((folder or Path()) / name)
+    return _load(Path(folder) / name)
 
 
 @functools.cache

@@ -7,9 +7,12 @@ from typing import Any
 
 import numpy as np
 
+from forcegrasp.short_repr import ShortRepr
 
-@dataclass(frozen=True)
-class GraspParameters:
+
+
+@dataclass(frozen=True, repr=False)
+class GraspParameters(ShortRepr):
     """The parameters of n grasps. Every field is a float64 array of shape ``(n,)``."""
 
     kappa: np.ndarray  #: softness κ; 0 hard, 1 soft

@@ -32,7 +32,7 @@ def offset_limits_m(
 
 
 class GraspSampler:
-    """Draws grasps from the ranges of a :class:`GraspConfig`; the ranges may be changed between draws.
+    """Draws grasps from the ranges of a ``GraspConfig``; the ranges may be changed between draws.
 
     Args:
       config: the ranges; those left out are the gripper's.

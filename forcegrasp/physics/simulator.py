@@ -59,7 +59,7 @@ class GraspSimulator:
         self.parameters = nominal_grasps(gripper, n)
         #: q_des of the last step, m or rad, ``(n, motors)``
         self.commanded_position = np.full((n, plant.motors), gripper.stroke)
-        self.object_speed = np.zeros(n)  #: |o_y(t) − o_y(t−1)|, metres per control step, ``(n,)``
+        self.object_speed = np.zeros(n)  #: ``|o_y(t) − o_y(t−1)|``, metres per control step, ``(n,)``
         self._substeps = max(1, round(gripper.period_s / plant.dt))
         self._variation = variation
         if variation is not None:

@@ -43,7 +43,7 @@ class Exported:
     step_us: float  #: median time of a controller's step on this machine, microseconds
 
 
-def export_policy(name: Path | str, out: Path, ceiling_n: float) -> Exported:
+def export_policy(name: str | Path, out: str | Path, ceiling_n: float) -> Exported:
     """Writes ``policy.onnx`` and ``contract.json``, and tries them out.
 
     Args:
@@ -57,6 +57,7 @@ def export_policy(name: Path | str, out: Path, ceiling_n: float) -> Exported:
         trained, or the exported network acts differently.
       OSError: if the folder can't be written.
     """
+    out = Path(out)
     torch.set_num_threads(1)  # the network is far too small for more
     policy, config = load_policy(name)
     if out.is_dir() and any(out.iterdir()):

@@ -13,6 +13,7 @@ import os
 import platform
 import subprocess
 import sys
+from contextlib import AbstractContextManager
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, cast
@@ -29,9 +30,19 @@ from forcegrasp.effects.variation import read_model_of
 from forcegrasp.errors import CheckpointError, ConfigError
 from forcegrasp.physics import load_gripper
 from forcegrasp.runs import checkpoint
+from forcegrasp.runs.lock import only_writer
 from forcegrasp.whole_file import write_whole
 
 _PACKAGES = ("torch", "torchrl", "tensordict", "mujoco", "gymnasium", "hydra-core", "numpy")
+
+
+def _refuse_interpolations(options: dict[str, Any], path: str = "") -> None:
+    """Raises ConfigError where a value asks for another one, such as a variable of the reader's environment."""
+    for name, value in options.items():
+        if isinstance(value, dict):
+            _refuse_interpolations(value, f"{path}{name}.")
+        elif "${" in str(value):
+            raise ConfigError(f"{path}{name}={value}: ${{...}} is not replaced in a file; write the value itself")
 
 
 def fingerprint(options: dict[str, Any]) -> str:
@@ -49,6 +60,7 @@ class RunDir:
         self.path = Path(path)
         self.config_path = self.path / "config.yaml"
         self.metrics_path = self.path / "metrics.csv"
+        self.model_path = self.path / "model.yaml"
         self.checkpoints = self.path / "checkpoints"
         self.best = self.checkpoints / "best.safetensors"
         self.tensorboard = self.path / "tensorboard"
@@ -58,24 +70,43 @@ class RunDir:
     def create(cls, path: Path | str, config: TrainConfig, overrides: list[str]) -> RunDir:
         """Makes a new run directory and writes config and provenance into it.
 
+        One that holds the same run is begun again, as long as it has no checkpoint.
+
         Raises:
-          CheckpointError: if the directory already holds a run, or can't be written.
+          CheckpointError: if the directory already holds a run, is being written, or can't be.
         """
         run = cls(path)
-        if run.config_path.exists():
-            raise CheckpointError(
-                f"{run.path}: already holds a run; continue it with resume={run.path}, or name another"
-            )
         try:
-            for folder in (run.checkpoints, run.tensorboard, run.figures):
-                folder.mkdir(parents=True, exist_ok=True)
-            facts = json.dumps(_provenance(config, overrides), indent=2) + "\n"
-            write_whole(run.path / "run.json", facts.encode())
-            text = yaml.safe_dump(dataclasses.asdict(config), sort_keys=False)
-            write_whole(run.config_path, text.encode())  # last: a folder without it is no run
+            with run.only_writer():
+                if run.config_path.exists() and (run.has_checkpoint or not run._is_of(config)):
+                    raise CheckpointError(
+                        f"{run.path}: already holds a run; continue it with resume={run.path}, or name another"
+                    )
+                for folder in (run.checkpoints, run.tensorboard, run.figures):
+                    folder.mkdir(parents=True, exist_ok=True)
+                run.model_path.unlink(missing_ok=True)  # of a run that is begun again: its source may have changed
+                facts = json.dumps(_provenance(config, overrides), indent=2) + "\n"
+                write_whole(run.path / "run.json", facts.encode())
+                text = yaml.safe_dump(dataclasses.asdict(config), sort_keys=False)
+                write_whole(run.config_path, text.encode())  # last: a folder without it is no run
         except OSError as error:
             raise CheckpointError(f"{run.path}: could not make the run directory ({error.strerror})") from error
         return run
+
+    def only_writer(self) -> AbstractContextManager[None]:
+        """Held by whoever writes the run, see :func:`~forcegrasp.runs.lock.only_writer`."""
+        return only_writer(self.path / "lock")
+
+    @property
+    def has_checkpoint(self) -> bool:
+        """Whether there is something to go on from; a run that has none begins at its first batch."""
+        return any(self.checkpoints.glob("*.safetensors"))
+
+    def _is_of(self, config: TrainConfig) -> bool:
+        try:
+            return self.config() == config
+        except CheckpointError:
+            return False
 
     def model(self, config: TrainConfig) -> Model | None:
         """The fitted model that the run trains with, if any; the run keeps a copy, to be resumed from.
@@ -86,10 +117,10 @@ class RunDir:
         """
         if not config.model:
             return None
-        copy = self.path / "model.yaml"
-        if not copy.exists():
-            write_model(read_model_of(load_gripper(config.gripper), config.model), copy)
-        return read_model_of(load_gripper(config.gripper), copy)
+        gripper = load_gripper(config.gripper)
+        if not self.model_path.exists():
+            write_model(read_model_of(gripper, config.model), self.model_path)
+        return read_model_of(gripper, self.model_path)
 
     @classmethod
     def open(cls, path: Path | str) -> RunDir:
@@ -123,6 +154,7 @@ class RunDir:
             loaded = plain_yaml.load(self.config_path)
             if not isinstance(loaded, dict):  # text would be taken for more YAML
                 raise ConfigError("no options in it")
+            _refuse_interpolations(loaded)
             merged = OmegaConf.merge(OmegaConf.structured(TrainConfig), loaded)
             config = cast(TrainConfig, OmegaConf.to_object(merged))
             validate(config)
@@ -162,20 +194,22 @@ class RunDir:
         return score if isinstance(score, float) else -math.inf
 
     def load(self) -> tuple[dict[str, Tensor], dict[str, Any]]:
-        """Returns the newest checkpoint that can be read.
+        """Returns the newest checkpoint that can be read, or else the best.
 
         Raises:
           CheckpointError: if there is none, or it was made with another configuration.
         """
         first_error = None
-        for path in reversed(self._files()):
+        for path in (*reversed(self._files()), *self.checkpoints.glob(self.best.name)):
             try:
                 tensors, facts = checkpoint.read(path)
             except CheckpointError as error:
                 first_error = first_error or error
                 continue
             return tensors, self._own(path, facts)
-        raise first_error or CheckpointError(f"{self.checkpoints}: no checkpoint yet; train longer or restart the run")
+        raise first_error or CheckpointError(
+            f"{self.checkpoints}: no checkpoint yet; train it with: forcegrasp train resume={self.path}"
+        )
 
     def load_file(self, path: Path) -> tuple[dict[str, Tensor], dict[str, Any]]:
         """Returns one checkpoint of this run.
@@ -201,7 +235,7 @@ class RunDir:
     def log_metrics(self, row: dict[str, float]) -> None:
         """Appends a row to metrics.csv; the first row decides the columns."""
         new = not self.metrics_path.exists()
-        with open(self.metrics_path, "a", newline="") as file:
+        with open(self.metrics_path, "a", encoding="utf-8", newline="") as file:
             writer = csv.DictWriter(file, fieldnames=list(row))
             if new:
                 writer.writeheader()
@@ -211,7 +245,7 @@ class RunDir:
         """Keeps the whole rows up to a checkpoint, so that a resumed run logs nothing twice and mends a torn line."""
         if not self.metrics_path.exists():
             return
-        with open(self.metrics_path, newline="") as file:
+        with open(self.metrics_path, encoding="utf-8", newline="") as file:
             header, *lines = list(csv.reader(file.read().replace("\0", "").splitlines())) or [[]]
         kept = [line for line in lines if len(line) == len(header) and line[0].isdigit() and int(line[0]) <= frames]
         if not kept:  # the header may be torn, too; the next row writes it anew

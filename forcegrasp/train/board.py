@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shlex
+
 from forcegrasp.config import TrainConfig
 from forcegrasp.env.episodes import FIGURES
 from forcegrasp.runs.run_dir import RunDir
@@ -60,16 +62,25 @@ def layout() -> dict[str, dict[str, list]]:
     }
 
 
+def evaluate_command(run: RunDir, config: TrainConfig) -> str:
+    """What to type to compare a run with the hand-written controller, in the simulator that it was trained in."""
+    words = [f"policies=[{run.path},force_pi]", *([f"model={run.model_path}"] if config.model else [])]
+    return shlex.join(["forcegrasp", "evaluate", *words])
+
+
 def card(run: RunDir, config: TrainConfig) -> str:
     """What this run is, how to go on with it and what the names mean, as Markdown."""
     meanings = "\n".join(f"* `{name}`: {meaning}" for name, meaning in FIGURES.items())
-    return f"""# {experiment(run.path) or "training"}, seed {config.seed}
+    simulator = f"the model `{config.model}`, kept as `{run.model_path}`" if config.model else "the nominal gripper"
+    title = f"{experiment(run.path) or 'training'}, seed {config.seed}" + (config.model and f", model {config.model}")
+    return f"""# {title}
 
-{config.ppo.total_frames:,} frames, {config.ppo.grasps} grasps at once, reward `{config.reward.form}`.
+{config.ppo.total_frames:,} frames, {config.ppo.grasps} grasps at once, reward `{config.reward.form}`, simulated with
+{simulator}.
 
-    forcegrasp train resume={run.path}                        go on with it, should it have been interrupted
-    forcegrasp evaluate 'policies=[{run.path},force_pi]'      compare it with the hand-written controller
-    forcegrasp curves {run.path}                              its learning curves as a picture
+    forcegrasp train resume={run.path}        go on with it, should it have been interrupted
+    {evaluate_command(run, config)}        compare it with the hand-written controller
+    forcegrasp curves {run.path}        its learning curves as a picture
 
 **Custom scalars** has one page per question: is it learning, does it push the object, is PPO healthy, how fast is it.
 **Scalars** has everything, what matters first; the numbers in the names only sort. All are means over a batch of

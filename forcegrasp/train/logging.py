@@ -14,8 +14,10 @@ from torch.utils.tensorboard import SummaryWriter
 
 from forcegrasp.config import TrainConfig
 from forcegrasp.errors import CheckpointError
+from forcegrasp.evaluate.colours import policy_colours
 from forcegrasp.evaluate.plots import force_traces
-from forcegrasp.evaluate.video import NoRendererError, grasp_video
+from forcegrasp.evaluate.video import grasp_video
+from forcegrasp.physics.scene_renderer import NoRendererError
 from forcegrasp.runs.run_dir import RunDir
 from forcegrasp.train.board import card, layout, tag
 
@@ -33,6 +35,7 @@ class TrainingLog:
     def __init__(self, run: RunDir, config: TrainConfig, frames: int) -> None:
         self.run, self.config, self.frames = run, config, frames
         self._told_no_renderer = False
+        self._colour = policy_colours([run.path.name])[run.path.name]  # as evaluate will draw it
 
     def __enter__(self) -> Self:
         self._hook, threading.excepthook = threading.excepthook, self._thread_failed
@@ -46,10 +49,13 @@ class TrainingLog:
     def _open(self) -> None:
         run, config, frames = self.run, self.config, self.frames
         run.drop_metrics_after(frames)
+        if not frames:
+            for old in run.tensorboard.glob("events.*"):  # of an attempt that came to no checkpoint
+                old.unlink()
         self.writer = SummaryWriter(str(run.tensorboard), purge_step=frames + 1 if frames else None)
         if not frames:
             self.writer.add_text("1_about_this_run", card(run, config))
-            self.writer.add_text("2_config", "```\n" + run.config_path.read_text() + "```")
+            self.writer.add_text("2_config", "```\n" + run.config_path.read_text("utf-8") + "```")
             self.writer.add_custom_scalars(layout())
 
     def batch(self, number: int, frames: int, groups: dict[str, dict[str, float]], episodes: TensorDictBase) -> None:
@@ -81,7 +87,7 @@ class TrainingLog:
 
     def traces(self, episodes: TensorDictBase, frames: int) -> None:
         """Draws force against goal for a few episodes, as PNG and in TensorBoard."""
-        figure = force_traces(episodes.cpu(), f"after {frames:,} frames")
+        figure = force_traces(episodes.cpu(), f"after {frames:,} frames", self._colour)
         figure.savefig(self.run.figures / f"traces_{frames:012d}.png", dpi=100)
         self.writer.add_figure("grasps/force_traces", figure, frames)
 
@@ -90,8 +96,9 @@ class TrainingLog:
         if self._told_no_renderer:
             return None
         path = self.run.figures / f"grasp_{frames:012d}.gif"
+        title = f"after {frames:,} frames"
         try:
-            data = grasp_video({f"after {frames:,} frames": episode.cpu()}, self.config.sensors)
+            data = grasp_video({title: episode.cpu()}, self.config.sensors, colours={title: self._colour})
         except NoRendererError as error:
             print(f"forcegrasp: no video: {error}", file=sys.stderr)
             self._told_no_renderer = True

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import signal
 import time
 from contextlib import contextmanager
 from typing import Any
 
-import numpy as np
 import torch
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from torch import Tensor
@@ -25,6 +23,7 @@ from forcegrasp.runs.run_dir import RunDir
 from forcegrasp.train.collector import collecting, make_collector, random_states, set_random_states, training_env
 from forcegrasp.train.logging import TrainingLog
 from forcegrasp.train.ppo import PPO, entropy, make_value
+from forcegrasp.train.stop import stop_signals
 
 
 class Trainer:
@@ -103,23 +102,29 @@ class Trainer:
 def train(config: TrainConfig, run: RunDir, resume: bool = False) -> bool:
     """Trains until ``ppo.total_frames``; saves into the run directory. Returns False if it was interrupted.
 
-    Ctrl-C (or SIGTERM) ends after the batch at work, with a checkpoint; a second one ends at once.
+    Ctrl-C, SIGTERM, SIGHUP or SIGUSR1 end it after the batch at work, with a checkpoint; a further Ctrl-C at once.
 
     Raises:
       ConfigError, CheckpointError, PhysicsError: with what to do about it.
     """
+    with run.only_writer():
+        return _train(config, run, resume)
+
+
+def _train(config: TrainConfig, run: RunDir, resume: bool) -> bool:
     trainer = Trainer(config, run.model(config))
     total = config.ppo.total_frames
-    if resume:
+    if resume and run.has_checkpoint:
         trainer.restore(*run.load())
     batch = None
     with (
         collecting(trainer.collector) as batches,
         TrainingLog(run, config, trainer.frames) as log,
-        _stop_signals() as stop,
+        stop_signals() as stop,
         _progress(total, trainer.frames, config.grasp.steps) as progress,
     ):
-        while trainer.frames < total and not stop:
+        last = trainer.frames >= total
+        while not last:
             started = time.perf_counter()
             values = trainer.prepare()
             batch = next(batches)
@@ -129,6 +134,7 @@ def train(config: TrainConfig, run: RunDir, resume: bool = False) -> bool:
             losses = trainer.ppo.update(batch, trainer.shuffle)
             ended = time.perf_counter()
 
+            whole_task = trainer.frames >= trainer.schedule.end_frames  # before, the batch was easier
             trainer.frames += batch.numel()
             trainer.batches += 1
             terms = batch.get(("next", "reward_terms"))
@@ -152,8 +158,8 @@ def train(config: TrainConfig, run: RunDir, resume: bool = False) -> bool:
             every = config.log
             if every.video_every and trainer.batches % every.video_every == 0:
                 log.video(batch[0], trainer.frames)
-            if trainer.batches % every.checkpoint_every == 0 or trainer.frames >= total or stop:
-                whole_task = trainer.frames >= trainer.schedule.end_frames  # before, it was easier
+            last = trainer.frames >= total or bool(stop)
+            if last or trainer.batches % every.checkpoint_every == 0:
                 score = figures["force_reward_normalised"] if whole_task else None
                 run.save(trainer.frames, *trainer.state(), keep=every.keep, score=score)
             progress(trainer.frames, figures)
@@ -166,45 +172,20 @@ def train(config: TrainConfig, run: RunDir, resume: bool = False) -> bool:
 
 
 @contextmanager
-def _stop_signals():
-    """Yields a list that is not empty once the user asked to stop."""
-    asked: list[int] = []
-
-    def ask(number: int, _frame: Any) -> None:
-        if asked:
-            raise KeyboardInterrupt
-        asked.append(number)
-
-    try:
-        before = {number: signal.signal(number, ask) for number in (signal.SIGINT, signal.SIGTERM)}
-    except ValueError:  # not the main thread, as in some sweep launchers: they have their own way to stop a job
-        before = {}
-    try:
-        yield asked
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
-
-
-@contextmanager
 def _progress(total: int, done: int, steps: int):
     """Yields a function that shows progress: ``(frames, episode figures)``."""
     columns = [
         BarColumn(bar_width=16),
         TextColumn("{task.percentage:3.0f} % of {task.total:,} frames"),
-        TextColumn("force reward {task.fields[reward]:.0f}/{task.fields[steps]}"),
-        TextColumn("moved {task.fields[moved]:.2f} mm"),
+        TextColumn("{task.fields[reached]}"),
         TimeRemainingColumn(),
     ]
     with Progress(*columns) as bar:
-        task = bar.add_task("training", total=total, completed=done, steps=steps, reward=np.nan, moved=np.nan)
+        task = bar.add_task("training", total=total, completed=done, reached="")
 
         def show(frames: int, figures: dict[str, float]) -> None:
-            bar.update(
-                task,
-                completed=min(frames, total),
-                reward=figures["force_reward_normalised"],
-                moved=figures["displacement_until_grasped_mm"],
-            )
+            reward, moved = figures["force_reward_normalised"], figures["displacement_until_grasped_mm"]
+            reached = f"force reward {reward:.0f}/{steps} moved {moved:.2f} mm"
+            bar.update(task, completed=min(frames, total), reached=reached)
 
         yield show

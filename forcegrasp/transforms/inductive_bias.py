@@ -15,10 +15,10 @@ def contact_bias(
     """φ of each motor (paper, eq. 7).
 
     Where each motor has a force reading of its own: 1 before its finger's first contact; ``one`` for a finger that
-    waits for the other; with both in contact max(floor, 1 − |Δf| / f_goal).
+    waits for the other; with both in contact ``max(floor, 1 − |Δf| / f_goal)``.
 
     Else, as with one motor for two fingers, all motors have the same φ: 1 until every reading has shown contact, and
-    then max(floor, 1 − |Δf| / f_goal) of the mean error. Between the first and the second finger's touch nothing can
+    then ``max(floor, 1 − |Δf| / f_goal)`` of the mean error. Between the first and the second finger's touch nothing can
     wait: the motor closes on, and the finger that has touched pushes the object towards the other one.
 
     Args:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import platform
 import re
 import shutil
 import subprocess
@@ -12,6 +13,7 @@ from pathlib import Path
 import pytest
 
 from forcegrasp.cli.main import main
+from forcegrasp.runs.lock import only_writer
 
 #: (arguments, what the line must tell). Train and evaluate are made quick, should they start after all.
 MISTAKES = [
@@ -111,7 +113,12 @@ MISTAKES = [
     (["train", "hydra=3"], "hydra"),
     (["train", "hydra/launcher=jobli"], "jobli"),
     (["train", "hydra.run.dir="], "hydra.run.dir"),
+    (["train", "hydra.searchpath=[file:///tmp]"], "no option 'hydra.searchpath'"),
+    (["train", "-m", "seed=0,1", "hydra/callbacks=mine"], "no option 'hydra/callbacks'"),
+    (["train", "hydra.launcher.n_job=2"], "did you mean hydra.launcher.n_jobs"),
+    (["evaluate", "hydra.run.dir=x"], "no option 'hydra.run.dir'"),
     # sweeps
+    (["train", "-m", "experiment=glob(*)"], "write the values one by one"),
     (["train", "-m", "seed=0,x"], "seed=x"),
     (["train", "-m", "experiment=ib,noib"], "did you mean no_ib"),
     (["train", "-m", "ppo.grasps=4,0"], "ppo.grasps=0"),
@@ -174,8 +181,8 @@ MISTAKES = [
     (["train", "resume=other"], "another configuration"),
     (["train", "resume=broken"], "config.yaml: not a valid configuration"),
     (["train", "resume=damaged"], "damaged"),
-    (["train", "resume=started"], "no checkpoint yet"),
-    (["train", "hydra.run.dir=finished"], "already holds a run"),
+    (["train", "hydra.run.dir=finished"], "already holds a run; continue it with resume=finished"),
+    (["train", "seed=3", "hydra.run.dir=started"], "already holds a run; continue it with resume=started"),
     (["train", "hydra.run.dir=file/run"], "could not make the run directory"),
     (["train", "hydra.run.dir=file"], "could not make the run directory"),
     (["evaluate", "policies=[]"], "must not be empty"),
@@ -199,7 +206,7 @@ MISTAKES = [
     (["evaluate", "policies=[force_pi"], "policies"),
     (["evaluate", "policies=[other]"], "another configuration"),
     (["evaluate", "policies=[damaged]"], "damaged"),
-    (["evaluate", "policies=[started]"], "no checkpoint yet"),
+    (["evaluate", "policies=[started]"], "no checkpoint yet; train it with: forcegrasp train resume=started"),
     (["evaluate", "out=file"], "could not write"),
     (["evaluate", "out=file/below"], "could not write"),
     (["export"], "which run?"),
@@ -291,6 +298,35 @@ def test_mistake_in_a_process_of_its_own(arguments, told, tmp_path):
     assert told in done.stderr
     assert not done.stdout
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("again", [["resume=started"], ["hydra.run.dir=started"]])
+def test_a_run_without_a_checkpoint_can_be_begun_again_either_way(again, folder, tiny):
+    finished = Path("finished/checkpoints")
+    assert main(["train", *again, *([] if "resume" in again[0] else tiny["train"])]) == 0
+    for path in finished.iterdir():
+        assert Path("started/checkpoints", path.name).read_bytes() == path.read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "lock"),
+    [
+        (["resume=started"], "started/lock"),
+        (["hydra.run.dir=started"], "started/lock"),
+        (["-m", "seed=0,1", "hydra.sweep.dir=sweep"], "sweep/sweep.lock"),
+    ],
+)
+def test_what_another_training_is_writing(arguments, lock, folder, tiny, capsys, monkeypatch):
+    monkeypatch.setattr(sys, "argv", sys.argv)
+    monkeypatch.setenv("HYDRA_FULL_ERROR", "0")
+    with only_writer(Path(lock)):
+        before = contents(folder)
+        assert main(["train", *arguments, *([] if "resume" in arguments[0] else tiny["train"])]) == 2
+        assert contents(folder) == before
+    out, err = capsys.readouterr()
+    assert not out
+    told = f"process {os.getpid()} on {platform.node()} is training here; wait until it has ended, or end it"
+    assert err == f"forcegrasp: {Path(lock).parent}: {told}\n"
 
 
 @pytest.mark.parametrize("sweep", [[], ["-m", "seed=0,1"]])

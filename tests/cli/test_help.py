@@ -11,7 +11,7 @@ import pytest
 
 from forcegrasp import __version__
 from forcegrasp.cli.main import VERBS, main
-from forcegrasp.cli.options import SCHEMAS, groups, leaves
+from forcegrasp.cli.options import COMMON, SCHEMAS, groups, leaves
 
 
 def printed(capsys, *arguments: str) -> str:
@@ -46,9 +46,9 @@ def test_every_verb_has_help(capsys):
         assert usage.startswith(f"usage: forcegrasp {verb} [")
 
 
-@pytest.mark.parametrize("arguments", [["--help"], ["-h"], ["seed=1", "--help"]])
+@pytest.mark.parametrize("arguments", [["--help", "--all"], ["--all"], ["seed=1", "--all", "-h"]])
 @pytest.mark.parametrize("verb", SCHEMAS)
-def test_help_of_a_verb_names_every_option_and_preset(capsys, verb, arguments):
+def test_all_of_the_help_names_every_option_and_preset(capsys, verb, arguments):
     out = printed(capsys, verb, *arguments)
     for name, entry, default in leaves(SCHEMAS[verb]):
         line = f"  {name}={str(default).replace(' ', '').replace(chr(39), '')}\n"
@@ -60,6 +60,22 @@ def test_help_of_a_verb_names_every_option_and_preset(capsys, verb, arguments):
         assert all(choice in out for choice in entry.metadata["choices"])
     for group, choices in groups(verb).items():
         assert f"  {group}={'|'.join(choices)}\n" in out
+
+
+@pytest.mark.parametrize("verb", SCHEMAS)
+def test_help_of_a_verb_fits_a_screen_and_says_where_the_rest_is(capsys, verb):
+    out = printed(capsys, verb, "--help")
+    assert len(out.splitlines()) <= 40
+    names = [name for name, _, _ in leaves(SCHEMAS[verb])]
+    shown = [name for name in names if re.search(rf"^  {re.escape(name)}=", out, re.MULTILINE)]
+    assert {name for name in names if "." not in name or name in COMMON} == set(shown)
+    left = re.search(r"^(\d+) more of [a-z, ]+:\n  forcegrasp (\w+) --help --all$", out, re.MULTILINE)
+    assert (left.groups() if left else ("0", verb)) == (str(len(names) - len(shown)), verb)
+    assert all(f"  {group}={'|'.join(choices)}\n" in out for group, choices in groups(verb).items())
+
+
+def test_common_options_are_options():
+    assert set(COMMON) <= {name for schema in SCHEMAS.values() for name, _, _ in leaves(schema)}
 
 
 def test_help_of_train_explains_what_is_no_option(capsys):

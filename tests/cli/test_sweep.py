@@ -7,6 +7,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -16,6 +17,7 @@ from forcegrasp.cli.main import main
 from forcegrasp.cli.options import compose
 from forcegrasp.cli.train import _begin_or_resume
 from forcegrasp.errors import CheckpointError
+from forcegrasp.runs.lock import only_writer
 from forcegrasp.runs.run_dir import RunDir
 from forcegrasp.train.logging import TrainingLog
 
@@ -95,14 +97,15 @@ def test_ctrl_c_ends_the_sweep_and_not_just_one_run(tiny, monkeypatch, capsys):
     assert started == [0]
 
 
-def test_the_same_sweep_again_goes_on(tiny, tmp_path, monkeypatch, capsys):
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGHUP, signal.SIGUSR1])
+def test_the_same_sweep_again_goes_on(tiny, tmp_path, monkeypatch, capsys, number):
     """As after a job that a scheduler ended and started anew: finished runs stay, the others end bit for bit alike."""
     log, interrupt = TrainingLog.batch, [False]
 
     def batch(self, *args):
         log(self, *args)
         if interrupt[0] and self.config.seed == 1:
-            signal.raise_signal(signal.SIGINT)
+            signal.raise_signal(number)
 
     monkeypatch.setattr(TrainingLog, "batch", batch)
     monkeypatch.setattr("forcegrasp.cli.train._draw_curves", lambda folder: None)
@@ -119,6 +122,44 @@ def test_the_same_sweep_again_goes_on(tiny, tmp_path, monkeypatch, capsys):
     assert final(RunDir("cut/ib_s1_1")) == final(RunDir("alone"))
     with pytest.raises(CheckpointError, match="already holds a run"):  # not the same: left alone
         _begin_or_resume(Path("alone"), compose("train", [*options, "seed=1", "ppo.epochs=3"]), [])
+
+
+def test_a_run_that_another_sweep_trains_is_named_and_the_others_are_trained(tiny, tmp_path, capsys):
+    """As when jobs of a scheduler are still at work when the sweep is typed again."""
+    sweep = ["train", "-m", "seed=0,1", *tiny["train"], "hydra.sweep.dir=sweep"]
+    with only_writer(Path("sweep/ib_s0_0/lock")):
+        assert main(sweep) == 2
+    first, _ = capsys.readouterr().err.splitlines()
+    assert first.startswith(f"sweep/ib_s0_0: process {os.getpid()} on ")
+    assert final(RunDir("sweep/ib_s1_1"))
+    assert main(sweep) == 0
+    assert not list(Path("sweep").rglob("failed.txt"))
+
+
+def test_a_sweep_that_is_stopped_side_by_side_saves_its_runs(tiny, tmp_path):
+    """The signal goes to the sweep alone, as a scheduler's may; the third run does not begin."""
+    options = [*tiny["train"], "ppo.total_frames=800000", "log.checkpoint_every=100000"]
+    command = ["train", "-m", "seed=0,1,2", *options, "hydra/launcher=joblib", "hydra.launcher.n_jobs=2"]
+    process = subprocess.Popen(
+        [sys.executable, "-m", "forcegrasp.cli.main", *command, "hydra.sweep.dir=sweep"],
+        env={**os.environ, "OMP_NUM_THREADS": "1"},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    runs = [RunDir("sweep/ib_s0_0"), RunDir("sweep/ib_s1_1")]
+    deadline = time.monotonic() + 120
+    while not all(run.metrics_path.exists() for run in runs) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    process.terminate()
+    out, err = process.communicate(timeout=120)
+    assert process.returncode == 130, err
+    assert err == "forcegrasp: interrupted\n"
+    for run in runs:
+        assert f"stopped and saved; go on with: forcegrasp train resume={run.path.resolve()}" in out
+        assert run.load()[1]["batches"] == len(run.metrics_path.read_text().splitlines()) - 1
+    assert {path.parent for path in Path("sweep").rglob("config.yaml")} == {run.path for run in runs}
+    assert not Path("sweep/stopped").exists()
 
 
 def test_submitit_runs_side_by_side_and_a_failing_run_takes_no_other_along(tiny, tmp_path):

@@ -12,11 +12,11 @@ import pytest
 from forcegrasp.compare.final_force import TableAnalysis, analyse_table
 from forcegrasp.compare.final_force_causes import CAUSES, MENU, causes_of
 from forcegrasp.compare.final_force_output import draw
-from forcegrasp.compare.report import write_report
 from forcegrasp.effects import catalogue
 from forcegrasp.measure.schema import FinalForceTable
 from forcegrasp.physics.gripper_file import load_gripper
 from forcegrasp.physics.plant import Plant, write_base
+from forcegrasp.reports.html import write_report
 
 GRIPPER = load_gripper("tiago")
 DELTA_M = np.arange(1, 11) * 3e-4

@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import dataclasses
+import io
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 from forcegrasp.compare import fit as fit_module
 from forcegrasp.compare import score as score_module
-from forcegrasp.compare.base_fit import check_gradient, fit_base, rms_error
+from forcegrasp.compare.base_fit import BaseFit, check_gradient, fit_base, rms_error
+from forcegrasp.compare.diagnose import Diagnosis, diagnose
+from forcegrasp.compare.diagnose_output import diagnosis_json, printed
+from forcegrasp.compare.diagnose_output import lines as lines_of
 from forcegrasp.compare.fit import Fit, Simulators, fit_exactly, fit_once
 from forcegrasp.compare.floor import beyond_fit, excess, numerical_error, numerical_floor
 from forcegrasp.compare.heldout import heldout_residual, make_folds, rms
@@ -21,6 +26,7 @@ from forcegrasp.compare.problem import Problem
 from forcegrasp.compare.refine import refine
 from forcegrasp.compare.score import Background, Signatures, best_sizes
 from forcegrasp.compare.target import Target, make_target
+from forcegrasp.compare.workflow import Loaded, model_of
 from forcegrasp.effects import get_effect
 from forcegrasp.measure import MeasuredGrasp, MeasurementSet
 from forcegrasp.measure.replay import Replay
@@ -149,6 +155,27 @@ def test_slopes(fitted):
     central = ((up - down) / 0.04 / SIGMA).ravel()
     ours = fit.jacobian[..., index].ravel()
     assert np.linalg.norm(ours - central) < 0.1 * np.linalg.norm(central)
+
+
+def test_slopes_follow_the_values_between_measurements(fitted, monkeypatch):
+    """Broyden's update (1965): along a step the new slopes give what was seen, across it they stay."""
+    fit, target = fitted.fit, fitted.target
+    local = fit_module._Local(target, fit.problem, fitted.simulators.cheap, fitted.simulators.cheap, None)
+    start, rng = fit.vector, np.random.default_rng(0)
+    before, value = local.slopes(start), local.value(start)
+    step = 0.2 * rng.standard_normal(len(start))
+    counts = []
+    monkeypatch.setattr(
+        fit_module, "predict", lambda replay, cases: counts.append(len(cases)) or predict(replay, cases)
+    )
+    after = local.slopes(start + step)
+    assert counts == [1]  # the values alone
+    seen = np.where(target.mask[..., None], (local.value(start + step) - value) / target.sigma, 0)
+    assert np.abs(seen - before @ step).max() > 0.1
+    assert after @ step == pytest.approx(seen, abs=1e-9)
+    across = rng.standard_normal(len(start))
+    across -= step * (across @ step) / (step @ step)
+    assert after @ across == pytest.approx(before @ across, abs=1e-9)
 
 
 def test_what_is_not_free_stays(fitted):
@@ -319,3 +346,49 @@ def test_a_right_model_leaves_nothing_and_a_wrong_one_does(fitted):
         fit_once(measure(BIAS)[0], fitted.problem, fitted.simulators, fit.vector), measure(BIAS)[0], folds
     )
     assert excess(off, left, target) != ""
+
+
+# --- a whole diagnosis ---------------------------------------------------------------------------------------------
+
+
+def diagnosed(fitted, target: Target, *names: str) -> Diagnosis:
+    start = fit_once(target, fitted.problem, fitted.simulators, fitted.fit.vector)
+    base, effects = BaseFit(start, (), True), [get_effect(name) for name in names]
+    return diagnose(target, base, fitted.simulators, effects, np.random.default_rng(0))
+
+
+def test_one_interval_everywhere(fitted):
+    """In words, in JSON and in the model file, a parameter has the same value and interval."""
+    target = measure(BIAS)[0]
+    diagnosis = diagnosed(fitted, target, "force_bias", "force_drift")
+    assert (diagnosis.verdict, diagnosis.effects) == ("effect", ("force_bias",))
+    expected = numerical_error(diagnosis.fit, target)
+    assert all(np.array_equal(one, other) for one, other in zip(diagnosis.numerical, expected, strict=True))
+    measured = MeasurementSet(Path(), "", "tiago", "", "", SIGMA[0], SIGMA[2], target.grasps, "")
+    model = model_of(diagnosis.fit, target, Loaded(measured, TIAGO, []), diagnosis.numerical)
+    found = diagnosis_json(diagnosis, None, [], "s")
+    lines, table = "\n".join(lines_of(diagnosis, None)), Console(width=200, record=True, file=io.StringIO())
+    table.print(printed(diagnosis))
+    shown = table.export_text()
+    for name, fitted_value in model.effects[0].parameters.items():
+        assert found["parameters"]["force_bias"][name] == dataclasses.asdict(fitted_value)
+        assert found["ranking"][0]["parameters"][name] == fitted_value.value
+        assert found["steps"][0]["ranking"][0]["parameters"][name] == fitted_value.value
+        assert f"{name} {fitted_value.value:.4g} N (95 %: {fitted_value.low:.4g} to {fitted_value.high:.4g})" in lines
+        assert f"{name} {fitted_value.value:.3g} N" in shown
+
+
+@pytest.mark.parametrize("shape", ["normal", "heavy tails"])
+def test_noise_that_is_not_as_said_is_no_missing_effect(fitted, shape):
+    rng, target = np.random.default_rng(5), fitted.target
+    noise = (
+        3 * rng.standard_normal(target.signals.shape) if shape == "normal" else rng.standard_t(3, target.signals.shape)
+    )
+    clean = exact(fitted.problem, truth_of(fitted.problem))
+    signals = np.where(target.mask[..., None], clean + SIGMA * noise, 0)
+    diagnosis = diagnosed(fitted, dataclasses.replace(target, signals=signals), "force_bias", "force_drift")
+    assert diagnosis.error_after > 1.4
+    assert (diagnosis.verdict, diagnosis.effects, diagnosis.left) == ("explained", (), "")
+    assert diagnosis.noise is not None
+    assert diagnosis.noise.unlike.all()
+    assert diagnosis.noise.heavy_tails.any() == (shape == "heavy tails")

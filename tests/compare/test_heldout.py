@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.stats import norm
 
 from forcegrasp.compare.fit import Fit
 from forcegrasp.compare.floor import cells, excess, numerical_floor
 from forcegrasp.compare.heldout import FOLDS, heldout_residual, log_likelihood, make_folds, rms
-from forcegrasp.compare.intervals import Z95, intervals, standard_errors, warnings
+from forcegrasp.compare.intervals import intervals, reached_bound, standard_errors, warnings
 from forcegrasp.compare.problem import Problem
 from forcegrasp.compare.target import PHASES, Target
 from forcegrasp.effects import get_effect
@@ -243,9 +245,13 @@ def test_standard_errors_see_what_numerical_error_shifts():
 def test_intervals_are_in_the_parameters_own_units_and_bounds():
     fit = fit_at(random_slopes(4), noise(), velocity_gain=-1.2, force_scale=3.0)
     found = dict(zip(ENTRIES, intervals(fit, np.array([0.05, 0.1, 0.02, 100.0])), strict=True))
-    assert found["position_gain"] == pytest.approx((100, 100 * np.exp(-Z95 * 0.05), 100 * np.exp(Z95 * 0.05)))
-    assert found["velocity_gain"] == pytest.approx((-1.2, -1.2 - Z95 * 0.1 * 9, -1.0))  # its bound
-    assert found["rho_m of cup"] == pytest.approx((0.0065, 0.0065 * np.exp(-Z95 * 0.02), 0.0065 * np.exp(Z95 * 0.02)))
+    low, high = norm.ppf([0.025, 0.975])
+    close = {"rel": 1e-4}
+    assert found["position_gain"] == pytest.approx((100, 100 * np.exp(low * 0.05), 100 * np.exp(high * 0.05)), **close)
+    assert found["velocity_gain"] == pytest.approx((-1.2, -1.2 + low * 0.1 * 9, -1.0), **close)  # its bound
+    assert found["rho_m of cup"] == pytest.approx(
+        (0.0065, 0.0065 * np.exp(low * 0.02), 0.0065 * np.exp(high * 0.02)), **close
+    )
     assert found["force_scale of cup"] == pytest.approx((3.0, 0.05, 30.0))  # nothing fixes it
 
 
@@ -270,8 +276,72 @@ def test_warning_of_a_parameter_that_nothing_fixes():
     assert warnings(fit_at(random_slopes(4), noise()), errors) == ["rho_m of cup is hardly fixed by these data"]
 
 
+def test_intervals_hold_the_truth_in_95_of_100_sets():
+    """A value that is off by its standard error times a normal number, 4,000 times."""
+    fit, rng, inside = fit_at(random_slopes(4), noise()), np.random.default_rng(0), []
+    errors, truth = np.full(4, 0.01), fit.values
+    for _ in range(1000):
+        missed = dataclasses.replace(fit, vector=fit.vector + errors * rng.standard_normal(4))
+        inside += [low <= t <= high for t, (_, low, high) in zip(truth, intervals(missed, errors), strict=True)]
+    assert np.mean(inside) == pytest.approx(0.95, abs=0.012)
+
+
+def test_hardly_fixed_parameters_are_one_warning():
+    errors = np.array([2.0, 2.0, 2.0, 0.01])
+    (line,) = warnings(fit_at(random_slopes(4), noise()), errors)
+    assert line == "position_gain, velocity_gain and rho_m of cup are hardly fixed by these data"
+
+
 def test_warning_of_two_that_do_the_same():
     slopes = random_slopes(4)
     slopes[..., 3] = -2 * slopes[..., 2] + 0.3 * slopes[..., 3]
     (line,) = warnings(fit_at(slopes, noise()), np.full(4, 0.01))
     assert re.match(r"rho_m of cup and force_scale of cup are confounded \(correlation 0\.9[89]\d\)", line)
+
+
+def test_eleven_pairs_are_one_warning():
+    """Softness and force scale of each of eleven objects, and the two gains."""
+    problem = Problem(TIAGO, [grasp(i, thing=f"thing {i}") for i in range(11)])
+    names = [e.name for e in problem.entries]
+    slopes = 50 * np.random.default_rng(3).standard_normal((11, S, 4, len(names)))
+    for one, other in [
+        ("position_gain", "velocity_gain"),
+        *((f"rho_m of thing {i}", f"force_scale of thing {i}") for i in range(11)),
+    ]:
+        first, second = names.index(one), names.index(other)
+        slopes[..., second] = slopes[..., first] + 0.05 * slopes[..., second]
+    residual = np.zeros((11, S, 4))
+    fit = Fit(problem, problem.start(), residual, residual, slopes, residual, 0.0, 1)
+    (line,) = warnings(fit, np.full(len(names), 0.01))
+    assert line.startswith("position_gain and velocity_gain are confounded (correlation -0.99")
+    assert "; rho_m and force_scale are confounded in 11 objects or grasps (correlation up to -0.99" in line
+    assert line.endswith(": only together are they fixed")
+
+
+def test_three_that_go_together_are_one_group():
+    covariance = np.eye(4)
+    covariance[:3, :3] += 99
+    slopes = np.zeros((G, S, 4, 4))
+    slopes[0, 0] = np.linalg.cholesky(np.linalg.inv(covariance)).T  # so that their covariance is this one
+    (line,) = warnings(fit_at(slopes, noise()), np.full(4, 0.01))
+    assert line == (
+        "position_gain, velocity_gain and rho_m of cup are confounded (correlation 0.990): only together are they fixed"
+    )
+
+
+@pytest.mark.parametrize(
+    ("value", "bounds", "bound"),
+    [
+        (1.0, (1.0, 9.0, False), 1.0),
+        (1.007, (1.0, 9.0, False), 1.0),
+        (1.009, (1.0, 9.0, False), None),
+        (8.993, (1.0, 9.0, False), 9.0),
+        (5.0, (1.0, 9.0, False), None),
+        (1.006, (1.0, 1000.0, True), 1.0),
+        (1.008, (1.0, 1000.0, True), None),
+        (0.0, (0.0, 9.0, False, 0.0), None),  # the effect is not there
+        (9.0, (0.0, 9.0, False, 0.0), 9.0),
+    ],
+)
+def test_bounds_that_were_reached(value, bounds, bound):
+    assert reached_bound(value, *bounds) == bound

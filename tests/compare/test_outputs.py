@@ -16,14 +16,16 @@ from forcegrasp.cli.results import write_json
 from forcegrasp.compare import compare_output, diagnose_output, figures, fit_output
 from forcegrasp.compare.base_fit import BaseFit
 from forcegrasp.compare.diagnose import Step
-from forcegrasp.compare.report import Picture
+from forcegrasp.compare.fit import Fit
+from forcegrasp.compare.workflow import model_of
 from forcegrasp.effects import get_effect
+from forcegrasp.reports.html import Picture, Table
 
 VERDICTS = ("effect", "one_of", "explained", "unknown", "not_fitted")
 
 
-def shown(renderable) -> str:
-    console = Console(width=80, record=True, file=open("/dev/null", "w"))  # noqa: SIM115
+def shown(renderable, width: int = 80) -> str:
+    console = Console(width=width, record=True, file=open("/dev/null", "w"))  # noqa: SIM115
     with console.file:
         console.print(renderable)
     return console.export_text()
@@ -130,6 +132,75 @@ def test_the_symptom_is_shown_where_it_is_strongest(made_up):
     assert "force left of grasp g3 on thing 1" in picture.caption
     labels = [text.get_text() for text in picture.figure.axes[0].get_legend().get_texts()]
     assert labels == ["measured", "without force_bias", "with force_bias"]
+
+
+def at_bounds(fit: Fit) -> Fit:
+    """The same fit, ended at each parameter's upper bound."""
+    return dataclasses.replace(fit, vector=fit.problem.high)
+
+
+def texts(sections) -> list[str]:
+    """All cells of all tables of a report."""
+    return [cell for s in sections for b in s.blocks if isinstance(b, Table) for row in b.rows for cell in row]
+
+
+def test_a_parameter_at_its_bound_is_marked_in_every_table(made_up):
+    fit = at_bounds(made_up.added.after)
+    model = model_of(fit, made_up.target, made_up.loaded, [])
+    assert "position_gain ended at its bound 300 N/m: widen it or doubt the model" in model.warnings
+    added = dataclasses.replace(made_up.added, after=fit, model=model)
+    base = BaseFit(fit, (1.0,), True)
+    for shown_texts in (
+        [shown(fit_output.printed_parameters(model))],
+        texts(fit_output.fit_sections(base, made_up.target, model)),
+        texts(fit_output.add_sections(added, get_effect("force_bias"))),
+    ):
+        assert any("300 (at its bound)" in text for text in shown_texts)
+        assert any("1 (at its bound)" in text for text in shown_texts)  # force_bias
+    plainly = shown(fit_output.printed_parameters(made_up.model))
+    assert "at its bound" not in plainly
+
+
+def test_a_diagnosis_marks_parameters_at_their_bounds(made_up, tmp_path):
+    one = made_up.diagnosis("one_of")
+    (step,) = one.steps
+    candidates = tuple(dataclasses.replace(c, fit=at_bounds(c.fit)) for c in step.candidates)
+    diagnosis = dataclasses.replace(
+        one, fit=candidates[0].fit, steps=(dataclasses.replace(step, candidates=candidates),)
+    )
+    bias, drift = (effect.parameters[0].high for effect in (get_effect("force_bias"), get_effect("force_drift")))
+    table = shown(diagnose_output.printed(diagnosis), 200)
+    cells = texts(diagnose_output.sections(diagnosis, None, made_up.tried))
+    for high in (bias, drift):
+        assert f"{high:g} (at its bound) N" in table
+        assert any(f"{high:g} (at its bound) N" in cell for cell in cells)
+    assert f"{bias:g} (at its bound)" in cells  # the table of the effect's parameters
+    lines = diagnose_output.lines(diagnosis, None)
+    assert any(line.startswith(f"  left_n {bias:g} (at its bound) N (95 %: ") for line in lines)
+    warning = f"force_bias.left_n ended at its bound {bias:g} N: widen it or doubt the model"
+    assert f"warning: {warning}" in lines
+    assert warning in plain(diagnose_output.diagnosis_json(diagnosis, None, made_up.tried, "s"), tmp_path)["warnings"]
+
+
+def test_values_of_a_step_give_way_to_final_ones(made_up):
+    """The second step moved what the first had found; what was not taken keeps its step's value."""
+    one = made_up.diagnosis("one_of")
+    bias = one.steps[0].candidates[0]
+    final = dataclasses.replace(bias.fit, vector=np.r_[bias.fit.vector[:-2], 0.0123 / 0.06, 0.0456 / 0.04])
+    diagnosis = dataclasses.replace(one, fit=final)
+    drift = dict(one.steps[0].candidates[1].parameters())
+    (left, right) = final.values[-2:]
+    assert left != pytest.approx(bias.parameters()["left_n"])
+    found = diagnose_output.diagnosis_json(diagnosis, None, made_up.tried, "s")
+    for rows in (found["ranking"], found["steps"][0]["ranking"]):
+        assert rows[0]["parameters"] == {"left_n": left, "right_n": right}
+        assert rows[1]["parameters"] == drift
+    table = shown(diagnose_output.printed(diagnosis), 200)
+    assert f"left_n {left:.3g} N" in table
+    cells = texts(diagnose_output.sections(diagnosis, None, made_up.tried))
+    assert any(f"left_n {left:.3g} N" in cell for cell in cells)
+    step_value = f"left_n {bias.parameters()['left_n']:.3g} N,"
+    assert not any(step_value in text for text in (table, *cells))
 
 
 # --- diagnose ------------------------------------------------------------------------------------------------------

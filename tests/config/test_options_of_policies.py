@@ -125,6 +125,7 @@ TRAIN_CASES: dict[str, Any] = {
 EVALUATE_CASES: dict[str, Any] = {
     "policies": ["informed"],
     "out": "elsewhere",
+    "detail": True,
     "baseline": "run",
     "objects": "paper",
     "kappas": 3,
@@ -211,6 +212,7 @@ def no_pictures(monkeypatch):
     Image.new("P", (2, 2)).save(gif, "GIF")
     monkeypatch.setattr("forcegrasp.train.logging.grasp_video", lambda *args, **kwargs: gif.getvalue())
     monkeypatch.setattr("matplotlib.figure.Figure.savefig", lambda self, path, **kwargs: Path(path).touch())
+    monkeypatch.setattr("forcegrasp.reports.html._svg", lambda figure: "")
 
 
 @pytest.fixture(scope="module")
@@ -233,6 +235,7 @@ def learned(plain_training, run_path) -> dict[str, list[str]]:
 def plain_evaluation(tmp_path_factory, learned):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("matplotlib.figure.Figure.savefig", lambda *args, **kwargs: None)
+        patch.setattr("forcegrasp.reports.html._svg", lambda figure: "")
         return evaluated(tmp_path_factory.mktemp("evaluate"), **learned)
 
 
@@ -295,7 +298,9 @@ def test_forces_that_the_reward_judges_differ_with_a_model(tmp_path):
     assert one["weights"] != other["weights"]
 
 
-@pytest.mark.parametrize("name", [n for n in EVALUATE_CASES if n not in ("out", "physics.threads", *ELSEWHERE)])
+@pytest.mark.parametrize(
+    "name", [n for n in EVALUATE_CASES if n not in ("out", "detail", "physics.threads", *ELSEWHERE)]
+)
 def test_option_of_evaluate(name, tmp_path, plain_evaluation, learned):
     different = evaluated(tmp_path, **learned | {name: EVALUATE_CASES[name]})
     assert different != plain_evaluation
@@ -339,6 +344,17 @@ def test_out_is_where_evaluate_writes(tmp_path, monkeypatch):
     tiny = [f"{name}={value}" for name, value in TINY_EVALUATION.items()]
     assert main(["evaluate", *tiny, f"out={EVALUATE_CASES['out']}"]) == 0
     assert json.loads((tmp_path / EVALUATE_CASES["out"] / "evaluation.json").read_text())["trials"] == 2
+
+
+def test_detail_of_evaluate_prints_more(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    tiny = [f"{name}={value}" for name, value in TINY_EVALUATION.items()]
+    said = []
+    for detail in (False, EVALUATE_CASES["detail"]):
+        assert main(["evaluate", *tiny, "out=here", f"detail={detail}"]) == 0
+        said.append(capsys.readouterr().out)
+    assert "interquartile mean" in said[1]
+    assert "interquartile mean" not in said[0]
 
 
 def test_every_option_of_render_has_a_case():

@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import pytest
 
-from forcegrasp.cli.options import SCHEMAS, compose, compose_run, leaves
+from forcegrasp.cli.options import HYDRA_OPTIONS, SCHEMAS, compose, compose_run, leaves
 from forcegrasp.config import validate
 from forcegrasp.errors import ConfigError
 
@@ -163,11 +163,44 @@ def test_misspelt_option_is_refused_with_the_right_name(verb, name):
         "hydra.callbacks={mine: {_target_: builtins.print}}",
         "+hydra.callbacks.mine._target_=builtins.print",
         "hydra.launcher={_target_: builtins.print}",
+        "hydra.searchpath=[file:///tmp]",
+        "hydra/callbacks=log_job_return",
+        "hydra.callbacks={}",
+        "hydra/sweeper=basic",
+        "hydra.sweeper.params={seed: 1}",
+        "hydra/job_logging=stdout",
+        "hydra.job_logging.handlers.file.class=os.system",
+        "hydra/launcher@hydra.callbacks=joblib",
+        "hydra.launcher.pre_dispatch=print(1)",
+        "hydra.launcher.setup=[ls]",
+        "hydra.job.chdir=true",
+        "hydra.output_subdir=x",
+        "--config-dir=/tmp",
+        "--config-path=/tmp",
     ],
 )
 def test_no_option_can_name_a_python_object(override):
     with pytest.raises(ConfigError):
         compose("train", [override])
+
+
+@pytest.mark.parametrize("verb", [verb for verb in SCHEMAS if verb != "train"])
+@pytest.mark.parametrize("override", ["hydra.run.dir=x", "hydra/launcher=joblib", "hydra.searchpath=[file:///tmp]"])
+def test_verbs_that_hydra_does_not_run_have_no_options_of_its_own(verb, override):
+    with pytest.raises(ConfigError, match="no option"):
+        compose(verb, [override])
+
+
+def test_what_a_training_takes_of_hydras_own_is_there():
+    plain = ["hydra.run.dir=a", "hydra.sweep.dir=b", "hydra/launcher=joblib", "hydra.launcher.n_jobs=2"]
+    assert compose_run("train", plain)[1] == "a"
+    assert {"hydra.run.dir", "hydra.sweep.dir", "hydra.launcher.n_jobs"} < set(HYDRA_OPTIONS)
+
+
+def test_options_of_slurm_are_the_launchers():
+    pytest.importorskip("hydra_plugins.hydra_submitit_launcher")  # of the extra cluster
+    slurm = [f"{name}=3" for name in HYDRA_OPTIONS if "launcher" in name and "n_jobs" not in name]
+    compose("train", ["hydra/launcher=submitit_slurm", *slurm])
 
 
 def test_a_folder_may_be_named_anything(tmp_path):

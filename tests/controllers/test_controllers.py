@@ -1,4 +1,4 @@
-"""The controllers by name, and those that mark what is possible."""
+"""The controllers by name, and those that others are held against."""
 
 from __future__ import annotations
 
@@ -8,14 +8,15 @@ import torch
 from tensordict import TensorDict
 
 from forcegrasp.config import ActionConfig, PhysicsConfig, SensorConfig
-from forcegrasp.controllers import CONTROLLERS, Constant, ForcePI, Informed, make_controller
+from forcegrasp.controllers import CONTROLLERS, Constant, ForcePI, InformedFeedForward, make_controller
 from forcegrasp.env import build_env
 from forcegrasp.errors import ConfigError
 from forcegrasp.physics import FixedGrasps
 
 
 @pytest.mark.parametrize(
-    ("name", "kind"), [("force_pi", ForcePI), ("informed", Informed), ("close", Constant), ("nothing", Constant)]
+    ("name", "kind"),
+    [("force_pi", ForcePI), ("informed", InformedFeedForward), ("close", Constant), ("nothing", Constant)],
 )
 def test_names(name, kind):
     assert type(make_controller(name)) is kind
@@ -42,7 +43,7 @@ def test_informed():
     had = torch.tensor([[1.0, 1.0], [0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [1.0, 1.0], [1.0, 1.0]])
     td = TensorDict({"had_contact": had, "goal_force": goal, "grasp_parameters": parameters}, batch_size=6)
     expected = [[-0.4, -0.4], [-1, -1], [0, -1], [-0.4, -0.4], [-0.1 / 0.15] * 2, [-1, -1]]
-    np.testing.assert_allclose(Informed()(td)["action"], expected, atol=1e-6)
+    np.testing.assert_allclose(InformedFeedForward()(td)["action"], expected, atol=1e-6)
 
 
 @pytest.mark.parametrize("name", CONTROLLERS)
@@ -57,6 +58,19 @@ def test_controllers_work_in_the_environment(name, draw):
     assert all(key in env.rollout(2, controller).keys(True) for key in controller.out_keys)
 
 
+def test_informed_is_a_static_feed_forward(draw):
+    """No force enters, so that the command after the second touch is one and the same: it can't be an upper bound."""
+    assert not [key for key in InformedFeedForward().in_keys if "force" in key and key != "goal_force"]
+    env = build_env(
+        4, physics=PhysicsConfig("fast", 1), sampler=FixedGrasps(draw(4)), sensors=SensorConfig(0.0, 0.0, 0.02)
+    )
+    rollout = env.rollout(80, InformedFeedForward())
+    after = rollout["action"][:, -30:]
+    assert rollout["had_contact"][:, -30:].all()
+    assert torch.equal(after, after[:, :1].expand_as(after))
+    assert (rollout["next", "force"][:, -30:].diff(dim=1).abs().amax() > 0).all()
+
+
 def test_informed_reaches_the_goal(draw):
     grasps = draw(16, offset_m=[-0.004, 0.004])
     env = build_env(
@@ -66,5 +80,5 @@ def test_informed_reaches_the_goal(draw):
         sensors=SensorConfig(0.0, 0.0, 0.02),
         action=ActionConfig(inductive_bias=False),
     )
-    after = env.rollout(150, Informed())["next"]
+    after = env.rollout(150, InformedFeedForward())["next"]
     np.testing.assert_allclose(after["force"][:, -25:].mean((1, 2)), grasps.goal_force_n, rtol=0.03)

@@ -42,6 +42,21 @@ def test_ranges_hold_from_the_next_reset_on(make):
     assert 0.01499 <= radius.min() < 0.016 < 0.034 < radius.max() <= 0.0350001
 
 
+@pytest.mark.parametrize("make", [GraspEnv, build_env])
+def test_offsets_lie_on_the_side_that_was_asked_for(make):
+    """The paper's range is symmetric, and hides a mirrored one."""
+    env = make(500, physics=FAST)
+    curriculum = CurriculumConfig(offset_m=[0.002, 0.004], end_fraction=0.5)
+    schedule = LinearSchedule(curriculum, GraspConfig(offset_m=[-0.003, 0.009]), RewardConfig(), FRAMES)
+    hook = CurriculumHook(schedule, env)
+    for frames, low, high in ((0, 0.002, 0.004), (FRAMES // 4, -0.0005, 0.0065), (FRAMES, -0.003, 0.009)):
+        assert hook.apply(frames).offset_m == pytest.approx((low, high))
+        offset = env.reset()["grasp_parameters"][:, 3]
+        margin = 0.05 * (high - low)
+        assert low - 1e-7 <= offset.min() < low + margin
+        assert high - margin < offset.max() <= high + 1e-7
+
+
 def test_grasp_in_hand_is_left_alone():
     env = build_env(20, physics=FAST)
     before = env.reset()

@@ -30,7 +30,7 @@ RUN = [
     "docs/write-an-effect.md",
     "docs/your-gripper.md",
 ]
-ELSEWHERE = {"docs/compare-your-data.md", "docs/deploy.md", "docs/gpu.md", "docs/tutorial.md"}
+ELSEWHERE = {"docs/compare-your-data.md", "docs/deploy.md", "docs/gpu.md", "docs/python.md", "docs/tutorial.md"}
 
 
 @pytest.fixture

@@ -19,7 +19,7 @@ from forcegrasp.measure.record import parse_effect
 from forcegrasp.policies import shipped_policies
 
 #: Programs of other packages.
-FOREIGN = {"pip", "tensorboard", ".", "pre-commit", "ray"}
+FOREIGN = {"pip", "git", "cd", "tensorboard", ".", "pre-commit", "ray"}
 #: What a reader of these pages has written before: an experiment, an effect.
 WRITTEN = {"experiment=blind": "experiment=ib", "experiment=ib,blind": "experiment=ib,no_ib"}
 OWN_EFFECTS = {"sensor_curvature"}

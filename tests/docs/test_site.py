@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import importlib
 import re
 import runpy
 
 import pytest
 from doc_pages import PAGES, ROOT
+
+import forcegrasp
 
 
 @pytest.fixture(scope="module")
@@ -43,3 +46,22 @@ def test_markdown_outside_is_a_download(conf):
     source = ["[a](../forcegrasp/policies/ib/card.md), [b](speed.md), [c](https://x.org/y.md)"]
     conf["read"](None, "results", source)
     assert source == ["[a](path:../forcegrasp/policies/ib/card.md), [b](speed.md), [c](https://x.org/y.md)"]
+
+
+def test_reference_is_made_of_docstrings(conf):
+    source = [PAGES["docs/reference.md"]]
+    conf["read"](None, "reference", source)
+    modules = re.findall(r"^\.\. automodule:: (\S+)\n   :members:$", source[0], re.MULTILINE)
+    assert modules == re.findall(r"^## `(.+)`$", PAGES["docs/reference.md"], re.MULTILINE)
+    offered = {name: module for module in modules for name in getattr(importlib.import_module(module), "__all__", ())}
+    missing = set(forcegrasp.__all__) - {"ForcegraspError"} - offered.keys()
+    assert not missing
+    for name, module in offered.items():
+        value = getattr(importlib.import_module(module), name)
+        assert not callable(value) or value.__doc__, f"{module}.{name} has no docstring"
+
+
+def test_other_pages_have_no_docstrings(conf):
+    source = ["## `forcegrasp.api`\n"]
+    conf["read"](None, "python", source)
+    assert source == ["## `forcegrasp.api`\n"]

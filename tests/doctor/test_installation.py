@@ -69,7 +69,7 @@ def test_all_files(told, tmp_path, monkeypatch):
     assert "trained policies: mine" in told(check_data, "fine")
 
 
-@pytest.mark.parametrize("lost", ["conf/train.yaml", "assets/tiago.xml", "compare/report.html"])
+@pytest.mark.parametrize("lost", ["conf/train.yaml", "assets/tiago.xml", "reports/report.html"])
 def test_a_file_is_missing(lost, told, tmp_path, monkeypatch):
     monkeypatch.setattr(installation, "files", files_of(tmp_path, lost))
     assert f"missing in the package: {lost}; install it again" in told(check_data, "mend")

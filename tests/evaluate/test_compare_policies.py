@@ -59,12 +59,13 @@ def untrained_run(path: Path, **sections) -> tuple[RunDir, Trainer]:
 def undrawn(monkeypatch) -> None:
     """Leaves out the drawing, which takes most of the time."""
     monkeypatch.setattr("matplotlib.figure.Figure.savefig", lambda *args, **kwargs: None)
+    monkeypatch.setattr("forcegrasp.reports.html._svg", lambda figure: "")
 
 
 @pytest.fixture(scope="module")
 def compared(tmp_path_factory) -> tuple[dict, Path, str]:
     """Two controllers compared: the report, its folder, and what was printed."""
-    out, console = tmp_path_factory.mktemp("out") / "deep" / "er", Console(file=io.StringIO(), width=100)
+    out, console = tmp_path_factory.mktemp("out") / "deep" / "er", Console(file=io.StringIO(), width=80)
     report = evaluate(evaluate_config(policies=["force_pi", "close"]), out, console)
     return report, out, console.file.getvalue()
 
@@ -80,7 +81,7 @@ def trials(compared) -> list[dict]:
 
 def test_files(compared):
     _, out, _ = compared
-    names = {"evaluation.json", "tables.md", "trials.csv", "force_reward.png", "displacement.png"}
+    names = {"evaluation.json", "tables.md", "trials.csv", "force_reward.png", "displacement.png", "report.html"}
     assert {path.name for path in out.iterdir()} == names | {"traces_force_pi.png", "traces_close.png"}
     for path in out.glob("*.png"):
         with Image.open(path) as picture:
@@ -232,10 +233,22 @@ def test_the_baseline_is_what_the_others_are_held_against(compared, tmp_path, un
     assert better["low"] <= better["probability"] <= better["high"]
     assert better["probability"] < 0.5
     assert "improvement" not in report["policies"]["force_pi"]["force_reward_normalised"]
-    assert "better than force_pi" in printed
+    assert "Baseline: force_pi" in printed
     config = evaluate_config(policies=["force_pi", "close"], baseline="close", kappas=1, trials=2)
     other = evaluate(config, tmp_path / "out", Console(file=io.StringIO()))
     assert "improvement" in other["policies"]["force_pi"]["force_reward_normalised"]
+
+
+def test_the_baseline_is_beaten_by_more_reward_and_by_less_movement(compared):
+    """Each figure counts in its own direction: close holds forces worse and moves the object more."""
+    report, _, _ = compared
+    other, base = report["policies"]["close"], report["policies"]["force_pi"]
+    for figure in ("force_reward_normalised", "force_reward_paper", "force_reward_measured"):
+        assert other[figure]["mean"] < base[figure]["mean"]
+        assert other[figure]["improvement"]["probability"] < 0.5, figure
+    for figure in ("displacement_total_mm", "overshoot_percent", "final_force_error_n"):
+        assert other[figure]["mean"] > base[figure]["mean"]
+        assert other[figure]["improvement"]["probability"] < 0.5, figure
 
 
 def test_objects_in_place_of_softness_values(tmp_path, undrawn):

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from forcegrasp.cli.main import main
-from forcegrasp.evaluate.video import NoRendererError
+from forcegrasp.physics.scene_renderer import NoRendererError
 
 MODEL = """format: forcegrasp-model/1
 gripper: tiago

@@ -44,6 +44,18 @@ def test_probability_of_improvement_of_normal_figures(shift):
     assert found["low"] < found["probability"] < found["high"]
 
 
+def test_the_interval_of_an_improvement_is_of_independent_resamples():
+    """Values and baseline are drawn apart from each other: 1.96 standard errors each way, by DeLong et al. (1988)."""
+    rng = np.random.default_rng(3)
+    baseline = rng.normal(0, 1, (3, 200))
+    for values in (baseline + 0.3, rng.normal(0.3, 1, (3, 200))):
+        better = (np.sign(values[:, :, None] - baseline[:, None, :]) + 1) / 2
+        variance = better.mean(2).var(1, ddof=1) / 200 + better.mean(1).var(1, ddof=1) / 200
+        expected = 2 * 1.96 * np.sqrt(variance.sum()) / 3
+        found = Bootstrap(3, 200, seed=1).improvement(values, baseline)
+        assert found["high"] - found["low"] == pytest.approx(expected, rel=0.12)
+
+
 def test_ties_count_half_and_certainty_is_certain():
     flat = np.ones((2, 10))
     bootstrap = Bootstrap(2, 10, seed=0)

@@ -25,7 +25,8 @@ from forcegrasp.evaluate.grasp_layout import (
     TOP_EDGE,
     WIDTH,
 )
-from forcegrasp.evaluate.video import NoRendererError, grasp_video
+from forcegrasp.evaluate.video import grasp_video
+from forcegrasp.physics.scene_renderer import NoRendererError
 from forcegrasp.runs.run_dir import RunDir
 from forcegrasp.train.loop import train
 
@@ -71,7 +72,7 @@ def test_scene_is_where_the_grasp_was(episode):
 
 
 def test_phases_are_marked_when_they_happened(episode):
-    figure = draw_grasp(episode, "close", SensorConfig())
+    figure = draw_grasp(episode, "close", SensorConfig(), "#0072b2")
     forces, moved = figure.axes
     seconds = summarise(episode[None], SensorConfig())
     assert float(seconds["both_contact_s"]) < 31 * 0.04
@@ -93,17 +94,25 @@ def test_pictures_of_several_policies_have_the_same_scales(episode):
     with torch.no_grad():
         other = env.rollout(31, make_controller("nothing"))[0]
     one, two = draw_grasps({"close": episode, "nothing": other}, SensorConfig())
-    alone = draw_grasp(episode, "close", SensorConfig())
+    alone = draw_grasp(episode, "close", SensorConfig(), "#0072b2")
     for axes, same, own in zip(one.axes, two.axes, alone.axes, strict=True):
         assert axes.get_ylim() == same.get_ylim()
         assert axes.get_ylim()[1] >= own.get_ylim()[1]
 
 
-def test_no_renderer(episode, monkeypatch):
-    monkeypatch.setenv("MUJOCO_GL", "nonsense")
-    with pytest.raises(NoRendererError, match="install") as caught:
+@pytest.mark.parametrize(
+    ("asked", "told"), [("broken", "with MUJOCO_GL=broken; unset MUJOCO_GL"), (None, "install libegl1 or libosmesa6")]
+)
+def test_no_renderer(asked, told, episode, monkeypatch):
+    """Who named a renderer that is none is not sent to install a library."""
+    monkeypatch.setattr("forcegrasp.physics.scene_renderer.backends", lambda: ("broken",))
+    monkeypatch.delenv("MUJOCO_GL", raising=False)
+    if asked:
+        monkeypatch.setenv("MUJOCO_GL", asked)
+    with pytest.raises(NoRendererError, match=told) as caught:
         grasp_video({"close": episode}, SensorConfig())
     assert "\n" not in str(caught.value)
+    assert ("install" in str(caught.value)) == (asked is None)
 
 
 def test_training_goes_on_without_a_renderer(tmp_path, monkeypatch, capsys):

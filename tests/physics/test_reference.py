@@ -1,32 +1,27 @@
-"""The authors' simulator, episode by episode.
+"""The authors' simulator, episode by episode; ``test_authors_instants.py`` has what a clone can hold it against.
 
-The episodes may not be shipped: set FORCEGRASP_REFERENCE to their folder (``index.csv`` and one CSV per episode), or
+The whole episodes are not shipped: set FORCEGRASP_REFERENCE to their folder (``index.csv`` and one CSV per episode), or
 keep them in ``shared/reference`` beside the checkout.
 """
 
 from __future__ import annotations
 
-import csv
 import os
 from pathlib import Path
 
 import numpy as np
 import pytest
 import torch
+from authors_episodes import EPISODES, INSTANTS, actions, parameters, read
 
 from forcegrasp.gpu.simulator import WarpGraspSimulator
-from forcegrasp.physics import GraspParameters, GraspSimulator
+from forcegrasp.physics import GraspSimulator
 
 FOLDER = Path(os.environ.get("FORCEGRASP_REFERENCE") or Path(__file__).parents[3] / "shared" / "reference")
 _INDEX_FILE = FOLDER / "index.csv"
-INDEX = list(csv.DictReader(_INDEX_FILE.read_text().splitlines())) if _INDEX_FILE.is_file() else []
+INDEX = read(_INDEX_FILE) if _INDEX_FILE.is_file() else []
 
-pytestmark = pytest.mark.skipif(not INDEX, reason=f"no reference episodes in {FOLDER}; set FORCEGRASP_REFERENCE")
-
-
-def _parameters() -> GraspParameters:
-    columns = ("kappa", "b2", "object_radius_m", "object_offset_m")
-    return GraspParameters(*(np.array([float(row[c]) for row in INDEX]) for c in columns), 0.1)
+pytestmark = pytest.mark.skipif(not INDEX, reason=f"no whole episodes in {FOLDER}; set FORCEGRASP_REFERENCE")
 
 
 @pytest.fixture(scope="session")
@@ -47,7 +42,7 @@ def _replay(tier: str, episodes: list[dict[str, np.ndarray]], warp: bool = False
     for i, episode in enumerate(episodes):
         actions[: len(episode["y"]), i] = episode["action"]
     simulator = (WarpGraspSimulator if warp else GraspSimulator)(len(episodes), tier)
-    simulator.reset(_parameters())
+    simulator.reset(parameters(INDEX))
     q, f, y = [], [], []
     for action in actions:
         simulator.step(torch.as_tensor(action * 0.003) if warp else action * 0.003)
@@ -111,6 +106,17 @@ def test_warp_over_all_episodes(warp, episodes, fast_deviations, tier):
 
 
 def test_softness_gives_the_authors_parameters():
-    parameters = _parameters()
-    np.testing.assert_allclose(parameters.rho_m, [float(row["rho_m"]) for row in INDEX], rtol=1e-8)
-    np.testing.assert_allclose(parameters.force_scale, [float(row["f_alpha"]) for row in INDEX], rtol=1e-8)
+    authors = parameters(INDEX)
+    np.testing.assert_allclose(authors.rho_m, [float(row["rho_m"]) for row in INDEX], rtol=1e-8)
+    np.testing.assert_allclose(authors.force_scale, [float(row["f_alpha"]) for row in INDEX], rtol=1e-8)
+
+
+def test_what_a_clone_has_is_taken_from_these(episodes):
+    assert [row["episode"] for row in EPISODES] == [row["name"] for row in INDEX]
+    np.testing.assert_array_equal(parameters(EPISODES).as_array(), parameters(INDEX).as_array())
+    for row, episode in zip(EPISODES, episodes, strict=True):
+        np.testing.assert_allclose(actions(row["actions"]), episode["action"], atol=1e-9)
+        for instant in (entry for entry in INSTANTS if entry["episode"] == row["episode"]):
+            step = int(instant["step"])
+            told = [float(instant[c]) for c in ("q_l_m", "q_r_m", "f_l_n", "f_r_n", "object_y_m")]
+            assert told == [*episode["q"][step], *episode["f"][step], episode["y"][step]]

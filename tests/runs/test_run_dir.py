@@ -192,6 +192,21 @@ def test_broken_config_is_refused(run, content, capsys):
     assert not capsys.readouterr().out
 
 
+@pytest.mark.parametrize("name", ["model", "seed", "ppo.hidden", "observation.parts"])
+@pytest.mark.parametrize("asked", ["${oc.env:OWN_SECRET}", "x${oc.env:OWN_SECRET}", "${seed}", "${oc.decode:'1'}"])
+def test_config_that_asks_for_another_value_is_refused(run, name, asked, monkeypatch):
+    """A stranger's file could show what the environment of whoever reads it holds."""
+    monkeypatch.setenv("OWN_SECRET", "hunter2")
+    options = yaml.safe_load(run.config_path.read_text())
+    section, _, leaf = name.rpartition(".")
+    (options[section] if section else options)[leaf] = [asked] if section else asked
+    run.config_path.write_text(yaml.safe_dump(options))
+    with pytest.raises(CheckpointError, match=r"\$\{...\} is not replaced in a file; write the value itself") as caught:
+        run.config()
+    assert name in str(caught.value)
+    assert "hunter2" not in str(caught.value)
+
+
 def test_config_that_is_no_text_is_refused(run):
     run.config_path.write_bytes(b"seed: \xff\xfe")
     with pytest.raises(CheckpointError):
@@ -219,6 +234,26 @@ def test_creating_over_a_run_is_refused(run):
     with pytest.raises(CheckpointError, match="already holds a run"):
         RunDir.create(run.path, TrainConfig(seed=9), [])
     assert run.config_path.read_text() == before
+
+
+def test_a_run_without_a_checkpoint_can_be_begun_again(run):
+    run.model_path.write_text("of a file that may have changed since")
+    command = json.loads((run.path / "run.json").read_text())["command"]
+    assert RunDir.create(run.path, TrainConfig(seed=7), ["seed=7", "log.keep=3"]).config() == TrainConfig(seed=7)
+    assert not run.model_path.exists()
+    assert json.loads((run.path / "run.json").read_text())["command"] == [*command, "log.keep=3"]
+    save(run, 1)
+    with pytest.raises(CheckpointError, match=f"already holds a run; continue it with resume={run.path}"):
+        RunDir.create(run.path, TrainConfig(seed=7), [])
+
+
+def test_a_run_with_nothing_but_its_best_goes_on_from_that(run):
+    run.save(5, {"x": torch.tensor([5])}, {"batches": 5}, keep=1, score=1.0)
+    damage(max(run.checkpoints.glob("frames_*")))
+    assert loaded_frames(run) == 5
+    max(run.checkpoints.glob("frames_*")).unlink()
+    assert run.has_checkpoint
+    assert loaded_frames(run) == 5
 
 
 def test_creating_under_a_file_is_refused(tmp_path):

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import pty
+import select
 import signal
 import subprocess
 import sys
@@ -12,11 +14,14 @@ from contextlib import contextmanager
 
 import pytest
 import torch
+from rich.progress import Progress
+from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
 from forcegrasp.cli.main import main
 from forcegrasp.errors import CheckpointError
 from forcegrasp.runs import checkpoint
 from forcegrasp.runs.run_dir import RunDir
+from forcegrasp.train.board import tag
 from forcegrasp.train.logging import TrainingLog
 from forcegrasp.train.loop import Trainer, train
 
@@ -35,6 +40,15 @@ def ctrl_c() -> None:
 
 def terminate() -> None:
     signal.raise_signal(signal.SIGTERM)
+
+
+def hang_up() -> None:
+    signal.raise_signal(signal.SIGHUP)
+    signal.raise_signal(signal.SIGHUP)  # a shell passes it on, and so does the system when the shell is gone
+
+
+def preempt() -> None:
+    signal.raise_signal(signal.SIGUSR1)
 
 
 @contextmanager
@@ -90,13 +104,16 @@ def equal(metrics) -> Callable[[RunDir, RunDir], bool]:
     return lambda one, other: final(one) == final(other) and metrics(one) == metrics(other)
 
 
-@pytest.mark.parametrize("action", [ctrl_c, terminate])
-@pytest.mark.parametrize("number", [1, 2, 4])
+@pytest.mark.parametrize(
+    ("number", "action"),
+    [(1, ctrl_c), (2, ctrl_c), (4, ctrl_c), (1, terminate), (4, terminate), (1, hang_up), (3, preempt)],
+)
 def test_after_a_signal(whole, run, equal, number, action):
-    handlers = [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)]
+    signals = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGUSR1)
+    handlers = [signal.getsignal(number) for number in signals]
     with after_batch(number, action):
         assert not train(run.config(), run)
-    assert [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)] == handlers
+    assert [signal.getsignal(number) for number in signals] == handlers
     assert run.load()[1]["batches"] == number
     assert resume(run)
     assert equal(run, whole)
@@ -187,11 +204,94 @@ def test_second_ctrl_c_ends_at_once(run):
         train(run.config(), run)
 
 
-def test_interrupted_before_the_first_checkpoint(run):
+@pytest.mark.parametrize("again", ["resume", "same command"])
+def test_interrupted_before_the_first_checkpoint(whole, run, equal, again):
+    """It is begun again, and nothing of the first attempt is left in what it shows."""
     with after_batch(1, power_cut), pytest.raises(PowerCutError):
         train(run.config(), run)
-    with pytest.raises(CheckpointError, match="no checkpoint yet"):
-        resume(run)
+    assert not run.has_checkpoint
+    assert resume(run) if again == "resume" else train(run.config(), RunDir.create(run.path, run.config(), []))
+    assert equal(run, whole)
+    events = EventAccumulator(str(run.tensorboard), size_guidance={"scalars": 0}).Reload()
+    steps = [event.step for event in events.Scalars(tag("episode/return"))]
+    assert steps == sorted(set(steps))
+    assert len(events.Tensors("2_config/text_summary")) == 1
+
+
+def test_a_signal_before_the_first_batch_leaves_a_checkpoint(run, monkeypatch):
+    prepare = Trainer.prepare
+
+    def interrupted(self):
+        if not self.frames:
+            terminate()
+        return prepare(self)
+
+    monkeypatch.setattr(Trainer, "prepare", interrupted)
+    assert not train(run.config(), run)
+    assert run.load()[1]["batches"] == 1
+
+
+def test_a_signal_after_a_batch_was_not_saved_saves_the_next(run, monkeypatch):
+    """Whatever instant it comes at, no batch is lost."""
+    show = Progress.update
+
+    def update(self, *args, **kwargs):
+        show(self, *args, **kwargs)
+        if kwargs["completed"] == run.config().ppo.total_frames * 3 // 5:
+            terminate()
+
+    monkeypatch.setattr(Progress, "update", update)
+    assert not train(run.config(), run)
+    assert run.load()[1]["batches"] == 4
+
+
+def test_signals_that_others_wait_for_are_left_to_them(whole, run, equal, monkeypatch):
+    """nohup ignores hang-ups; SLURM's jobs of submitit may be told by SIGUSR1 to start anew."""
+    told = []
+    before = [signal.signal(signal.SIGHUP, signal.SIG_IGN), signal.signal(signal.SIGUSR1, lambda *_: told.append(1))]
+    try:
+        with after_batch(1, lambda: (hang_up(), preempt())):
+            assert train(run.config(), run)
+    finally:
+        signal.signal(signal.SIGHUP, before[0])
+        signal.signal(signal.SIGUSR1, before[1])
+    assert told
+    assert equal(run, whole)
+
+
+def test_a_second_training_of_a_run_at_work_is_refused(whole, run, equal):
+    tried = []
+
+    def second():
+        tried.append(1)
+        assert len(tried) == 1, "it was let in"
+        with pytest.raises(CheckpointError, match=f"process {os.getpid()} on .* is training here"):
+            train(run.config(), run, resume=True)
+        with pytest.raises(CheckpointError, match="is training here"):
+            RunDir.create(run.path, run.config(), [])
+
+    with after_batch(2, second):
+        assert train(run.config(), run)
+    assert equal(run, whole)
+    assert not (run.path / "lock").exists()
+
+
+@pytest.mark.parametrize("number", [0, 2])
+def test_best_is_none_of_the_curriculum(tmp_path, tiny, trained, monkeypatch, number):
+    """A batch counts once all of it was the whole task: the curriculum ends within the batch of that number."""
+    scores = []
+    save = RunDir.save
+
+    def spy(self, *args, score, **kwargs):
+        scores.append(score)
+        return save(self, *args, score=score, **kwargs)
+
+    monkeypatch.setattr(RunDir, "save", spy)
+    end = (number + 0.5) / 5
+    run = trained(tmp_path, tiny(curriculum={"end_fraction": end}, log={"checkpoint_every": 1}))
+    assert [score is None for score in scores] == [batch <= number for batch in range(5)]
+    best = max(score for score in scores if score is not None)
+    assert run.load_file(run.best)[1]["batches"] == scores.index(best) + 1
 
 
 def test_same_seed_same_result(whole, run, equal):
@@ -275,3 +375,21 @@ def test_command_line_after_ctrl_c(tmp_path, metrics):
     assert main([*command, f"hydra.run.dir={uninterrupted.path}"]) == 0
     assert final(run) == final(uninterrupted)
     assert metrics(run) == metrics(uninterrupted)
+
+
+def test_command_line_after_a_lost_terminal(tmp_path, metrics):
+    """As when an ssh connection breaks: the terminal is gone, what is printed has no reader, and the run is saved."""
+    options = ["ppo.total_frames=800000", "ppo.grasps=2", "grasp.steps=40", "physics.threads=1", "ppo.hidden=[8]"]
+    quiet = ["log.histograms_every=0", "log.figures_every=0", "log.video_every=0", "log.checkpoint_every=100000"]
+    run = RunDir(tmp_path / "run")
+    command = [sys.executable, "-m", "forcegrasp.cli.main", "train", *options, *quiet, f"hydra.run.dir={run.path}"]
+    process, terminal = pty.fork()
+    if not process:
+        os.execve(sys.executable, command, {**os.environ, "OMP_NUM_THREADS": "1"})
+    deadline = time.monotonic() + 120
+    while not run.metrics_path.exists() and time.monotonic() < deadline:
+        if select.select([terminal], [], [], 0.02)[0]:
+            os.read(terminal, 10_000)
+    os.close(terminal)
+    assert os.waitstatus_to_exitcode(os.waitpid(process, 0)[1]) == 130
+    assert run.load()[1]["batches"] == len(metrics(run))

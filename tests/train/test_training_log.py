@@ -16,7 +16,7 @@ from forcegrasp.env.episodes import FIGURES
 from forcegrasp.runs.run_dir import RunDir
 from forcegrasp.train.board import CHARTS, OVERVIEW, tag
 from forcegrasp.train.logging import TrainingLog
-from forcegrasp.train.loop import train
+from forcegrasp.train.loop import _progress, train
 
 
 def events(run: RunDir):
@@ -46,7 +46,7 @@ def gif() -> bytes:
 @pytest.fixture(scope="module")
 def run(config, gif, tmp_path_factory, trained):
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("forcegrasp.train.logging.grasp_video", lambda *args: gif)
+        patch.setattr("forcegrasp.train.logging.grasp_video", lambda *args, **kwargs: gif)
         return trained(tmp_path_factory.mktemp("log") / "run", config)
 
 
@@ -166,6 +166,19 @@ def test_returns_are_the_sum_of_the_reward_terms(run, metrics, config):
         assert row["episode/return"] == pytest.approx(config.grasp.steps * step, rel=1e-4)
         assert row["episode/force_reward_paper"] == pytest.approx(50 * row["reward/force_paper"], rel=1e-4)
         assert row["episode/fast_steps"] == pytest.approx(-50 * row["reward/object"], rel=1e-4)
+
+
+def test_progress_shows_no_number_before_there_is_one(capsys):
+    figures = {"force_reward_normalised": 74.6, "displacement_until_grasped_mm": 0.123}
+    with _progress(1000, 0, 150):
+        pass
+    before = capsys.readouterr().out
+    assert "0 % of 1,000 frames" in before
+    assert "nan" not in before
+    assert "force reward" not in before
+    with _progress(1000, 0, 150) as progress:
+        progress(500, figures)
+    assert "50 % of 1,000 frames force reward 75/150 moved 0.12 mm" in capsys.readouterr().out
 
 
 def test_a_full_disk_is_not_told_by_tensorboards_thread(tiny, tmp_path, monkeypatch):

@@ -16,6 +16,7 @@ from tools.reliability.trial import Promise, Trial
 NAMES = (
     "kills",
     "resumes",
+    "writers",
     "full_disk",
     "measurements",
     "physics",

@@ -48,7 +48,7 @@ def trials(count: int, seed: int) -> Iterator[Trial]:
             problem = what_was_lost(path, every)
             if not problem and ended != -signal.SIGKILL:
                 problem = f"exit status {ended}: {last_words(path)}"
-            if not problem and list(path.glob("checkpoints/frames_*.safetensors")) and status(go_on(path)):
+            if not problem and (path / "config.yaml").exists() and status(go_on(path)):
                 problem = f"could not be resumed: {last_words(path)}"
             yield Trial(name, problem, f"killed {'inside a save' if killed % 2 else 'at an instant'}")
 

@@ -34,27 +34,18 @@ def trials(count: int, seed: int) -> Iterator[Trial]:
             seconds = time.monotonic() - started
             ended = kill_after(start(broken.path, config), float(rng.uniform(0.3, 1) * seconds))
             kills = int(ended < 0)
-            while kills < 3 and list(broken.checkpoints.glob("frames_*.safetensors")):
+            while kills < 3 and broken.config_path.exists():
                 kills += kill_after(go_on(broken.path), float(rng.uniform(0.3, 1) * seconds)) < 0
                 if rng.random() < 0.3:
                     break
-            last = (
-                go_on(broken.path)
-                if list(broken.checkpoints.glob("frames_*.safetensors"))
-                else _again(broken.path, config)
-            )
+            # killed before it was a run: the same again
+            last = go_on(broken.path) if broken.config_path.exists() else start(broken.path, config)
             if ended := status(last):
                 problem = f"exit status {ended} of the resumed training: {last_words(broken.path)}"
             else:
                 same = [a == b for a, b in zip(ending(whole), ending(broken), strict=True)]
                 problem = "" if all(same) else f"{'metrics' if same[0] else 'checkpoints'} differ"
             yield Trial(f"seed {number}, {kills} kills", problem, f"{kills} kills")
-
-
-def _again(path: Path, config) -> int:
-    """Starts a training anew that was killed before its first checkpoint."""
-    path.rename(path.with_name(f"{path.name} killed too early"))
-    return start(path, config)
 
 
 PROMISE = Promise("a resumed training ends with the same bits as an uninterrupted one", 20, 1, trials)

@@ -36,7 +36,11 @@ OPTIONS = [
     "-cd",
     "hydra/launcher=../evil",
     "hydra/launcher=evil",
+    "hydra.callbacks={evil:{}}",
+    "hydra.sweeper.params={seed:1}",
 ]
+#: Together they would have Hydra build an object that a file names.
+CALLBACK = ["hydra.searchpath=[file://evil]", "hydra/callbacks=evil"]
 
 
 def attacks() -> Iterator[Attack]:
@@ -44,6 +48,9 @@ def attacks() -> Iterator[Attack]:
         for multirun in ([], ["-m"]):
             arguments = ["train", *multirun, option, "ppo.total_frames=1"]
             yield Attack(" ".join(arguments[:-1]), _lay, partial(_refused, arguments), seconds=20)
+    for verb in ("train", "evaluate", "record"):
+        arguments = [verb, *CALLBACK, *(["-m", "seed=0,1", "ppo.total_frames=1"] if verb == "train" else [])]
+        yield Attack(f"{verb} {' '.join(CALLBACK)}", _lay, partial(_refused, arguments), seconds=20)
     for verb in ("evaluate", "render", "export", "compare", "fit", "diagnose", "record"):
         yield Attack(f"{verb} _target_", _lay, partial(_refused, [verb, "+_target_=os.system"]), seconds=20)
     for name in ("../outside/secret", "/etc/passwd", "/dev/zero", "evil"):
@@ -53,9 +60,11 @@ def attacks() -> Iterator[Attack]:
 
 
 def _lay() -> None:
-    for folder in (Path("evil"), Path("evil/experiment")):
-        folder.mkdir()
+    for folder in (Path("evil"), Path("evil/experiment"), Path("evil/hydra/callbacks")):
+        folder.mkdir(parents=True)
         (folder / "evil.yaml").write_text(f"_target_: os.system\n_args_: ['touch {MARK}']\n")
+    callback = f"evil:\n  _target_: os.system\n  command: touch {MARK}\n"
+    (Path("evil") / "hydra" / "callbacks" / "evil.yaml").write_text(callback)
     (Path("evil") / "config.yaml").write_text(f"_target_: os.system\n_args_: ['touch {MARK}']\n")
 
 

@@ -49,7 +49,7 @@ class Section:
     blocks: list[Text | Table | Picture] = field(default_factory=list)
 
 
-def write_report(path: Path, title: str, lead: str, sections: Sequence[Section], facts: dict[str, str]) -> Path:
+def write_report(path: str | Path, title: str, lead: str, sections: Sequence[Section], facts: dict[str, str]) -> Path:
     """Writes a report.
 
     Args:
@@ -62,8 +62,9 @@ def write_report(path: Path, title: str, lead: str, sections: Sequence[Section],
     Raises:
       ConfigError: if the file can't be written.
     """
+    path = Path(path)
     environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("forcegrasp.compare", "."), autoescape=True, undefined=jinja2.StrictUndefined
+        loader=jinja2.PackageLoader("forcegrasp.reports", "."), autoescape=True, undefined=jinja2.StrictUndefined
     )
     environment.globals.update(svg=_svg, kind=lambda block: type(block).__name__)
     html = environment.get_template("report.html").render(

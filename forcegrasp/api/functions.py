@@ -1,0 +1,222 @@
+"""What ``import forcegrasp as fg`` offers for measurements: each function does what the verb of its name does."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TypeVar
+
+from forcegrasp.api.results import (
+    AddResult,
+    CompareResult,
+    DiagnoseResult,
+    FitResult,
+    ModelResult,
+    TableResult,
+)
+from forcegrasp.cli import measuring
+from forcegrasp.cli.results import default_out
+from forcegrasp.compare import workflow
+from forcegrasp.compare.advice import advise
+from forcegrasp.compare.final_force import analyse_table
+from forcegrasp.compare.workflow import Loaded, Progress
+from forcegrasp.config import CompareConfig, DiagnoseConfig, FitConfig, validate
+from forcegrasp.effects import catalogue
+from forcegrasp.effects.model_file import Model, read_model, write_model
+from forcegrasp.errors import ConfigError
+from forcegrasp.measure import FinalForceTable, MeasurementSet
+from forcegrasp.short_repr import cut
+
+Writable = TypeVar("Writable", FitResult, AddResult)
+AnySet = Loaded[MeasurementSet] | Loaded[FinalForceTable] | str | Path
+AnyModel = Model | ModelResult | str | Path
+
+
+def load(path: str | Path) -> Loaded[MeasurementSet] | Loaded[FinalForceTable]:
+    """Reads and checks a measurement set.
+
+    Args:
+      path: a folder with ``meta.yaml``, ``grasps.csv`` and ``samples.csv`` (or ``samples.parquet``); or, for a table of
+        final forces, with ``meta.yaml`` and ``table.csv``.
+
+    Returns:
+      The set in ``measured``, its gripper, and in ``warnings`` what is odd about it.
+
+    Raises:
+      MeasurementError: if the set can't be right: file, row, column and what to do.
+      ConfigError: if its gripper is unknown.
+    """
+    return workflow.load(path)
+
+
+def compare(
+    data: AnySet, model: AnyModel | None = None, *, seed: int = 0, progress: Progress | None = None
+) -> CompareResult | TableResult:
+    """Finds out where a model fails on measured grasps.
+
+    Args:
+      data: what :func:`load` returns, or the set's folder.
+      model: what :func:`fit`, :func:`diagnose` or :func:`add` returned, or a model's file; a model that was fitted to
+        other grasps is tested on all of these. Without one, the base model is fitted to these grasps first.
+      seed: of the fit's starts.
+      progress: told in a line what is going on, such as ``print``; nothing is said by default.
+
+    Raises:
+      MeasurementError: if the set can't be right.
+      ConfigError: if the model can't be read, is of another gripper, or is given for a table of final forces.
+    """
+    validate(CompareConfig(seed=seed))
+    loaded, tell = _open(data, progress)
+    if measuring.is_table(loaded):
+        return _analyse(loaded, "compare", model=model)
+    given = None if model is None else _model(model)
+    comparison, used, notes = workflow.compare(loaded, given, seed, tell)
+    name = "" if model is None else str(model) if isinstance(model, (str, Path)) else repr(model)
+    return CompareResult(loaded, comparison, used, name, (*notes, *used.warnings))
+
+
+def fit(data: AnySet, *, out: str | Path | None = None, seed: int = 0, progress: Progress | None = None) -> FitResult:
+    """Fits a gripper's base model to measured grasps, from several starts.
+
+    Args:
+      data: what :func:`load` returns, or the set's folder.
+      out: the file to write the model to; none by default.
+      seed: of the fit's starts.
+      progress: told in a line what is going on, such as ``print``; nothing is said by default.
+
+    Raises:
+      MeasurementError: if the set can't be right.
+      ConfigError: if the set is a table of final forces, or the file can't be written.
+    """
+    validate(FitConfig(seed=seed))
+    path = _file(out)
+    loaded, tell = _open(data, progress)
+    grasps = measuring.refuse_table(loaded, "fit")
+    target, _, base = workflow.fit_model(grasps, seed, tell)
+    return _written(FitResult(grasps, target, base, measuring.base_model(base, target, grasps), path))
+
+
+def diagnose(
+    data: AnySet,
+    model: AnyModel | None = None,
+    *,
+    effects: str | Sequence[str] = (),
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> DiagnoseResult | TableResult:
+    """Finds out which physical effects a model lacks, and which grasp to record next.
+
+    Args:
+      data: what :func:`load` returns, or the set's folder; six grasps at least.
+      model: what to start from, as for :func:`compare`; its parameters are fitted again. The base model by default.
+      effects: names of the effects to try; the whole catalogue by default.
+      seed: of the fit's starts and of the null distribution.
+      progress: told in a line what is going on, such as ``print``; nothing is said by default.
+
+    Raises:
+      MeasurementError: if the set can't be right, or has too few grasps to hold any out.
+      ConfigError: if an effect is unknown, the model can't be read or is of another gripper, or one of them is given
+        for a table of final forces.
+    """
+    validate(DiagnoseConfig(seed=seed))
+    only = (effects,) if isinstance(effects, str) else tuple(effects)
+    tried = measuring.check_effects("effects", only) or list(catalogue().values())
+    loaded, tell = _open(data, progress)
+    if measuring.is_table(loaded):
+        return _analyse(loaded, "diagnosis", model=model, effects=only)
+    given = None if model is None else _model(model)
+    diagnosis, _ = workflow.diagnose_set(loaded, given, [effect.name for effect in tried], seed, tell)
+    return DiagnoseResult(loaded, diagnosis, advise(diagnosis), tuple(tried), only, given is None)
+
+
+def add(
+    data: AnySet,
+    model: AnyModel,
+    effect: str,
+    *,
+    out: str | Path | None = None,
+    progress: Progress | None = None,
+) -> AddResult:
+    """Adds an effect to a model and fits it again, if the error on held-out grasps falls by that.
+
+    Args:
+      data: what :func:`load` returns, or the set's folder; two grasps at least.
+      model: the model to add to, as for :func:`compare`.
+      effect: its name; :func:`diagnose` tells which.
+      out: the file to write the model to; none by default.
+      progress: told in a line what is going on, such as ``print``; nothing is said by default.
+
+    Raises:
+      MeasurementError: if the set can't be right.
+      ConfigError: if the effect is unknown, in the model already, or does not help; if the model is of another gripper,
+        the set is a table of final forces, or the file can't be written.
+    """
+    (chosen,) = measuring.check_effects("effect", [effect])
+    path = _file(out)
+    loaded, tell = _open(data, progress)
+    grasps = measuring.refuse_table(loaded, "add")
+    measuring.refuse_one_grasp(grasps)
+    added = workflow.add_effect(grasps, _model(model), chosen, tell)
+    measuring.refuse_useless(added, chosen, "forcegrasp.diagnose")
+    return _written(AddResult(grasps, added, chosen, path))
+
+
+def report(result: ModelResult | TableResult, out: str | Path | None = None) -> Path:
+    """Writes a result as the verb does: ``report.html``, which works offline, its figures as JSON, and fitted models.
+
+    Args:
+      result: what :func:`compare`, :func:`fit`, :func:`diagnose` or :func:`add` returned.
+      out: the folder; a new one below ``runs`` by default.
+
+    Returns:
+      The path of ``report.html``.
+
+    Raises:
+      ConfigError: if the folder can't be written.
+    """
+    verb = "diagnose" if result.file == "diagnosis" else result.file
+    folder = measuring.check_folder(default_out(verb, str(out or "")))
+    for name, model in result.models().items():
+        write_model(model, folder / name)
+    return measuring.write_files(
+        folder, result.file, result.to_dict(), result.title, result.answer, result.sections(), result.data
+    )
+
+
+def _open(data: AnySet, progress: Progress | None) -> tuple[Loaded[MeasurementSet] | Loaded[FinalForceTable], Progress]:
+    """The set, and what is told about the work; first what is odd about it."""
+    loaded = data if isinstance(data, Loaded) else load(data)
+    tell = progress or _nothing
+    for warning in loaded.warnings:
+        tell(f"warning: {warning}")
+    return loaded, tell
+
+
+def _nothing(line: str) -> None:
+    """Tells nobody."""
+
+
+def _model(model: AnyModel) -> Model:
+    if isinstance(model, (str, Path)):
+        return read_model(model)
+    if isinstance(model, Model):
+        return model
+    if not isinstance(model, ModelResult):
+        raise ConfigError(f"model: {cut(repr(model), 100)} is none; give what fit, diagnose or add returned, or a file")
+    return model.model
+
+
+def _file(out: str | Path | None) -> Path | None:
+    return None if out is None else measuring.check_file(Path(out))
+
+
+def _written(result: Writable) -> Writable:
+    """The result, its model written if there is a file to write it to."""
+    if result.path is not None:
+        write_model(result.model, result.path)
+    return result
+
+
+def _analyse(loaded: Loaded[FinalForceTable], file: str, **unused: object) -> TableResult:
+    measuring.refuse_options(loaded, **unused)
+    return TableResult(loaded, analyse_table(loaded.measured, loaded.gripper), file)

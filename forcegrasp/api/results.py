@@ -1,0 +1,314 @@
+"""What the functions of :mod:`forcegrasp.api` return: the answer, figures, arrays, and what a report is made of."""
+
+from __future__ import annotations
+
+import dataclasses
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from forcegrasp.cli import measuring
+from forcegrasp.compare import compare_output, diagnose_output, fit_output, workflow
+from forcegrasp.compare.advice import Advice
+from forcegrasp.compare.base_fit import BaseFit
+from forcegrasp.compare.comparison import Comparison
+from forcegrasp.compare.diagnose import Diagnosis
+from forcegrasp.compare.final_force import TableAnalysis
+from forcegrasp.compare.floor import numerical_error
+from forcegrasp.compare.heldout import rms
+from forcegrasp.compare.target import Target
+from forcegrasp.compare.workflow import Added, Loaded
+from forcegrasp.effects import Effect
+from forcegrasp.effects.model_file import Model
+from forcegrasp.measure import FinalForceTable, MeasurementSet
+from forcegrasp.short_repr import ShortRepr, counted, cut, some
+
+if TYPE_CHECKING:
+    from forcegrasp.reports.html import Section
+
+
+class Result(ShortRepr):
+    """Base of all results. Errors are in units of the sensor noise: 1 is as good as it gets."""
+
+    data: Any  #: the set, as :func:`forcegrasp.api.load` returns it
+    file: str  #: name of its JSON file, without the ending
+
+    @property
+    def answer(self) -> str:
+        """The result in a sentence or two."""
+        raise NotImplementedError
+
+    @property
+    def title(self) -> str:
+        """Heading of the report."""
+        raise NotImplementedError
+
+    def to_dict(self) -> dict[str, Any]:
+        """All figures in plain types: what the verb writes as JSON."""
+        raise NotImplementedError
+
+    def sections(self) -> list[Section]:
+        """The sections of the report: what the answer rests on."""
+        raise NotImplementedError
+
+    def models(self) -> dict[str, Model]:
+        """The models that lie beside the report, by the names of their files."""
+        return {}
+
+    @property
+    def name(self) -> str:
+        """The set's name."""
+        return self.data.measured.name
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class CompareResult(Result):
+    """Where a model fails."""
+
+    data: Loaded[MeasurementSet]
+    comparison: Comparison  #: all arrays, measured, predicted and their difference
+    model: Model  #: what was judged
+    given: str  #: what that model was given as; empty if it is the base model, fitted to this set
+    notes: tuple[str, ...]  #: what to bear in mind
+
+    file = "compare"
+
+    @property
+    def error(self) -> float:
+        """rms error on held-out grasps."""
+        return self.comparison.floor_ratio()
+
+    @property
+    def floor(self) -> float:
+        """The error that a perfect model would leave."""
+        return self.comparison.floor
+
+    @property
+    def answer(self) -> str:
+        return compare_output.answer(self.comparison)
+
+    @property
+    def title(self) -> str:
+        return f"Where the model fails: {self.name}"
+
+    def to_dict(self) -> dict[str, Any]:
+        name = self.given or "base model, fitted to this set"
+        return compare_output.compare_json(self.comparison, self.name, name, list(self.notes))
+
+    def sections(self) -> list[Section]:
+        return compare_output.sections(self.comparison, list(self.notes))
+
+    def models(self) -> dict[str, Model]:
+        return {} if self.given else {measuring.BASE_MODEL: dataclasses.replace(self.model, warnings=self.notes)}
+
+    def summary(self) -> str:
+        worst = compare_output.worst_cell(self.comparison.cells())
+        return (
+            f"{cut(self.name)}: error {self.error:.2f} × noise, a perfect model {self.floor:.2f};"
+            f" largest in {worst.phase}, {worst.signal}: {worst.ratio:.1f} × noise"
+        )
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class FitResult(Result):
+    """A gripper's base model."""
+
+    data: Loaded[MeasurementSet]
+    target: Target
+    base: BaseFit
+    model: Model  #: with 95 % intervals
+    path: Path | None  #: where it was written to
+
+    file = "fit"
+
+    @property
+    def converged(self) -> bool:
+        """Whether to believe the fit; ``base.reason`` says why not."""
+        return self.base.converged
+
+    @cached_property
+    def error(self) -> float:
+        """rms error on held-out grasps; NaN where there are too few to hold any out."""
+        return rms(fit_output.held_out(self.base.fit, self.target), self.target)
+
+    @property
+    def answer(self) -> str:
+        return fit_output.fit_answer(self.base, self.target)
+
+    @property
+    def title(self) -> str:
+        return f"Base model of {self.name}"
+
+    def to_dict(self) -> dict[str, Any]:
+        return fit_output.fit_json(self.base, self.target, self.model, self.name, self.path or Path("model.yaml"))
+
+    def sections(self) -> list[Section]:
+        return fit_output.fit_sections(self.base, self.target, self.model)
+
+    def models(self) -> dict[str, Model]:
+        return {"model.yaml": self.model}
+
+    def summary(self) -> str:
+        verdict = "converged" if self.converged else f"NOT fitted, {cut(self.base.reason, 100)}"
+        parameters = counted(len(self.base.fit.vector), "parameter")
+        warnings = counted(len(self.model.warnings), "warning")
+        return f"{cut(self.name)}: {verdict}; error {self.error:.2f} × noise, {parameters}, {warnings}"
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class DiagnoseResult(Result):
+    """Which physical effects a model lacks."""
+
+    data: Loaded[MeasurementSet]
+    diagnosis: Diagnosis  #: all steps of the search, with every candidate
+    advice: Advice | None  #: which grasp to record next
+    tried: tuple[type[Effect], ...]
+    only: tuple[str, ...]  #: the effects that were asked for; empty if all were tried
+    from_base: bool  #: whether it starts from the base model, for none was given
+
+    file = "diagnosis"
+
+    @property
+    def verdict(self) -> str:
+        """One of "effect", "one_of", "explained", "unknown" and "not_fitted"."""
+        return self.diagnosis.verdict
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """The effects that were found, in that order; with "one_of", those that the data can't tell apart."""
+        return self.diagnosis.effects
+
+    @property
+    def error_before(self) -> float:
+        """rms error on held-out grasps, without any effect."""
+        return self.diagnosis.error_before
+
+    @property
+    def error_after(self) -> float:
+        """The same with the effects that were found."""
+        return self.diagnosis.error_after
+
+    @cached_property
+    def model(self) -> Model:
+        """The fitted model, with the effects that were found; of those that can't be told apart with the first."""
+        diagnosis = self.diagnosis
+        if self.verdict not in ("effect", "one_of"):
+            return self._base_model
+        numerical = numerical_error(diagnosis.fit, diagnosis.target)
+        return workflow.model_of(diagnosis.fit, diagnosis.target, self.data, numerical)
+
+    @cached_property
+    def _base_model(self) -> Model:
+        return measuring.base_model(self.diagnosis.base, self.diagnosis.target, self.data)
+
+    @property
+    def answer(self) -> str:
+        answer = diagnose_output.answer(self.diagnosis)
+        return f"{answer} Only {', '.join(self.only)} were tried." if self.only else answer
+
+    @property
+    def title(self) -> str:
+        return f"What the model lacks: {self.name}"
+
+    def to_dict(self) -> dict[str, Any]:
+        return diagnose_output.diagnosis_json(self.diagnosis, self.advice, self.tried, self.name)
+
+    def sections(self) -> list[Section]:
+        return diagnose_output.sections(self.diagnosis, self.advice, self.tried)
+
+    def models(self) -> dict[str, Model]:
+        base = {measuring.BASE_MODEL: self._base_model} if self.from_base else {}
+        return base | ({"model.yaml": self.model} if self.verdict in ("effect", "one_of") else {})
+
+    def summary(self) -> str:
+        found = f"{self.verdict} {some(self.effects)}".strip()
+        fall = f"error {self.error_before:.2f} → {self.error_after:.2f} × noise, floor {self.diagnosis.floor:.2f}"
+        return f"{cut(self.name)}: {found}; {fall}"
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class AddResult(Result):
+    """A model with an effect added."""
+
+    data: Loaded[MeasurementSet]
+    added: Added  #: both fits
+    effect: type[Effect]
+    path: Path | None  #: where the model was written to
+
+    file = "add"
+
+    @property
+    def model(self) -> Model:
+        """The model with the effect."""
+        return self.added.model
+
+    @property
+    def error_before(self) -> float:
+        """rms error on held-out grasps, without the effect."""
+        return self.added.error_before
+
+    @property
+    def error_after(self) -> float:
+        """The same with it."""
+        return self.added.error_after
+
+    @property
+    def answer(self) -> str:
+        return fit_output.add_answer(self.added, self.effect)
+
+    @property
+    def title(self) -> str:
+        return f"{self.effect.name} added: {self.name}"
+
+    def to_dict(self) -> dict[str, Any]:
+        return fit_output.add_json(self.added, self.effect, self.name, self.path or Path("model.yaml"))
+
+    def sections(self) -> list[Section]:
+        return fit_output.add_sections(self.added, self.effect)
+
+    def models(self) -> dict[str, Model]:
+        return {"model.yaml": self.model}
+
+    def summary(self) -> str:
+        fall = f"error {self.error_before:.2f} → {self.error_after:.2f} × noise"
+        return f"{cut(self.name)}: {self.effect.name} added; {fall}"
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class TableResult(Result):
+    """A table of final forces against the model's static law."""
+
+    data: Loaded[FinalForceTable]
+    analysis: TableAnalysis
+    file: str  #: "compare" or "diagnosis"
+
+    @property
+    def verdict(self) -> str:
+        """One of "one_of", "explained", "unknown" and "not_fitted"; a table alone never names one effect."""
+        return self.analysis.verdict
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """What could make the shape that was found."""
+        return self.analysis.effects
+
+    @property
+    def answer(self) -> str:
+        return measuring.table_answer(self.analysis)
+
+    @property
+    def title(self) -> str:
+        return measuring.table_title(self.data, self.file)
+
+    def to_dict(self) -> dict[str, Any]:
+        return self.analysis.compare_json() if self.file == "compare" else self.analysis.diagnosis_json()
+
+    def sections(self) -> list[Section]:
+        return self.analysis.sections()
+
+    def summary(self) -> str:
+        return f"{cut(self.name)}: {self.verdict} {some(self.effects) or cut(self.analysis.reason, 150)}"
+
+
+#: What a model can be taken from.
+ModelResult = CompareResult | FitResult | DiagnoseResult | AddResult

@@ -1,0 +1,55 @@
+"""The functions on results made up by hand: what is simulated is tried by the verbs' own tests and by the tutorial."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from forcegrasp.api import results
+from forcegrasp.compare import advice, floor, workflow
+from tests.compare.conftest import made_up as made_up  # a fixture
+
+TABLE_META = "format: forcegrasp-measurements/1\nkind: final_force\ngripper: tiago\nsource: a test\nlicense: none\n"
+
+
+@pytest.fixture
+def table(tmp_path) -> Path:
+    """A table of final forces with a dead zone."""
+    folder = tmp_path / "table"
+    folder.mkdir()
+    (folder / "meta.yaml").write_text(TABLE_META)
+    rows = [f"foam,{0.0002 * k:g},{0.06 * max(0, k - 1) + 0.001 * (-1) ** k:g}" for k in range(1, 11)]
+    (folder / "table.csv").write_text("\n".join(["object,delta_q_m,final_force_n", *rows]) + "\n")
+    return folder
+
+
+@pytest.fixture
+def work(made_up, monkeypatch, tmp_path) -> SimpleNamespace:
+    """Nothing is simulated: the workflow returns what was made up. ``calls`` holds what it was asked."""
+    calls: dict[str, tuple] = {}
+
+    def returns(name: str, value: object) -> Callable:
+        def stub(*arguments, **options):
+            calls[name] = (*arguments, *options.values())
+            return value
+
+        return stub
+
+    load, diagnosis = workflow.load, made_up.diagnosis("effect")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(workflow, "load", lambda path: made_up.loaded if str(path) == "my_set" else load(path))
+    for name, value in {
+        "compare": (made_up.comparison, made_up.model, ["a note"]),
+        "fit_model": (made_up.target, None, made_up.base),
+        "diagnose_set": (diagnosis, None),
+        "add_effect": made_up.added,
+    }.items():
+        monkeypatch.setattr(workflow, name, returns(name, value))
+    monkeypatch.setattr(advice, "advise", lambda diagnosis: made_up.advice)
+    monkeypatch.setattr("forcegrasp.api.functions.advise", lambda diagnosis: made_up.advice)
+    for module in (floor, results):
+        monkeypatch.setattr(module, "numerical_error", lambda fit, target: [])
+    return SimpleNamespace(calls=calls, made_up=made_up)

@@ -1,0 +1,220 @@
+"""Noise that is not what was said is told from effects that nobody knows."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from forcegrasp.compare import diagnose_output
+from forcegrasp.compare.floor import excess
+from forcegrasp.compare.noise import Noise, unlike_said
+from forcegrasp.compare.target import PHASES, Target
+from forcegrasp.measure import MeasuredGrasp
+
+G, S = 8, 150
+ONES = np.ones(4)
+NOTHING = (np.zeros((G, S, 4)),) * 2
+PHASE = np.arange(S) * len(PHASES) // S
+#: In each phase the fingers move half of the time; forces rise and fall.
+MOVING = np.arange(S) // 15 % 2 == 0
+FORCE = np.interp(np.arange(S), [0, 40, 80, 110, 150], [0.0, 0.0, 1.0, 1.0, 0.0])
+GRASPS = np.tile(np.stack([np.cumsum(MOVING), np.cumsum(MOVING), FORCE, FORCE], axis=1), (G, 1, 1))
+
+
+def make(count: int = G) -> Target:
+    """A target whose grasps pass through all phases; noise 1 in every signal."""
+    pair, mask = np.zeros((S, 2)), np.ones((count, S), bool)
+    grasps = tuple(
+        MeasuredGrasp(f"g{i}", "cup", "", 0.02, 0.0, None, np.arange(S) * 0.04, pair, pair, pair, None)
+        for i in range(count)
+    )
+    return Target(grasps, np.zeros((count, S, 4)), mask, ONES, ONES, 0 * ONES, True, np.tile(PHASE, (count, 1)))
+
+
+def normal(seed: int) -> np.ndarray:
+    return np.random.default_rng(seed).standard_normal((G, S, 4))
+
+
+def student(seed: int) -> np.ndarray:
+    """Three degrees of freedom: standard deviation √3."""
+    return np.random.default_rng(seed).standard_t(3, (G, S, 4))
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_noise_as_said_is_no_finding(seed):
+    assert unlike_said(normal(seed), NOTHING, make(), GRASPS) is None
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("times", [1.3, 3.0])
+def test_noise_of_another_size(times, seed):
+    noise = unlike_said(times * normal(seed), NOTHING, make(), GRASPS)
+    assert noise is not None
+    assert noise.unlike.all()
+    assert noise.times == pytest.approx(times, rel=0.05)
+    assert noise.core == pytest.approx(times, rel=0.15)
+    assert noise.stronger
+    assert not noise.heavy_tails.any()
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("scale", [1.0, 1 / np.sqrt(3)])
+def test_heavy_tails(scale, seed):
+    noise = unlike_said(scale * student(seed), NOTHING, make(), GRASPS)
+    assert noise is not None
+    assert noise.heavy_tails.all()
+    assert noise.stronger
+    assert noise.core == pytest.approx(1.134 * scale, rel=0.1)  # 0.765 ÷ 0.6745, the medians of the two
+
+
+def test_noise_of_one_signal():
+    residual = normal(0) * [1, 1, 1, 3]
+    noise = unlike_said(residual, NOTHING, make(), GRASPS)
+    assert noise is not None
+    assert noise.unlike.tolist() == [False, False, False, True]
+    assert noise.times[3] == pytest.approx(3, rel=0.05)
+
+
+def test_noise_that_is_smaller():
+    noise = unlike_said(normal(0) * [1, 1, 0.3, 0.3], NOTHING, make(), GRASPS)
+    assert noise is not None
+    assert (noise.unlike.tolist(), noise.stronger) == ([False, False, True, True], False)
+
+
+def test_grasps_that_were_not_held_out_are_left_out():
+    residual = 3 * normal(0)
+    residual[5:] = np.nan
+    noise = unlike_said(residual, NOTHING, make(), GRASPS)
+    assert noise is not None
+    assert noise.times == pytest.approx(3, rel=0.07)
+
+
+def slow(residual):
+    """Each reading leans on the one before."""
+    out = residual.copy()
+    for k in range(1, S):
+        out[:, k] += 0.7 * out[:, k - 1]
+    return out
+
+
+def level(residual):
+    residual[:, PHASE == 3, 2] += 1.5
+    return residual
+
+
+def louder_in_one_phase(residual):
+    residual[:, PHASE == 4] *= 3
+    return residual
+
+
+def louder_when_pressed(residual):
+    residual[:, PHASE >= 2] *= 1.5
+    return residual
+
+
+def wild_while_moving(residual):
+    """White in time, rare and large: readings that are stale matter where things move."""
+    wild = np.random.default_rng(9).random((G, S, 4)) < 0.05
+    wild[:, PHASE == 3] = False
+    residual[wild] *= 20
+    return residual
+
+
+def louder_with_the_force(residual):
+    return residual * np.sqrt(1 + 8 * FORCE)[:, None]
+
+
+def twice_and_more_in_motion(residual):
+    """No phase and no speed is as was said."""
+    return 2 * residual * np.where(MOVING, 2, 1)[:, None]
+
+
+def wild_in_motion(residual):
+    """As when some readings are the one of the sample before: that shows only in motion."""
+    wild = np.random.default_rng(9).random((G, S, 4)) < 0.04
+    return np.where(wild & MOVING[:, None], 20 * residual, residual)
+
+
+def wave(residual):
+    return residual + 2 * np.sin(2 * np.pi * np.arange(S) / 4)[:, None]
+
+
+def one_signal_slow(residual):
+    return np.concatenate([3 * residual[..., :3], slow(residual)[..., 3:]], axis=-1)
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(
+    "spoil",
+    [
+        slow,
+        level,
+        louder_in_one_phase,
+        louder_when_pressed,
+        wild_while_moving,
+        wild_in_motion,
+        twice_and_more_in_motion,
+        louder_with_the_force,
+        wave,
+        one_signal_slow,
+    ],
+)
+def test_an_effect_is_not_taken_for_noise(spoil, seed):
+    residual = spoil(normal(seed))
+    assert excess(residual, NOTHING, make())
+    assert unlike_said(residual, NOTHING, make(), GRASPS) is None
+
+
+def test_in_doubt_it_is_not_noise():
+    """One grasp of 150 samples does not show where so small an excess is from."""
+    target, nothing = make(1), tuple(n[:1] for n in NOTHING)
+    assert excess(1.2 * normal(0)[:1], nothing, target)
+    assert unlike_said(1.2 * normal(0)[:1], nothing, target, GRASPS[:1]) is None
+
+
+# --- in words ------------------------------------------------------------------------------------------------------
+
+
+def of(made_up, verdict: str, times: list[float], core: list[float], unlike: list[bool], **changed):
+    noise = Noise(np.array(times), np.array(core), np.array(unlike))
+    return dataclasses.replace(made_up.diagnosis(verdict), noise=noise, left="", **changed)
+
+
+def test_the_answer_tells_the_noise(made_up):
+    diagnosis = of(made_up, "explained", [3.0, 3.1, 1.0, 1.7], [3.0, 3.1, 1.0, 1.1], [True, True, False, True])
+    answer = diagnose_output.answer(diagnosis)
+    assert answer.startswith("The model explains these data: they show no missing effect")
+    assert (
+        "positions scatter by 3.1 ×, force right scatter by 1.7 × (with heavy tails) the noise that was given" in answer
+    )
+    assert "white in time and alike in all phases" in answer
+    assert "give position_std_m and force_std_n" in answer
+    assert "none of the effects" not in answer
+    found = diagnose_output.diagnosis_json(diagnosis, None, made_up.tried, "s")
+    assert set(found["noise"]) == {"position_l", "position_r", "force_r"}
+    assert found["noise"]["force_r"] == {"times_stated": 1.7, "core": 1.1, "heavy_tails": True}
+    assert found["where"]["explainable"] == 0
+
+
+def test_an_effect_and_other_noise(made_up):
+    diagnosis = of(made_up, "effect", [3.0] * 4, [3.0] * 4, [True] * 4, error_before=5.0, error_after=3.0)
+    answer = diagnose_output.answer(diagnosis)
+    assert answer.startswith("The model lacks force_bias. ")
+    assert "positions scatter by 3 ×, forces scatter by 3 ×" in answer
+    assert diagnosis.explained == pytest.approx(1)
+
+
+def test_a_noise_that_is_smaller_may_hide_effects(made_up):
+    answer = diagnose_output.answer(
+        of(made_up, "explained", [1, 1, 0.3, 0.3], [1, 1, 0.3, 0.3], [False] * 2 + [True] * 2)
+    )
+    assert "the noise is smaller than that: forces scatter by 0.3 ×" in answer
+    assert "a small effect may show" in answer
+
+
+def test_noise_as_said_is_not_mentioned(made_up):
+    diagnosis = made_up.diagnosis("explained")
+    assert "white in time" not in diagnose_output.answer(diagnosis)
+    assert diagnose_output.diagnosis_json(diagnosis, None, made_up.tried, "s")["noise"] is None

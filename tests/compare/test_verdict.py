@@ -1,0 +1,190 @@
+"""When a step takes an effect, when two can't be told apart, and what the steps amount to."""
+
+from __future__ import annotations
+
+import dataclasses
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+from forcegrasp.compare import diagnose, diagnose_output
+from forcegrasp.compare.diagnose import Diagnosis, Step
+from forcegrasp.compare.verdict import conclude, explained_share
+from forcegrasp.effects import get_effect
+
+
+def candidate(made_up, **changed: Any):
+    """A candidate that passes each gate of a step, but for what is changed."""
+    good = made_up.diagnosis("effect").steps[0].candidates[0]
+    return dataclasses.replace(good, **({"p_family": 0.002, "share": 0.9, "largest_fall": 0.5} | changed))
+
+
+# --- one step ------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("changed", "taken"),
+    [
+        ({}, True),
+        ({"share": 0.26}, True),
+        ({"share": 0.24}, False),  # a quarter of the mean square beyond the noise is asked for
+        ({"p_family": 0.009}, True),
+        ({"p_family": 0.011}, False),
+        ({"largest_fall": 0.021}, True),
+        ({"largest_fall": 0.019}, False),
+        # four grasps' gains with standard deviation 10: their sum is uncertain by 10 √4 = 20
+        ({"gains": np.array([0.0, 0.0, 10.0, 10.0]) * np.sqrt(3) - 5 * np.sqrt(3) + 5.1}, True),
+        ({"gains": np.array([0.0, 0.0, 10.0, 10.0]) * np.sqrt(3) - 5 * np.sqrt(3) + 4.9}, False),
+        ({"gains": np.full(4, 1.3)}, True),
+        ({"gains": np.full(4, 1.2)}, False),  # a sum below 5 is no evidence, however even
+        ({"gains": np.array([100.0, np.nan, np.nan, np.nan])}, False),  # one grasp has no spread
+    ],
+)
+def test_what_convinces(made_up, changed, taken):
+    gains = changed.get("gains")
+    if gains is not None and len(gains) == 4 and gains.std() > 1:
+        assert gains.std(ddof=1) == pytest.approx(10)
+    assert diagnose._convincing(candidate(made_up, **changed), 0.02) == taken
+
+
+@pytest.mark.parametrize(("ahead", "equal"), [(4.9, True), (5.1, False)])
+def test_a_lead_within_its_standard_error_decides_nothing(made_up, ahead, equal):
+    """Leads of four grasps with standard deviation 10: their sum is uncertain by 20."""
+    lead = np.array([-5.0, -5.0, 5.0, 5.0]) * np.sqrt(3) + ahead
+    assert lead.std(ddof=1) == pytest.approx(10)
+    winner = candidate(made_up, gains=100 + lead, signature=np.array([1.0, 0.0]))
+    other = candidate(made_up, gains=np.full(4, 100.0), signature=np.array([0.0, 1.0]))
+    assert diagnose._equal(winner, other) == equal
+
+
+# --- all steps -----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("found", "before", "after", "left", "verdict"),
+    [
+        ([], 1.0, 1.0, False, "explained"),
+        ([], 3.0, 3.0, True, "unknown"),
+        (["effect"], 5.0, 1.0, False, "effect"),
+        (["one_of"], 5.0, 1.0, False, "one_of"),
+        (["one_of", "effect"], 5.0, 1.0, False, "one_of"),
+        (["effect", "one_of", "effect"], 5.0, 1.0, False, "one_of"),
+        (["effect", "effect"], 8.0, 1.68, True, "effect"),  # 97 % explained
+        (["effect"], 348.0, 173.0, True, "unknown"),  # 75 % explained, and 173 × noise is left
+        (["effect"], 5.1, 3.09, True, "unknown"),
+        (["one_of"], 5.1, 3.09, True, "unknown"),
+        (["effect"], 50.0, 5.0, True, "effect"),  # 99 % explained: right, if not all
+        (["effect"], 3.0, 1.6, True, "effect"),
+        (["effect"], 2.0, 1.7, True, "unknown"),  # 37 % explained
+        (["effect"], 1.2, 1.19, False, "effect"),
+    ],
+)
+def test_the_verdict(found, before, after, left, verdict):
+    assert conclude(found, before, after, 1.0, left) == verdict
+
+
+def test_shares_are_of_the_mean_square_beyond_the_noise():
+    assert explained_share(3.0, 2.0) == pytest.approx(5 / 8)
+    assert explained_share(5.0, 3.0, noise=3.0) == pytest.approx(1.0)
+
+
+# --- what is said of them ------------------------------------------------------------------------------------------
+
+
+def two_steps(made_up, rivals: tuple[str, ...] = ("coulomb_friction", "stiction"), **changed: Any) -> Diagnosis:
+    """Two effects found, the first with rivals that these data can't tell from it."""
+    one = made_up.diagnosis("one_of")
+    first = [dataclasses.replace(one.steps[0].candidates[0], effect=get_effect(name)) for name in rivals]
+    steps = (
+        Step("one_of", rivals, tuple(first), (), 5.0, 2.0),
+        Step("effect", ("force_bias",), one.steps[0].candidates[:1], (), 2.0, 1.0),
+    )
+    names = (rivals[0], "force_bias", *rivals[1:])
+    figures = {"error_before": 5.0, "error_after": 1.0, "floor": 1.02, "left": ""} | changed
+    return dataclasses.replace(one, effects=names, steps=steps, **figures)
+
+
+def test_the_headline_is_no_stronger_than_its_steps(made_up):
+    diagnosis = two_steps(made_up)
+    first = diagnose_output.answer(diagnosis).partition(". ")[0]
+    assert first == (
+        "The model lacks coulomb_friction (or stiction: these data can't tell which, and coulomb_friction is preferred,"
+        " for it has fewer parameters) and force_bias"
+    )
+    found = diagnose_output.diagnosis_json(diagnosis, None, made_up.tried, "s")
+    assert (found["verdict"], found["effects"]) == ("one_of", ["coulomb_friction", "force_bias", "stiction"])
+    assert found["preferred"] == ["coulomb_friction", "force_bias"]
+    assert [step["preferred_because"] for step in found["steps"]] == ["it has fewer parameters", ""]
+
+
+def test_of_equally_many_parameters_the_gain_decides(made_up):
+    answer = diagnose_output.answer(made_up.diagnosis("one_of"))
+    assert "force_bias or force_drift: these data can't tell which, and force_bias is preferred" in answer
+    assert "for its held-out gain is larger" in answer
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "left", "said"),
+    [
+        (5.0, 1.0, "", ""),
+        (5.0, 1.2, "forces, hold", ""),
+        (5.0, 1.6, "in all", "but that is not all, for 1.60 × the sensor noise is left on held-out grasps where 1.02"),
+        (1.5, 1.2, "in all", "(65% of the mean square beyond it is explained)"),
+    ],
+)
+def test_much_that_is_left_is_said_first(made_up, before, after, left, said):
+    diagnosis = two_steps(made_up, error_before=before, error_after=after, left=left)
+    first = diagnose_output.answer(diagnosis).partition(". ")[0]
+    assert said in first
+    assert ("not all" in first) == bool(said)
+
+
+def test_little_explained_is_unknown_and_says_what_it_would_take_off(made_up):
+    diagnosis = two_steps(made_up, verdict="unknown", error_before=348.0, error_after=173.0, left="in all")
+    first = diagnose_output.answer(diagnosis).partition(". ")[0]
+    assert "none of the effects I know" in first
+    assert "348.00 × the sensor noise, and coulomb_friction and force_bias would only take it down to 173.00 ×" in first
+
+
+# --- the search ----------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def found_by(made_up, monkeypatch):
+    """Runs the search with steps that are given."""
+
+    def run(*steps: Step) -> Diagnosis:
+        following = iter((*steps, Step("none", (), (), (), 1.0, 1.0)))
+        base = made_up.base.fit
+        monkeypatch.setattr(diagnose, "_look_further", lambda *a: next(following))
+        monkeypatch.setattr(diagnose, "numerical_error", lambda fit, target: (0 * fit.residual + 0.1,) * 2)
+        monkeypatch.setattr(diagnose, "Signatures", lambda *a: None)
+        effects = [get_effect(name) for name in ("force_bias", "force_drift", "backlash", "stiction")]
+        nothing = cast(Any, SimpleNamespace())
+        assert base.problem.effects == ()
+        return diagnose.diagnose(made_up.target, made_up.base, nothing, effects, np.random.default_rng(0))
+
+    return run
+
+
+def test_effects_lists_what_was_found_and_then_the_rivals(made_up, found_by):
+    bias, drift = made_up.diagnosis("one_of").steps[0].candidates
+    half = dataclasses.replace(bias, fit=drift.fit)  # something is left, so that the search goes on
+    diagnosis = found_by(
+        Step("one_of", ("force_bias", "stiction", "backlash"), (half,), (), 2.0, 1.6),
+        Step("one_of", ("force_drift", "backlash"), (dataclasses.replace(drift, fit=bias.fit),), (), 1.6, 1.0),
+    )
+    assert diagnosis.verdict == "one_of"
+    assert diagnosis.effects == ("force_bias", "force_drift", "stiction", "backlash")
+    assert diagnosis.preferred == ("force_bias", "force_drift")
+    assert diagnosis.explained > 0.95
+
+
+def test_intervals_are_those_of_the_final_fit(made_up, found_by):
+    (bias, _) = made_up.diagnosis("effect").steps[0].candidates
+    diagnosis = found_by(Step("effect", ("force_bias",), (bias,), (), 2.0, 1.0))
+    assert diagnosis.fit is bias.fit
+    assert [n.shape for n in diagnosis.numerical] == [bias.fit.residual.shape] * 2
+    assert np.all(diagnosis.numerical[0] == 0.1 + 0 * bias.fit.residual)
