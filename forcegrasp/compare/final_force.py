@@ -134,7 +134,10 @@ def analyse_table(table: FinalForceTable, gripper: Gripper) -> TableAnalysis:
     """
     rows, skipped = _usable(table)
     gain = gripper.parameters["position_gain"].nominal if "position_gain" in gripper.parameters else None
-    facts = {"position_gain": gain, "training": gripper.training if gain is not None and "force_scale" in gripper.training.softness else None}
+    facts = {
+        "position_gain": gain,
+        "training": gripper.training if gain is not None and "force_scale" in gripper.training.softness else None,
+    }
     if not rows:
         why = "; ".join(f"{name}: {reason}" for name, reason in skipped.items())
         return TableAnalysis(table, rows, skipped, "not_fitted", f"no object can be fitted ({why})", **facts)

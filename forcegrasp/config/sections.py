@@ -53,14 +53,22 @@ class GraspConfig:
         [], "offset_m", "object offset along the grasp axis, o_y", unit="m", source="paper, Table 2", low=-1, high=1
     )
     deformation_m: float = of_gripper(
-        math.nan, "deformation_m", "largest object deformation d_p, both sides together", unit="m",
-        source="authors' code", low=0, high=1,
+        math.nan,
+        "deformation_m",
+        "largest object deformation d_p, both sides together",
+        unit="m",
+        source="authors' code",
+        low=0,
+        high=1,
     )
     goal_force_min_n: float = of_gripper(
         math.nan, "goal_force_min_n", "smallest goal force", unit="N", source="authors' code", low=1e-4, high=1e4
     )
     goal_force_max: float = option(
-        0.95, "largest goal force, as a fraction of what the gripper reaches with its largest command step", low=0.01, high=1
+        0.95,
+        "largest goal force, as a fraction of what the gripper reaches with its largest command step",
+        low=0.01,
+        high=1,
     )
     steps: int = option(150, "control steps of an episode", source="authors' code", low=1, high=100_000)
 
@@ -80,8 +88,13 @@ class SensorConfig:
         math.nan, "force_std_n", "noise of the forces, σ_f", unit="N", source="paper", low=0, high=1000
     )
     contact_threshold_n: float = of_gripper(
-        math.nan, "contact_threshold_n", "force above which a finger is in contact, f_θ", unit="N",
-        source="authors' code", low=0, high=1000,
+        math.nan,
+        "contact_threshold_n",
+        "force above which a finger is in contact, f_θ",
+        unit="N",
+        source="authors' code",
+        low=0,
+        high=1000,
     )
 
 
@@ -90,7 +103,10 @@ class ObservationConfig:
     """What the policy sees."""
 
     parts: list[str] = option(
-        list(OBSERVATION_PARTS), "parts of o(t): a number per motor or per force reading each", source="paper, Sec. 4", choices=OBSERVATION_PARTS
+        list(OBSERVATION_PARTS),
+        "parts of o(t): a number per motor or per force reading each",
+        source="paper, Sec. 4",
+        choices=OBSERVATION_PARTS,
     )
     frames: int = option(3, "observations stacked, k", source="paper, Sec. 4", low=1, high=50)
 
@@ -189,7 +205,8 @@ class PPOConfig:
         -0.5, "the policy's mean action at the start: closing, lest training never meets the object", low=-1, high=1
     )
     mirrored: bool = option(
-        True, "average the policy with its mirror image where the gripper is its own, so that it treats both fingers alike"
+        True,
+        "average the policy with its mirror image where the gripper is its own, so that it treats both fingers alike",
     )
     critic: str = option(
         "privileged",

@@ -146,7 +146,7 @@ class EvaluateConfig:
     trials: int = option(
         50, "grasps per softness value (or object) and policy; the paper had 200 (20)", low=2, high=1_000_000
     )
-    gripper: str = option(DEFAULT_GRIPPER, "gripper by name, or the path of a description")
+    gripper: str = option("", "gripper by name, or the path of a description; that of the policies if empty")
     seed: int = option(1000, "seed of the grasps; the same grasps for every policy", low=0, high=2**31 - 1)
     model: str = option(
         "", "model file of forcegrasp fit or add to simulate the grasps with; virtual_robot comes with the package"
@@ -190,10 +190,12 @@ class RenderConfig:
         ["force_pi"], "what to show: controllers and shipped policies by name, or run directories; policy= for one"
     )
     out: str = option("", "file to write, NAME.gif; runs/render_TIME.gif if empty")
-    gripper: str = option(DEFAULT_GRIPPER, "gripper by name, or the path of a description")
+    gripper: str = option("", "gripper by name, or the path of a description; that of the policies if empty")
     seed: int = option(0, "seed of what is not given, and of the sensor noise", low=0, high=2**31 - 1)
     kappa: float | None = option(None, "softness of the object; 0 is hard", source="paper, Sec. 3", low=0, high=1)
-    b2: float | None = option(None, "servo gain that training draws; the paper's velocity gain b₂", source="paper, Sec. 3")
+    b2: float | None = option(
+        None, "servo gain that training draws; the paper's velocity gain b₂", source="paper, Sec. 3"
+    )
     radius_m: float | None = option(
         None, "object radius; the paper's w_o", unit="m", source="paper, Table 2", low=1e-4, high=1
     )

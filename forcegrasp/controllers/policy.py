@@ -55,7 +55,9 @@ def make_policy(observation_size: int, config: PPOConfig, gripper: Gripper | Non
     """
     gripper = gripper or default_gripper()
     actions = len(gripper.motors)
-    net = MLP(in_features=observation_size, out_features=actions, num_cells=list(config.hidden), activation_class=nn.Tanh)
+    net = MLP(
+        in_features=observation_size, out_features=actions, num_cells=list(config.hidden), activation_class=nn.Tanh
+    )
     last = cast(nn.Linear, net[-1])
     nn.init.orthogonal_(last.weight, gain=0.01)
     nn.init.constant_(last.bias, config.initial_action)

@@ -7,6 +7,8 @@ from torch import Tensor
 
 from forcegrasp.config import SensorConfig
 from forcegrasp.env.reward import normalised_force_reward
+from forcegrasp.physics import default_gripper
+from forcegrasp.physics.completion import complete
 
 #: Figure → what it is. All of shape ``(n,)``, one per episode.
 FIGURES = {
@@ -25,17 +27,18 @@ FIGURES = {
 }
 
 
-def summarise(rollout: TensorDictBase, sensors: SensorConfig, period_s: float = 0.04) -> dict[str, Tensor]:
+def summarise(rollout: TensorDictBase, sensors: SensorConfig, period_s: float | None = None) -> dict[str, Tensor]:
     """Figures of every episode, from the true state.
 
     Args:
       rollout: whole episodes as an env's ``rollout`` gives them, batch ``(n, T)``.
       sensors: f_θ, the true force above which a finger counts as touching, and σ_f, half the band around the goal.
-      period_s: seconds per step.
+      period_s: seconds per step; the paper's by default.
 
     Returns:
       One tensor ``(n,)`` per entry of :data:`FIGURES`.
     """
+    sensors, period_s = complete(sensors, default_gripper()), period_s or default_gripper().period_s
     after = rollout.get("next")
     terms = after.get("reward_terms")
     force, position = after.get("force"), after.get("object_position").squeeze(-1)

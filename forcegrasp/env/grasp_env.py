@@ -160,7 +160,9 @@ class GraspEnv(EnvBase):
         )
 
 
-def _simulator(gripper: Gripper, n: int, physics: PhysicsConfig, model: Model | None) -> GraspSimulator | WarpGraspSimulator:
+def _simulator(
+    gripper: Gripper, n: int, physics: PhysicsConfig, model: Model | None
+) -> GraspSimulator | WarpGraspSimulator:
     check_no_effects(model, physics)
     if physics.engine == "warp":
         return WarpGraspSimulator(n, physics.tier, physics.device, gripper)

@@ -19,7 +19,7 @@ WIDTH, HEIGHT = 480, 360
 
 
 class GraspGymnasiumEnv(gymnasium.Env[np.ndarray, np.ndarray]):
-    """Observation: the stacked o(t), ``(30,)`` by default. Action: ``(2,)`` in [−1, 1], scaled to position deltas.
+    """Observation: the stacked o(t), ``(30,)`` by default. Action: ``(motors,)`` in [−1, 1], scaled to position deltas.
 
     ``info`` holds the true state of the grasp (see ``forcegrasp.env.grasp_env.OBSERVATIONS``;
     nested names are joined by a dot).
@@ -39,12 +39,14 @@ class GraspGymnasiumEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         if render_mode not in (None, "rgb_array"):
             raise ConfigError(f"render_mode={render_mode}: must be rgb_array, or left out")
         self.render_mode = render_mode
-        self._renderer = SceneRenderer(WIDTH, HEIGHT)
         self._env = build_env(1, seed=seed, **parts)
+        gripper = self._env.base_env.gripper
+        self._renderer = SceneRenderer(WIDTH, HEIGHT, gripper)
+        self._motors = len(gripper.motors)
         self._state: TensorDictBase | None = None
         size = self._env.observation_spec["observation"].shape[-1]
         self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (size,), np.float32)
-        self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (2,), np.float32)
+        self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (self._motors,), np.float32)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[np.ndarray, dict]:
         """Starts a new grasp."""
@@ -55,10 +57,10 @@ class GraspGymnasiumEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         return self._observe(self._state)
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict]:
-        """One control step of 40 ms."""
+        """One control step."""
         if self._state is None:
             raise gymnasium.error.ResetNeeded("call reset() before step()")
-        self._state.set("action", torch.as_tensor(action, dtype=torch.float32).reshape(1, 2))
+        self._state.set("action", torch.as_tensor(action, dtype=torch.float32).reshape(1, self._motors))
         stepped = self._env.step(self._state)
         after = stepped.get("next")
         observation, info = self._observe(after)

@@ -14,10 +14,10 @@ from rich.progress import track
 from tensordict import TensorDictBase
 
 from forcegrasp.config import EvaluateConfig, RewardConfig
-from forcegrasp.effects.variation import read_tiago_model
+from forcegrasp.effects.variation import read_model_of
 from forcegrasp.env.episodes import FIGURES, summarise
 from forcegrasp.evaluate.colours import policy_colours
-from forcegrasp.evaluate.contestants import load_contestants
+from forcegrasp.evaluate.contestants import gripper_of, load_contestants
 from forcegrasp.evaluate.grids import Grid, kappa_grid, object_grid, read_objects
 from forcegrasp.evaluate.page import write_page
 from forcegrasp.evaluate.plots import cell_boxes, force_traces
@@ -26,6 +26,8 @@ from forcegrasp.evaluate.statistics import Bootstrap
 from forcegrasp.evaluate.summary import print_summary, simulator_notes
 from forcegrasp.evaluate.tables import markdown
 from forcegrasp.gpu import check_engine
+from forcegrasp.physics import Gripper
+from forcegrasp.physics.completion import complete
 
 #: Figures of which more is better; of the others less is.
 _MORE_IS_BETTER = ("force_reward_normalised", "force_reward_paper", "force_reward_measured")
@@ -43,10 +45,12 @@ def evaluate(config: EvaluateConfig, out: str | Path, console: Console | None = 
     out, console = Path(out), console or Console()
     torch.set_num_threads(1)
     check_engine(config.physics)
-    model = read_tiago_model(config.model) if config.model else None
-    contestants = load_contestants(config.policies)
+    gripper = gripper_of(config.policies, config.gripper)
+    config = complete(config, gripper)
+    model = read_model_of(gripper, config.model) if config.model else None
+    contestants = load_contestants(config.policies, gripper)
     baseline = config.baseline if config.baseline in {c.name for c in contestants} else ""
-    grid, colours = _grid(config), policy_colours(c.name for c in contestants)
+    grid, colours = _grid(config, gripper), policy_colours(c.name for c in contestants)
     out.mkdir(parents=True, exist_ok=True)
     figures: dict[str, dict[str, np.ndarray]] = {}
     traces: dict[str, Figure] = {}
@@ -56,6 +60,7 @@ def evaluate(config: EvaluateConfig, out: str | Path, console: Console | None = 
             grid.grasps,
             config.grasp,
             config.seed,
+            gripper=gripper,
             physics=config.physics,
             sensors=config.sensors,
             model=model,
@@ -63,14 +68,17 @@ def evaluate(config: EvaluateConfig, out: str | Path, console: Console | None = 
             action=contestant.action,
             observation=contestant.observation,
         )
-        summary = summarise(episodes, config.sensors)
+        summary = summarise(episodes, config.sensors, gripper.period_s)
         figures[contestant.name] = {k: v.double().numpy().reshape(len(grid.cells), -1) for k, v in summary.items()}
-        traces[contestant.name] = force_traces(_spread(episodes), contestant.name, colours[contestant.name])
+        traces[contestant.name] = force_traces(
+            _spread(episodes), contestant.name, colours[contestant.name], gripper.period_s
+        )
     report = {
         "seed": config.seed,
         "trials": grid.trials,
         "steps": config.grasp.steps,
         "physics": config.physics.tier,
+        "gripper": gripper.name,
         "model": config.model,
         "what": grid.what,
         "cells": grid.cells,
@@ -103,10 +111,11 @@ def _boxes(figures: dict[str, dict[str, np.ndarray]], grid: Grid, steps: int) ->
     }
 
 
-def _grid(config: EvaluateConfig) -> Grid:
+def _grid(config: EvaluateConfig, gripper: Gripper) -> Grid:
     if config.objects:
-        return object_grid(read_objects(config.objects, config.grasp), config.grasp, config.trials, config.seed)
-    return kappa_grid(config.grasp, config.kappas, config.trials, config.seed)
+        objects = read_objects(config.objects, config.grasp, gripper)
+        return object_grid(objects, config.grasp, config.trials, config.seed, gripper)
+    return kappa_grid(config.grasp, config.kappas, config.trials, config.seed, gripper)
 
 
 def _spread(episodes: TensorDictBase, count: int = 6) -> TensorDictBase:

@@ -10,6 +10,8 @@ from tensordict.nn import TensorDictModuleBase
 from forcegrasp.config import ActionConfig, ObservationConfig, TrainConfig
 from forcegrasp.controllers import CONTROLLERS, make_controller
 from forcegrasp.errors import ConfigError, closest
+from forcegrasp.physics import Gripper, default_gripper, load_gripper
+from forcegrasp.physics.completion import complete
 from forcegrasp.policies import shipped_policies
 from forcegrasp.runs.policy import load_policy
 from forcegrasp.runs.run_dir import RunDir
@@ -27,12 +29,17 @@ class Contestant:
     model_file: Path | None = None  #: the run's own copy of it, if there is one
 
 
-def load_contestants(names: list[str]) -> list[Contestant]:
+def load_contestants(names: list[str], gripper: Gripper | None = None) -> list[Contestant]:
     """Loads controllers and policies; a controller's name wins over a policy's, and that over a folder's.
 
+    Args:
+      names: of controllers or shipped policies, or run directories.
+      gripper: that all of them are to move; the paper's by default.
+
     Raises:
-      ConfigError, CheckpointError: if one can't be loaded.
+      ConfigError, CheckpointError: if one can't be loaded, or was trained on another gripper.
     """
+    gripper = gripper or default_gripper()
     if not all(names):
         raise ConfigError(f"policies={names}: a name is empty")
     paths = {name: Path(name).resolve() for name in names}
@@ -42,13 +49,19 @@ def load_contestants(names: list[str]) -> list[Contestant]:
         if name not in known and not ("/" in name or path.exists()):
             raise ConfigError(f"no controller, policy or run directory named {name!r}{closest(name, known)}")
         if name in CONTROLLERS:
-            label, policy, config = name, make_controller(name), TrainConfig(action=ActionConfig(inductive_bias=False))
+            action = complete(ActionConfig(inductive_bias=False), gripper)
+            label, policy, config = name, make_controller(name, gripper), TrainConfig(action=action)
         else:
             same = [other for other in set(paths.values()) if other.name == path.name]
             label = path.name if len(same) == 1 else f"{path.parent.name}_{path.name}"
             if path.suffix == ".safetensors":  # RUN/checkpoints/best.safetensors
                 label = f"{path.parent.parent.name}_{path.stem}"
             policy, config = load_policy(name)
+            trained = load_gripper(config.gripper)
+            if trained.name != gripper.name:
+                raise ConfigError(
+                    f"policies: {name} was trained on gripper {trained.name}, and can't move {gripper.name}"
+                )
         if label in contestants:
             raise ConfigError(f"policies: {label} is named twice")
         parts = config.action, config.observation
@@ -56,6 +69,19 @@ def load_contestants(names: list[str]) -> list[Contestant]:
     if len(paths) < len(names):
         raise ConfigError(f"policies={names}: one is named twice")
     return list(contestants.values())
+
+
+def gripper_of(names: list[str], asked: str) -> Gripper:
+    """The gripper that was asked for; else the one that the first trained policy knows; else the paper's.
+
+    Raises:
+      ConfigError, CheckpointError: if it can't be read.
+    """
+    trained = [name for name in names if name and name not in CONTROLLERS]
+    for name in trained if not asked else ():
+        if name in shipped_policies() or Path(name).exists():
+            return load_gripper(load_policy(name)[1].gripper)
+    return load_gripper(asked) if asked else default_gripper()
 
 
 def _model_file(name: str, config: TrainConfig) -> Path | None:

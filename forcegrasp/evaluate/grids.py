@@ -12,8 +12,9 @@ import numpy as np
 from forcegrasp.config import GraspConfig
 from forcegrasp.errors import ConfigError
 from forcegrasp.measure.yaml_file import Reader, load_yaml
-from forcegrasp.physics import GraspParameters, GraspSampler
-from forcegrasp.physics.sampling import OPEN_M, offset_limit_m
+from forcegrasp.physics import GraspParameters, GraspSampler, Gripper, default_gripper
+from forcegrasp.physics.completion import complete
+from forcegrasp.physics.sampling import offset_limits_m
 
 FORMAT = "forcegrasp-objects/1"
 #: Name of the objects that come with the package.
@@ -44,37 +45,45 @@ class GraspedObject:
     goal_force_n: tuple[float, float]
 
 
-def kappa_grid(grasp: GraspConfig, kappas: int, trials: int, seed: int) -> Grid:
+def kappa_grid(grasp: GraspConfig, kappas: int, trials: int, seed: int, gripper: Gripper | None = None) -> Grid:
     """Draws ``trials`` grasps for each of ``kappas`` evenly spaced softness values; all else random."""
     rng, parts = np.random.default_rng(seed), []
     values = np.linspace(*grasp.kappa, num=kappas)
     for kappa in values:
-        sampler = GraspSampler(dataclasses.replace(grasp, kappa=[float(kappa)] * 2))
+        sampler = GraspSampler(dataclasses.replace(grasp, kappa=[float(kappa)] * 2), gripper)
         parts.append(sampler(rng, np.arange(trials)))
     return Grid("softness κ (0 hard, 1 soft)", [f"{k:.3g}" for k in values], GraspParameters.concatenate(parts))
 
 
-def object_grid(objects: list[GraspedObject], grasp: GraspConfig, trials: int, seed: int) -> Grid:
+def object_grid(
+    objects: list[GraspedObject], grasp: GraspConfig, trials: int, seed: int, gripper: Gripper | None = None
+) -> Grid:
     """Draws ``trials`` grasps of each object, as in the paper's Table 1: the object stands nearer to one finger.
 
     Goal force and actuator are drawn; the offset is between half of what paper eqs. 1-2 allow and all of it, to
     either side.
     """
+    gripper = gripper or default_gripper()
+    grasp = complete(grasp, gripper)
     rng, parts = np.random.default_rng(seed), []
     for thing in objects:
         radius = np.full(trials, thing.diameter_m / 2)
-        offset = offset_limit_m(radius, grasp.deformation_m) * rng.uniform(0.5, 1, trials) * rng.choice([-1, 1], trials)
+        share, side = rng.uniform(0.5, 1, trials), rng.choice([-1, 1], trials)
+        lowest, highest = offset_limits_m(gripper, radius, grasp.deformation_m)
+        offset = np.where(side < 0, lowest, highest) * share
         b2, goal = rng.uniform(*grasp.b2, size=trials), rng.uniform(*thing.goal_force_n, trials)
         parts.append(GraspParameters(np.full(trials, thing.kappa), b2, radius, offset, goal))
     return Grid("object", [thing.name for thing in objects], GraspParameters.concatenate(parts))
 
 
-def read_objects(name: str, grasp: GraspConfig) -> list[GraspedObject]:
+def read_objects(name: str, grasp: GraspConfig, gripper: Gripper | None = None) -> list[GraspedObject]:
     """Reads a file of objects; ``paper`` names the six of the paper's Table 1.
 
     Raises:
       ConfigError, MeasurementError: names the file, the object and the key, and what it must be.
     """
+    gripper = gripper or default_gripper()
+    grasp = complete(grasp, gripper)
     path = Path(str(files("forcegrasp.assets") / "paper_objects.yaml")) if name == PAPER_OBJECTS else Path(name)
     top = Reader(load_yaml(path), str(path), ("format", "objects"))
     if top.text("format", 80) != FORMAT:
@@ -82,13 +91,14 @@ def read_objects(name: str, grasp: GraspConfig) -> list[GraspedObject]:
     listed = top.get("objects")
     if not isinstance(listed, dict) or not listed:
         raise ConfigError(f"{path}: objects: must hold an object a line, each `name: {{diameter_m: ...}}`")
-    return [_read_object(path, key, entry, grasp) for key, entry in listed.items()]
+    widest = float(gripper.opening.opening_m[-1])
+    return [_read_object(path, key, entry, grasp, widest) for key, entry in listed.items()]
 
 
-def _read_object(path: Path, name: str, entry: object, grasp: GraspConfig) -> GraspedObject:
+def _read_object(path: Path, name: str, entry: object, grasp: GraspConfig, widest_m: float) -> GraspedObject:
     place = f"{path}: objects.{name}"
     reader = Reader(entry, place, ("diameter_m", "kappa", "goal_force_n"))
-    diameter = _between(reader, "diameter_m", 2 * grasp.deformation_m, 2 * OPEN_M)
+    diameter = _between(reader, "diameter_m", 2 * grasp.deformation_m, widest_m)
     kappa = _between(reader, "kappa", -1e-12, 1 + 1e-12)
     goals = reader.get("goal_force_n")
     if not isinstance(goals, list) or len(goals) != 2:

@@ -9,36 +9,39 @@ from matplotlib.figure import Figure
 from tensordict import TensorDictBase
 
 from forcegrasp.evaluate.colours import finger_colours, policy_colours
-from forcegrasp.physics.model import CONTROL_PERIOD_S
+from forcegrasp.physics import default_gripper
 
 matplotlib.use("Agg")
 GOAL = "#444444"
 
 
-def _draw_forces(axes: Axes, episode: TensorDictBase, colour: str) -> None:
-    after = episode.get("next")
-    time = np.arange(1, len(after["force"]) + 1) * CONTROL_PERIOD_S
-    for finger, (shade, name) in enumerate(zip(finger_colours(colour), ("left", "right"), strict=True)):
-        axes.plot(time, after["sensed_force"][:, finger], color=shade, lw=0.6, alpha=0.4)
-        axes.plot(time, after["force"][:, finger], color=shade, lw=1.4, label=name)
+def _draw_forces(axes: Axes, episode: TensorDictBase, colour: str, period_s: float) -> None:
+    after, shades = episode.get("next"), finger_colours(colour)
+    time = np.arange(1, len(after["force"]) + 1) * period_s
+    for read, shade in zip(after["sensed_force"].T, shades, strict=False):
+        axes.plot(time, read, color=shade, lw=0.6, alpha=0.4)
+    for force, shade, name in zip(after["force"].T, shades, ("left", "right"), strict=True):
+        axes.plot(time, force, color=shade, lw=1.4, label=name)
     axes.axhline(float(after["goal_force"][0]), color=GOAL, ls="--", lw=1, label="goal")
     axes.set_xlim(0, time[-1])
 
 
-def force_traces(episodes: TensorDictBase, title: str, colour: str) -> Figure:
+def force_traces(episodes: TensorDictBase, title: str, colour: str, period_s: float | None = None) -> Figure:
     """Whole forces of up to six episodes ``(n, T)`` against their goals; thin lines are the noisy readings.
 
     Args:
       episodes: as an env's ``rollout`` gives them.
       title: whose they are.
       colour: of that policy; the right finger has another shade of it.
+      period_s: seconds per step; the paper's by default.
     """
+    period_s = period_s or default_gripper().period_s
     n = min(6, len(episodes))
     rows = (n + 2) // 3
     figure = Figure(figsize=(10, 2.7 * rows + 0.5), layout="constrained")
     grid = figure.subplots(rows, min(n, 3), squeeze=False).reshape(-1)
     for axes, episode in zip(grid, episodes, strict=False):
-        _draw_forces(axes, episode, colour)
+        _draw_forces(axes, episode, colour, period_s)
         kappa, _, radius, offset, goal = episode["grasp_parameters"][0].tolist()
         grasp = f"κ {kappa:.2f} · r {radius * 1e3:.0f} mm · o_y {offset * 1e3:+.0f} mm"
         overshoot = max(0.0, float(episode["next", "force"].max()) / goal - 1)

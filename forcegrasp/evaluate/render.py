@@ -7,14 +7,14 @@ from pathlib import Path
 import torch
 
 from forcegrasp.config import GraspConfig, RenderConfig
-from forcegrasp.effects.variation import read_tiago_model
+from forcegrasp.effects.variation import read_model_of
 from forcegrasp.env.episodes import summarise
-from forcegrasp.evaluate.contestants import load_contestants
+from forcegrasp.evaluate.contestants import gripper_of, load_contestants
 from forcegrasp.evaluate.grasp_figure import describe
 from forcegrasp.evaluate.one_grasp import draw_one_grasp
 from forcegrasp.evaluate.rollouts import roll_out
 from forcegrasp.evaluate.video import grasp_video
-from forcegrasp.physics.model import CONTROL_PERIOD_S
+from forcegrasp.physics.completion import complete
 
 
 def render(config: RenderConfig, out: str | Path) -> dict[str, dict[str, float]]:
@@ -26,33 +26,39 @@ def render(config: RenderConfig, out: str | Path) -> dict[str, dict[str, float]]
     """
     out = Path(out)
     torch.set_num_threads(1)
-    grasp = draw_one_grasp(config)
-    model = read_tiago_model(config.model) if config.model else None
+    gripper = gripper_of(config.policies, config.gripper)
+    config = complete(config, gripper)
+    grasp = draw_one_grasp(config, gripper)
+    model = read_model_of(gripper, config.model) if config.model else None
     episodes = {
         contestant.name: roll_out(
             contestant.policy,
             grasp,
             GraspConfig(steps=config.steps),
             config.seed,
+            gripper=gripper,
             physics=config.physics,
             sensors=config.sensors,
             model=model,
             action=contestant.action,
             observation=contestant.observation,
         )[0]
-        for contestant in load_contestants(config.policies)
+        for contestant in load_contestants(config.policies, gripper)
     }
-    data = grasp_video(episodes, config.sensors)
+    data = grasp_video(episodes, config.sensors, gripper=gripper)
     out.parent.mkdir(parents=True, exist_ok=True)
     out.write_bytes(data)
     found = {
-        name: {figure: float(value[0]) for figure, value in summarise(episode[None], config.sensors).items()}
+        name: {
+            figure: float(value[0])
+            for figure, value in summarise(episode[None], config.sensors, gripper.period_s).items()
+        }
         for name, episode in episodes.items()
     }
     print(describe(next(iter(episodes.values()))))
     for name, figures in found.items():
         touched = figures["both_contact_s"]
-        never = touched >= config.steps * CONTROL_PERIOD_S
+        never = touched >= config.steps * gripper.period_s
         when = "never in both fingers" if never else f"in both fingers after {touched:.2f} s"
         print(
             f"{name}: force reward {figures['force_reward_normalised']:.1f} of {config.steps}, {when},"

@@ -16,6 +16,8 @@ from forcegrasp.evaluate.grasp_layout import (
     SCENE_WIDTH,
     TOP_EDGE,
 )
+from forcegrasp.physics import Gripper, default_gripper
+from forcegrasp.physics.completion import complete
 from forcegrasp.physics.scene_renderer import SceneRenderer
 
 if TYPE_CHECKING:
@@ -27,7 +29,11 @@ _AHEAD = 0.15
 
 
 def grasp_video(
-    episodes: dict[str, TensorDictBase], sensors: SensorConfig, every: int = 2, colours: dict[str, str] | None = None
+    episodes: dict[str, TensorDictBase],
+    sensors: SensorConfig,
+    every: int = 2,
+    colours: dict[str, str] | None = None,
+    gripper: Gripper | None = None,
 ) -> bytes:
     """Shows recorded episodes, one below the other, as an animated GIF.
 
@@ -36,6 +42,7 @@ def grasp_video(
       sensors: σ_f of the band around the goal, and f_θ that tells when a finger touched.
       every: control steps per picture.
       colours: title → colour; the titles are names of policies, and have theirs, if not given.
+      gripper: that is seen; the paper's by default.
 
     Raises:
       NoRendererError: where there is no OpenGL.
@@ -45,11 +52,13 @@ def grasp_video(
     from forcegrasp.evaluate.grasp_figure import draw_grasps, from_the_start
     from forcegrasp.evaluate.plots import figure_pixels
 
+    gripper = gripper or default_gripper()
     steps = len(from_the_start(next(iter(episodes.values())), "joint_position")) - 1
     shown = sorted({*range(0, steps + 1, every), steps})
     rows = []
-    with SceneRenderer(SCENE_WIDTH, SCENE_HEIGHT) as renderer:
-        for episode, figure in zip(episodes.values(), draw_grasps(episodes, sensors, colours), strict=True):
+    with SceneRenderer(SCENE_WIDTH, SCENE_HEIGHT, gripper) as renderer:
+        charts = draw_grasps(episodes, complete(sensors, gripper), colours, gripper.period_s)
+        for episode, figure in zip(episodes.values(), charts, strict=True):
             parameters = episode.get("grasp_parameters")[0].double().numpy()
             fingers = from_the_start(episode, "joint_position")
             objects = from_the_start(episode, "object_position")[:, 0]
@@ -64,7 +73,7 @@ def grasp_video(
     palette = _palette(pictures)
     images = [Image.fromarray(picture).quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures]
     data = io.BytesIO()
-    durations = [40 * every] * (len(images) - 1) + [1000]  # a moment to look at the end
+    durations = [round(1000 * gripper.period_s) * every] * (len(images) - 1) + [1000]  # a moment to look at the end
     images[0].save(data, "GIF", save_all=True, append_images=images[1:], duration=durations, loop=0)
     return data.getvalue()
 

@@ -55,7 +55,9 @@ class WarpScene:
         self._body = int(geom.bodyid[0])
         self._geoms = np.flatnonzero(host.geom_bodyid == self._body).tolist()
         self._object = int(host.joint(gripper.object_joint).qposadr[0]) + gripper.axis
-        self._readings = [slice(s.adr[0], s.adr[0] + s.dim[0]) for s in (host.sensor(f.force_sensor) for f in gripper.fingers)]
+        self._readings = [
+            slice(s.adr[0], s.adr[0] + s.dim[0]) for s in (host.sensor(f.force_sensor) for f in gripper.fingers)
+        ]
         floor = host.geom("floor").id
         host.geom_gap[floor] = GAP_M
         with wp.ScopedDevice(self._warp_device):

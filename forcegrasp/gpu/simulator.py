@@ -45,7 +45,9 @@ class WarpGraspSimulator:
         self.steps = torch.zeros(n, dtype=torch.int64, device=self.device)  #: control steps since the reset, ``(n,)``
         self.parameters = nominal_grasps(gripper, n)
         self._force_scale = torch.ones(n, 1, device=self.device)
-        self.commanded_position = torch.full((n, 2), gripper.stroke, device=self.device)  #: q_des of the last step, metres
+        self.commanded_position = torch.full(
+            (n, 2), gripper.stroke, device=self.device
+        )  #: q_des of the last step, metres
         self.object_speed = torch.zeros(n, device=self.device)  #: |o_y(t) − o_y(t−1)|, metres per control step
         self.reset(self.parameters)
 

@@ -10,7 +10,6 @@ import numpy as np
 from forcegrasp.short_repr import ShortRepr
 
 
-
 @dataclass(frozen=True, repr=False)
 class GraspParameters(ShortRepr):
     """The parameters of n grasps. Every field is a float64 array of shape ``(n,)``."""

@@ -283,6 +283,15 @@ class Plant:
         for effect in self._effects:
             effect.new_reading[:] = True
 
+    def posed(self, position: np.ndarray, object_position: float) -> np.ndarray:
+        """Generalised positions of the first row with its motors and its object somewhere else, ``(nq,)``."""
+        before = self._qpos[:1].copy()
+        self._place(np.arange(1), position[None])
+        self._qpos[0, self._object_qpos] = self._object_origin + object_position
+        posed = self._qpos[0].copy()
+        self._qpos[:1] = before
+        return posed
+
     def _place(self, ids: np.ndarray, position: np.ndarray) -> None:
         """Puts motors somewhere, and with them whatever they move."""
         law = self.gripper.opening

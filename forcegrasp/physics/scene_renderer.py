@@ -16,12 +16,16 @@ import mujoco
 import numpy as np
 
 from forcegrasp.errors import ForcegraspError
+from forcegrasp.physics.gripper import Gripper
+from forcegrasp.physics.gripper_file import default_gripper, load_gripper
 from forcegrasp.physics.parameters import GraspParameters
 from forcegrasp.physics.simulator import GraspSimulator
 
 _BACKENDS = {"linux": ("egl", "osmesa"), "darwin": ("cgl",)}
-#: What is asked for: grasp parameters, finger positions, object position.
-_REQUEST = 5 + 2 + 1
+#: Numbers that describe a grasp.
+_PARAMETERS = 5
+# How far away the camera stands, for each metre that the gripper opens.
+_DISTANCE = 7 / 3
 
 
 class NoRendererError(ForcegraspError):
@@ -47,24 +51,25 @@ class SceneRenderer:
     Args:
       width: of the pictures, pixels.
       height: of the pictures, pixels.
+      gripper: that is drawn; the paper's by default.
     """
 
-    def __init__(self, width: int, height: int) -> None:
-        self.width, self.height = width, height
+    def __init__(self, width: int, height: int, gripper: Gripper | None = None) -> None:
+        self.width, self.height, self.gripper = width, height, gripper or default_gripper()
         self._child: subprocess.Popen[bytes] | None = None
 
-    def draw(self, parameters: np.ndarray, fingers: np.ndarray, object_position: float) -> np.ndarray:
+    def draw(self, parameters: np.ndarray, position: np.ndarray, object_position: float) -> np.ndarray:
         """A picture, uint8 ``(height, width, 3)``.
 
         Args:
           parameters: of the grasp, ``(5,)``, see :meth:`~forcegrasp.physics.GraspParameters.as_array`.
-          fingers: positions, metres, ``(2,)``.
+          position: of the motors, m or rad, ``(motors,)``.
           object_position: along the grasp axis, metres.
 
         Raises:
           NoRendererError: where there is no OpenGL.
         """
-        request = np.array([*parameters, *fingers, object_position], float).tobytes()
+        request = np.array([*parameters, *position, object_position], float).tobytes()
         if self._child is not None:
             picture = self._ask(self._child, request)
             if picture is not None:
@@ -93,7 +98,8 @@ class SceneRenderer:
 
     def _start(self, backend: str) -> subprocess.Popen[bytes]:
         # -P: nothing is imported from the folder that it runs in
-        command = [sys.executable, "-P", "-m", __name__, str(self.width), str(self.height)]
+        name = self.gripper.name if self.gripper.is_shipped else str(self.gripper.path.resolve())
+        command = [sys.executable, "-P", "-m", __name__, str(self.width), str(self.height), name]
         return subprocess.Popen(
             command,
             stdin=subprocess.PIPE,
@@ -125,40 +131,42 @@ def _stop(child: subprocess.Popen[bytes]) -> None:
 class _Scene:
     """One grasp in the process that draws."""
 
-    def __init__(self, parameters: np.ndarray, width: int, height: int) -> None:
-        simulator = GraspSimulator(1, threads=1)
+    def __init__(self, gripper: Gripper, parameters: np.ndarray, width: int, height: int) -> None:
+        self.simulator = simulator = GraspSimulator(1, threads=1, gripper=gripper)
         simulator.reset(GraspParameters.from_array(parameters[None]))
         self.model, self.data = simulator.scene(0)
         self.renderer = mujoco.Renderer(self.model, height, width)
         self.camera = mujoco.MjvCamera()
-        self.camera.lookat[:] = (0, 0, 0.05)
-        self.camera.distance, self.camera.azimuth, self.camera.elevation = 0.21, 180, -25
+        body = self.model.geom(gripper.object_geom).bodyid[0]
+        self.camera.lookat[:] = self.model.body_pos[body]
+        self.camera.distance = _DISTANCE * gripper.opening.opening_m[-1]
+        # seen along the third axis of the grasp: the fingers close from left and right
+        self.camera.azimuth, self.camera.elevation = (90, 180, 180)[gripper.axis], -25
 
-    def draw(self, fingers: np.ndarray, object_position: float) -> np.ndarray:
-        for name, position in zip(("finger_l", "finger_r"), fingers, strict=True):
-            self.data.joint(name).qpos[0] = position
-        self.data.joint("object").qpos[1] = object_position
+    def draw(self, position: np.ndarray, object_position: float) -> np.ndarray:
+        self.data.qpos[:] = self.simulator.plant.posed(position, object_position)
         mujoco.mj_kinematics(self.model, self.data)
         self.renderer.update_scene(self.data, self.camera)
         self.renderer.scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = False  # they take most of the time without a GPU
         return self.renderer.render()
 
 
-def _serve(requests: BinaryIO, pictures: BinaryIO, width: int, height: int) -> None:
+def _serve(requests: BinaryIO, pictures: BinaryIO, width: int, height: int, gripper: Gripper) -> None:
     """Draws until nothing more is asked for."""
     scene, known = None, b""
-    while len(request := requests.read(8 * _REQUEST)) == 8 * _REQUEST:
+    size = 8 * (_PARAMETERS + len(gripper.motors) + 1)
+    while len(request := requests.read(size)) == size:
         values = np.frombuffer(request)
-        parameters, fingers, object_position = values[:5], values[5:7], float(values[7])
+        parameters, position, object_position = values[:_PARAMETERS], values[_PARAMETERS:-1], float(values[-1])
         if scene is None or parameters.tobytes() != known:
             if scene is not None:
                 scene.renderer.close()
-            scene, known = _Scene(parameters, width, height), parameters.tobytes()
-        pictures.write(scene.draw(fingers, object_position).tobytes())
+            scene, known = _Scene(gripper, parameters, width, height), parameters.tobytes()
+        pictures.write(scene.draw(position, object_position).tobytes())
         pictures.flush()
 
 
 if __name__ == "__main__":
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # whatever a driver prints must not get among the pictures
-    _serve(sys.stdin.buffer, answers, int(sys.argv[1]), int(sys.argv[2]))
+    _serve(sys.stdin.buffer, answers, int(sys.argv[1]), int(sys.argv[2]), load_gripper(sys.argv[3]))

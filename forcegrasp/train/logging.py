@@ -17,6 +17,7 @@ from forcegrasp.errors import CheckpointError
 from forcegrasp.evaluate.colours import policy_colours
 from forcegrasp.evaluate.plots import force_traces
 from forcegrasp.evaluate.video import grasp_video
+from forcegrasp.physics import load_gripper
 from forcegrasp.physics.scene_renderer import NoRendererError
 from forcegrasp.runs.run_dir import RunDir
 from forcegrasp.train.board import card, layout, tag
@@ -35,6 +36,7 @@ class TrainingLog:
     def __init__(self, run: RunDir, config: TrainConfig, frames: int) -> None:
         self.run, self.config, self.frames = run, config, frames
         self._told_no_renderer = False
+        self._gripper = load_gripper(config.gripper)
         self._colour = policy_colours([run.path.name])[run.path.name]  # as evaluate will draw it
 
     def __enter__(self) -> Self:
@@ -87,7 +89,7 @@ class TrainingLog:
 
     def traces(self, episodes: TensorDictBase, frames: int) -> None:
         """Draws force against goal for a few episodes, as PNG and in TensorBoard."""
-        figure = force_traces(episodes.cpu(), f"after {frames:,} frames", self._colour)
+        figure = force_traces(episodes.cpu(), f"after {frames:,} frames", self._colour, self._gripper.period_s)
         figure.savefig(self.run.figures / f"traces_{frames:012d}.png", dpi=100)
         self.writer.add_figure("grasps/force_traces", figure, frames)
 
@@ -98,7 +100,9 @@ class TrainingLog:
         path = self.run.figures / f"grasp_{frames:012d}.gif"
         title = f"after {frames:,} frames"
         try:
-            data = grasp_video({title: episode.cpu()}, self.config.sensors, colours={title: self._colour})
+            data = grasp_video(
+                {title: episode.cpu()}, self.config.sensors, colours={title: self._colour}, gripper=self._gripper
+            )
         except NoRendererError as error:
             print(f"forcegrasp: no video: {error}", file=sys.stderr)
             self._told_no_renderer = True
