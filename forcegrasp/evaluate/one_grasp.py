@@ -61,7 +61,8 @@ def _radius(config: RenderConfig, ranges: GraspConfig, gripper: Gripper) -> list
     away = config.offset_m
     left, right = gripper.opening.faces_m
     moves = [finger.motor >= 0 for finger in gripper.fingers]
-    reached = [ranges.deformation_m + side * away for side, moving in zip((1, -1), moves, strict=True) if moving]
+    sides = zip((1, -1), moves, gripper.opening.reach_m, strict=True)
+    reached = [ranges.deformation_m + side * away - beyond for side, moving, beyond in sides if moving]
     if config.radius_m is not None:
         lowest, highest = (float(end) for end in offset_limits_m(gripper, config.radius_m, ranges.deformation_m))
         if not lowest <= away <= highest:

@@ -37,6 +37,12 @@ class OpeningLaw:
             return np.asarray(opening_m, float) * (self.position[1] / self.opening_m[1])
         return np.interp(opening_m, self.opening_m, self.position)
 
+    @property
+    def reach_m(self) -> tuple[float, float]:
+        """How far beyond the middle of the scene's object each side's pads come when closed, metres; left, right."""
+        left, right = self.travel * (self.position[-1] - self.position[0]) - self.faces_m
+        return float(left), float(right)
+
     def opening_at(self, position: np.ndarray | float) -> np.ndarray:
         """Distance between the pads at a position of the motors, metres."""
         return np.interp(position, self.position, self.opening_m)

@@ -22,12 +22,12 @@ def offset_limits_m(
     r − d_p > \\|o_y\\|. Both are strict, hence the last bit taken off. A finger that stands still reaches nothing: the
     object has to be beside it, and the other finger brings it there.
     """
-    radius = np.asarray(radius_m, float)
-    left, right = gripper.opening.faces_m
-    reached = radius - deformation_m
+    radius, law = np.asarray(radius_m, float), gripper.opening
+    left, right = law.faces_m
     moves = [finger.motor >= 0 for finger in gripper.fingers]
-    high = np.minimum(right - radius, reached) if moves[0] else right - radius
-    low = -np.minimum(left - radius, reached) if moves[1] else radius - left
+    by_left, by_right = (radius - deformation_m + beyond for beyond in law.reach_m)
+    high = np.minimum(right - radius, by_left) if moves[0] else right - radius
+    low = -np.minimum(left - radius, by_right) if moves[1] else radius - left
     return np.nextafter(low, np.inf), np.nextafter(high, -np.inf)
 
 
