@@ -53,7 +53,12 @@ def interrupt(folder: Path) -> None:
         checkpoint.unlink()
 
 
-DEPLOY = "from forcegrasp.deploy import GraspController; print(GraspController.load('exported'))"
+DEPLOY = """
+from forcegrasp.deploy import GraspController
+controllers = GraspController.load("exported", gripper="tiago"), GraspController.load("hand", gripper="franka_hand")
+for controller in (*controllers, GraspController.baseline(gripper="so101_gripper")):
+    print(controller.contract)
+"""
 GYMNASIUM = "import gymnasium, forcegrasp; print(gymnasium.make('forcegrasp/Grasp-v0').reset(seed=0)[0].shape)"
 FUNCTIONS = "import forcegrasp as fg; print(fg.load('set'), fg.report(fg.compare('set', 'model.yaml'), 'p'))"
 TYPED = "from importlib.resources import files; print((files('forcegrasp') / 'py.typed').read_text())"
@@ -76,6 +81,7 @@ STEPS = [
     Step("evaluate shipped", ["python", "-c", SHIPPED], ("shipped/evaluation.json",)),
     Step("render", ["forcegrasp", "render", "policy=run", "steps=8", "out=g.gif"], ("g.gif",), or_says="no OpenGL"),
     Step("export", ["forcegrasp", "export", "run", "out=exported"], ("exported/policy.onnx",)),
+    Step("export force_pi", ["forcegrasp", "export", "force_pi", "gripper=franka_hand", "out=hand"], ("hand",)),
     Step("deploy", ["python", "-c", DEPLOY]),
     Step("record", ["forcegrasp", "record", "out=set", "grasps=6", "objects=1", "effects=[force_bias]"], ("set",)),
     Step("fit", ["forcegrasp", "fit", "data=set", "out=model.yaml"], ("model.yaml",)),

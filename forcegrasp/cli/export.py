@@ -11,10 +11,12 @@ from forcegrasp.errors import ConfigError
 
 PURPOSE = "write a trained policy as a folder that runs on a robot, without torch"
 NOTES = """
-  RUN        a run directory of forcegrasp train, or the name of a policy that comes with the package
+  RUN        a run directory of forcegrasp train, the name of a policy that comes with the package, or force_pi,
+             the hand-written controller
 
-Writes policy.onnx and contract.json (scaling, stacking, limits). forcegrasp.deploy.GraspController runs them with
-numpy and onnxruntime: see docs/deploy.md. Needs pip install 'forcegrasp[onnx]'.
+Writes policy.onnx and contract.json (readings, scaling, stacking, limits). forcegrasp.deploy.GraspController runs them
+with numpy and onnxruntime: see docs/deploy.md. Needs pip install 'forcegrasp[onnx]'. For force_pi gripper=DESCRIPTION
+it writes contract.json alone, and neither needs the other packages.
 """
 
 
@@ -35,10 +37,13 @@ def main(arguments: list[str]) -> int:
     from forcegrasp.runs.export import CHECKS, export_policy
 
     try:
-        done = export_policy(policies[0], out, config.ceiling_n)
+        done = export_policy(policies[0], out, config.ceiling_n, config.gripper)
     except OSError as error:
         raise ConfigError(f"out={out}: could not write ({error.strerror})") from error
-    print(f"{out}: policy.onnx and contract.json ({done.contract})")
-    print(f"acts like the policy in torch: to {done.difference:.1g} over {CHECKS} random observations")
+    if done.difference is None:
+        print(f"{out}: contract.json ({done.contract})")
+    else:
+        print(f"{out}: policy.onnx and contract.json ({done.contract})")
+        print(f"acts like the policy in torch: to {done.difference:.1g} over {CHECKS} random observations")
     print(f"a step takes {done.step_us:.0f} µs here (median of {CHECKS})")
     return 0

@@ -175,10 +175,18 @@ class CurvesConfig:
 class ExportConfig:
     """`forcegrasp export`."""
 
-    run: str = option("", "run directory or shipped policy; also given plainly, without run=")
+    run: str = option("", "run directory or shipped policy, or force_pi; also given plainly, without run=")
     out: str = option("", "folder to write; must not exist or be empty; runs/export_TIME if empty")
-    ceiling_n: float = option(
-        2.0, "force above which no finger is closed further; the simulated one reaches 1.5", unit="N", low=0.1, high=20
+    gripper: str = option(
+        "", "gripper of force_pi by name, or the path of a description; the paper's if empty. A run has its own"
+    )
+    ceiling_n: float = of_gripper(
+        math.nan,
+        "ceiling_n",
+        "force above which no finger is closed further; a third above what the simulated gripper reaches if left out",
+        unit="N",
+        low=1e-4,
+        high=1e4,
     )
 
 

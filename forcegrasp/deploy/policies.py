@@ -7,7 +7,8 @@ from typing import Protocol
 
 import numpy as np
 
-from forcegrasp.deploy.contract import FINGERS, INPUT, NETWORK_FILE, OUTPUT, Contract, read_contract
+from forcegrasp.deploy.contract import Contract, ForcePIGains
+from forcegrasp.deploy.contract_file import INPUT, NETWORK_FILE, OUTPUT, read_contract
 from forcegrasp.errors import DeployError
 
 
@@ -19,7 +20,7 @@ class Policy(Protocol):
         ...
 
     def act(self, parts: dict[str, np.ndarray]) -> np.ndarray:
-        """The action (left, right), ``(2,)``, −1 closing at full speed; from every part of o(t), float32 ``(2,)``."""
+        """The action ``(motors,)``, −1 closing at full speed; from every part of o(t), float32, see :data:`PARTS`."""
         ...
 
 
@@ -46,31 +47,19 @@ class OnnxPolicy:
         except Exception as error:  # onnxruntime's own, without a base of their own
             raise DeployError(f"{NETWORK_FILE}: onnxruntime can't load it; export the policy again") from error
         found = [(p.name, p.type, p.shape) for p in (*session.get_inputs(), *session.get_outputs())]
-        expected = [(INPUT, "tensor(float)", [1, contract.observation_size]), (OUTPUT, "tensor(float)", [1, FINGERS])]
+        sizes = ((INPUT, contract.observation_size), (OUTPUT, contract.action_size))
+        expected = [(name, "tensor(float)", [1, size]) for name, size in sizes]
         if found != expected:
             raise DeployError(f"{NETWORK_FILE}: has {found}, but its contract says {expected}")
         self._session, self._parts, self._frames = session, contract.parts, contract.frames
         self.reset()
-
-    @classmethod
-    def load(cls, folder: Path | str) -> tuple[OnnxPolicy, Contract]:
-        """Reads an exported folder.
-
-        Raises:
-          DeployError: if it is missing, damaged, or can't be run here.
-        """
-        contract, network = read_contract(folder)
-        try:
-            return cls(network, contract), contract
-        except DeployError as error:
-            raise DeployError(f"{folder}: {error}") from error
 
     def reset(self) -> None:
         """Forgets: the next observation fills the whole stack."""
         self._stack: np.ndarray | None = None
 
     def act(self, parts: dict[str, np.ndarray]) -> np.ndarray:
-        """The mean of the policy's Gaussian, not clipped, float32 ``(2,)``."""
+        """The mean of the policy's Gaussian, not clipped, float32 ``(motors,)``."""
         frame = np.concatenate([parts[name] for name in self._parts])
         if self._stack is None:
             self._stack = np.tile(frame, self._frames)
@@ -82,28 +71,17 @@ class OnnxPolicy:
 class ForcePI:
     """The grasp controller of Lach et al. (2022): the same law as ``forcegrasp.controllers.ForcePI``, in numpy.
 
-    A finger that has not touched closes; one that has waits for the other; once both have, both get half of the PI
-    law's position delta Δq = −½ Σ_i (K_p e_i + K_i I_i), e_i = Δf_i / k, with one integral for both fingers.
+    A finger that has not touched closes; one that has waits for the other; once all have, all motors get the PI law's
+    position delta Δq = −(1/F) Σ_i (K_p e_i + K_i I_i), e_i = Δf_i / k, over F force readings, with one integral.
+    Where readings and motors are not one to one, motors close until every reading has shown contact.
 
     Args:
-      max_delta_m: Δq_max, metres.
-      period_s: control period, seconds.
-      stiffness: k, newtons per metre.
-      kp, ki: K_p (1) and K_i (1/s).
-      closing_m: position delta while closing, metres per step.
+      contract: gives Δq_max, the control period, and how many motors there are.
+      gains: k, K_p, K_i and the step while closing.
     """
 
-    def __init__(
-        self,
-        max_delta_m: float,
-        period_s: float,
-        stiffness: float = 160.0,
-        kp: float = 0.18,
-        ki: float = 1.13,
-        closing_m: float = 0.004,
-    ) -> None:
-        self.max_delta_m, self.period_s = max_delta_m, period_s
-        self.stiffness, self.kp, self.ki, self.closing_m = stiffness, kp, ki, closing_m
+    def __init__(self, contract: Contract, gains: ForcePIGains) -> None:
+        self.contract, self.gains = contract, gains
         self.reset()
 
     def reset(self) -> None:
@@ -111,13 +89,30 @@ class ForcePI:
         self._integral = 0.0
 
     def act(self, parts: dict[str, np.ndarray]) -> np.ndarray:
-        """The action, float64 ``(2,)``, not clipped."""
+        """The action, float64 ``(motors,)``, not clipped."""
+        contract, gains = self.contract, self.gains
         touched = parts["had_contact"] > 0.5
         if not touched.all():
-            return np.where(touched, 0.0, -self.closing_m) / self.max_delta_m
-        error = parts["force_error"].astype(np.float64) / self.stiffness
+            waits = touched if contract.gripper.one_to_one else np.zeros(contract.action_size, bool)
+            return np.where(waits, 0.0, -gains.closing_step) / contract.max_delta_m
+        error = parts["force_error"].astype(np.float64) / gains.stiffness
         # the left error enters the integral, which is used, then the right one, and it is used again
-        running = self._integral + np.cumsum(error * self.period_s)
+        running = self._integral + np.cumsum(error * contract.control_period_s)
         self._integral = float(running[-1])
-        delta = -0.5 * np.sum(self.kp * error + self.ki * running)
-        return np.full(FINGERS, delta / self.max_delta_m)
+        delta = -np.mean(gains.kp * error + gains.ki * running)
+        return np.full(contract.action_size, delta / contract.max_delta_m)
+
+
+def load_policy(folder: Path | str) -> tuple[Policy, Contract]:
+    """Reads an exported folder.
+
+    Raises:
+      DeployError: if it is missing, damaged, or can't be run here.
+    """
+    contract, decides = read_contract(folder)
+    if isinstance(decides, ForcePIGains):
+        return ForcePI(contract, decides), contract
+    try:
+        return OnnxPolicy(decides, contract), contract
+    except DeployError as error:
+        raise DeployError(f"{folder}: {error}") from error

@@ -105,6 +105,11 @@ class Training:
         hard, soft = self.softness["force_scale"]
         return np.clip(1 - (force_scale - soft) / (hard - soft), 0.0, 1.0)
 
+    @property
+    def ceiling_n(self) -> float:
+        """Force above which a policy that was trained with this may close no further: a third above what it reaches."""
+        return self.max_force_n * float(np.max(self.force_scale(np.array([0.0, 1.0])))) * 4 / 3
+
     def force_scale(self, kappa: np.ndarray | float) -> np.ndarray | float:
         """f_α of an object of softness κ; 1 where it does not depend on it."""
         return self.at("force_scale", kappa) if "force_scale" in self.softness else 1.0 + 0.0 * kappa

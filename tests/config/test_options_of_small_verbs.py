@@ -14,16 +14,16 @@ from forcegrasp.config import (
 )
 from forcegrasp.errors import ForcegraspError
 
-EXPORT_CASES: dict[str, Any] = {"run": "other", "out": "elsewhere", "ceiling_n": 1.0}
+EXPORT_CASES: dict[str, Any] = {"run": "other", "out": "elsewhere", "gripper": "franka_hand", "ceiling_n": 1.0}
 CURVES_CASES: dict[str, Any] = {"folders": "[other]", "out": "elsewhere"}
 
 
 def exporting(monkeypatch, **values: Any) -> tuple:
-    """What the verb sets out to export, where to, and with which ceiling."""
+    """What the verb sets out to export, where to, with which ceiling, and of which gripper."""
     asked = []
 
     def stop(*arguments):
-        asked.extend(arguments)
+        asked.extend(map(str, arguments))  # a NaN is not its like
         raise ForcegraspError("enough")
 
     monkeypatch.setattr("forcegrasp.runs.export.export_policy", stop)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -10,7 +11,8 @@ import pytest
 import torch
 
 from forcegrasp.config import ActionConfig, GraspConfig, PhysicsConfig, PPOConfig, SensorConfig, TrainConfig
-from forcegrasp.controllers.policy import make_policy
+from forcegrasp.controllers.policy import make_policy, observation_size
+from forcegrasp.physics import default_gripper, load_gripper
 from forcegrasp.runs.export import export_policy
 from forcegrasp.runs.run_dir import RunDir
 
@@ -28,11 +30,13 @@ def make_run(tmp_path_factory) -> Make:
     def make(**parts) -> tuple[Path, TrainConfig]:
         config = replace(TRAINING, **parts)
         torch.manual_seed(0)
-        policy = make_policy(2 * len(config.observation.parts) * config.observation.frames, config.ppo)
+        gripper = load_gripper(config.gripper)
+        policy = make_policy(observation_size(gripper, config.observation), config.ppo, gripper)
         with torch.no_grad():
             for tensor in policy.parameters():  # much of [-1, 1], and beyond
                 tensor.normal_(0.0, 0.4)
-            policy[0].module[0].get_submodule("net" if config.ppo.mirrored else "")[-1].bias.fill_(-1.0)
+            mirrored = config.ppo.mirrored and gripper.is_symmetric
+            policy[0].module[0].get_submodule("net" if mirrored else "")[-1].bias.fill_(-1.0)
         run = RunDir.create(tmp_path_factory.mktemp("deploy") / "run", config, [])
         run.save(0, {f"policy.{name}": tensor for name, tensor in policy.state_dict().items()}, {}, keep=1)
         return run.path, config
@@ -45,5 +49,15 @@ def exported(make_run, tmp_path_factory) -> Path:
     """A folder that forcegrasp export wrote. Copy it before you change it."""
     out = tmp_path_factory.mktemp("exported") / "policy"
     run, _ = make_run(sensors=SensorConfig(), action=ActionConfig())
-    export_policy(run, out, ceiling_n=2.0)
+    export_policy(run, out)
     return out
+
+
+@pytest.fixture(scope="session")
+def one_sensor(tmp_path_factory) -> Path:
+    """The description of a gripper with two motors, one of whose fingers has a force sensor."""
+    folder, shipped = tmp_path_factory.mktemp("one_sensor"), default_gripper()
+    text = shipped.path.read_text().replace(", force_sensor: force_r}", "}")
+    (folder / "one_sensor.yaml").write_text(text.replace(f"name: {shipped.name}", "name: one_sensor"))
+    shutil.copy(shipped.model, folder)
+    return folder / "one_sensor.yaml"

@@ -12,9 +12,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from forcegrasp.deploy import Contract, GraspController
-from forcegrasp.deploy.contract import read_contract
+from forcegrasp.deploy import GraspController
+from forcegrasp.deploy.contract_file import read_contract, shipped_contracts
 from forcegrasp.errors import DeployError
+from forcegrasp.physics.gripper_file import shipped_grippers
+from tools.deploy_contracts import write_contracts
 
 
 @pytest.fixture
@@ -45,11 +47,28 @@ def test_what_was_exported(exported):
 @pytest.mark.parametrize(
     ("change", "told"),
     [
-        (lambda c: c.update(format="forcegrasp-policy/2"), "format is 'forcegrasp-policy/2', but this version reads"),
+        (lambda c: c.update(format="forcegrasp-policy/3"), "format is 'forcegrasp-policy/3', but this version reads"),
         (lambda c: c.update(format=1), "format is missing or not a str"),
         (lambda c: c.pop("format"), "format is missing"),
         (lambda c: c.pop("network"), "network is missing"),
         (lambda c: c["network"].update(sha256="0" * 64), "policy.onnx: not the network that contract.json"),
+        (lambda c: c.update(policy="net"), "policy is 'net', but must be network or force_pi"),
+        (lambda c: c.update(policy="force_pi"), "gains is missing or not a dict"),
+        (lambda c: c.pop("gripper"), "gripper is missing or not a dict"),
+        (lambda c: c["gripper"].pop("name"), "gripper: name is missing"),
+        (lambda c: c["gripper"].update(name=2), "gripper: name=2: must be text"),
+        (lambda c: c["gripper"].update(unit="mm"), "unit='mm': must be m or rad"),
+        (lambda c: c["gripper"].update(forces=[]), "forces=[]: must name each reading once, and at least one"),
+        (lambda c: c["gripper"].update(forces=["f_n", "f_n"]), "must name each reading once"),
+        (lambda c: c["gripper"].update(positions="q_m"), "gripper: positions='q_m': must be a list of names"),
+        (
+            lambda c: c["gripper"].update(positions=["q_m"]),
+            "but its contract says [('observation', 'tensor(float)', [1, 24])",
+        ),
+        (lambda c: c["control"].pop("stall"), "control: stall is missing"),
+        (lambda c: c["control"].update(stall="never"), "stall='never': must be a number, or null"),
+        (lambda c: c["control"].update(stall=0), "stall=0: must be positive"),
+        (lambda c: (c["control"].update(stall=1.0), c["gripper"].update(forces=["f_n"])), "a force reading per motor"),
         (lambda c: c.update(control=[]), "control is missing or not a dict"),
         (lambda c: c["control"].pop("frames"), "control: frames is missing"),
         (lambda c: c["control"].update(frame=3), "no entry 'frame'; did you mean frames?"),
@@ -124,10 +143,10 @@ def test_nothing_of_the_simulator_is_needed(exported):
     program = f"""
 import sys
 for name in ("torch", "torchrl", "tensordict", "mujoco", "gymnasium", "hydra", "omegaconf", "scipy", "yaml", "polars",
-             "matplotlib", "rich", "safetensors"):
+             "matplotlib", "rich", "safetensors", "pydantic"):
     sys.modules[name] = None  # importing it raises
 from forcegrasp.deploy import GraspController
-for controller in (GraspController.baseline(), GraspController.load({str(exported)!r})):
+for controller in (GraspController.baseline(), GraspController.load({str(exported)!r}, gripper="tiago")):
     controller.reset(0.5)
     print(controller.step([0.04, 0.04], [0.0, 0.0], 0.0))
 """
@@ -146,4 +165,70 @@ def test_without_onnxruntime(exported, monkeypatch):
 
 
 def test_contract_in_one_line():
-    assert str(Contract()) == "25 Hz, goal 0.08 to 1.425 N, at most 3 mm a step, ceiling 2 N"
+    for gripper, told in {
+        "tiago": "tiago, 25 Hz, goal 0.08 to 1.425 N, at most 3 mm a step, ceiling 2 N",
+        "so101_gripper": "so101_gripper, 25 Hz, goal 0.6524 to 3.873 N, at most 0.02 rad a step, ceiling 5.436 N",
+    }.items():
+        assert str(GraspController.baseline(gripper=gripper).contract) == told
+
+
+def test_contract_of_the_first_format(folder):
+    """There was one gripper, and nothing was said of it."""
+    path = folder / "contract.json"
+    content = json.loads(path.read_text())
+    expected, _ = read_contract(folder)
+    content["format"] = "forcegrasp-policy/1"
+    del content["policy"], content["gripper"], content["control"]["stall"], content["network"]["input"]["columns"]
+    path.write_text(json.dumps(content))
+    controller = GraspController.load(folder, gripper="tiago")
+    assert controller.contract == expected
+    controller.reset(0.5)
+    assert controller.step([0.04, 0.04], [0.0, 0.0]).shape == (2,)
+
+
+def test_policy_of_another_gripper(exported):
+    with pytest.raises(DeployError) as caught:
+        GraspController.load(exported, gripper="franka_hand")
+    assert str(caught.value) == (
+        f"{exported}: made for tiago (2 positions and 2 forces: q_l_m, q_r_m, f_l_n, f_r_n); the robot has franka_hand"
+        " (1 position and 2 forces: q_m, f_l_n, f_r_n)"
+    )
+    with pytest.raises(DeployError, match="made for robotiq_2f85"):  # as many readings, of another kind
+        GraspController.load(shipped_contracts() / "robotiq_2f85", gripper="franka_hand")
+
+
+def test_grippers_that_have_no_contract(exported):
+    with pytest.raises(DeployError, match=r"gripper=franka: no such gripper; did you mean franka_hand\?; for one of"):
+        GraspController.baseline(gripper="franka")
+    with pytest.raises(DeployError, match=r"holds a trained policy, which GraspController\.load runs"):
+        GraspController.baseline(gripper=exported)
+
+
+def test_shipped_contracts_are_those_of_the_descriptions(tmp_path):
+    """Else: python tools/deploy_contracts.py."""
+    write_contracts(tmp_path)
+    assert [path.name for path in sorted(tmp_path.iterdir())] == shipped_grippers()
+    for name in shipped_grippers():
+        shipped, made = (
+            json.loads((at / name / "contract.json").read_text()) for at in (shipped_contracts(), tmp_path)
+        )
+        for section in ("control", "gains"):
+            expected = made.pop(section).items()
+            assert shipped.pop(section) == {k: v if k == "parts" else pytest.approx(v) for k, v in expected}
+        assert shipped == made
+
+
+@pytest.mark.parametrize(
+    ("gains", "told"),
+    [
+        ({"stiffness": 0}, "stiffness=0: must be positive"),
+        ({"closing_step": "slow"}, "gains: closing_step='slow': must be a number"),
+        ({"kd": 1.0}, "gains: no entry 'kd'; did you mean kp or ki?"),
+    ],
+)
+def test_damaged_gains(gains, told, tmp_path):
+    folder = Path(shutil.copytree(shipped_contracts() / "tiago", tmp_path / "hand"))
+    content = json.loads((folder / "contract.json").read_text())
+    content["gains"] |= gains
+    (folder / "contract.json").write_text(json.dumps(content))
+    assert told in refusal(folder)

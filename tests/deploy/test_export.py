@@ -13,6 +13,7 @@ import torch
 from forcegrasp.cli.main import main
 from forcegrasp.config import GraspConfig, TrainConfig
 from forcegrasp.deploy import GraspController
+from forcegrasp.errors import DeployError
 from forcegrasp.runs import export
 from forcegrasp.runs.export import contract_of
 
@@ -36,7 +37,7 @@ def test_command(run, same_network, tmp_path, capsys, monkeypatch):
     assert not err
     first, second, third = out.splitlines()
     assert first == (
-        "folder: policy.onnx and contract.json (25 Hz, goal 0.08 to 1.425 N, at most 3 mm a step, ceiling 0.9 N)"
+        "folder: policy.onnx and contract.json (tiago, 25 Hz, goal 0.08 to 1.425 N, at most 3 mm a step, ceiling 0.9 N)"
     )
     assert second.startswith("acts like the policy in torch: to ")
     assert third.startswith("a step takes ")
@@ -53,7 +54,7 @@ def test_a_run_of_a_sweep_may_be_called_like_an_option(run, same_network, tmp_pa
 
 
 def test_exports_of_one_policy_are_the_same_file(run, exported, tmp_path):
-    export.export_policy(run, tmp_path / "again", ceiling_n=2.0)
+    export.export_policy(run, tmp_path / "again")
     assert (tmp_path / "again/policy.onnx").read_bytes() == (exported / "policy.onnx").read_bytes()
     assert (tmp_path / "again/contract.json").read_bytes() == (exported / "contract.json").read_bytes()
 
@@ -103,3 +104,50 @@ def test_goals_are_those_that_training_draws(grasp, expected, draw):
     assert contract.goal_range_n == pytest.approx(expected)
     goals = draw(2000, **vars(grasp)).goal_force_n
     assert np.all((goals >= contract.goal_range_n[0]) & (goals <= contract.goal_range_n[1]))
+
+
+def test_force_pi_of_a_gripper_of_ones_own(one_sensor, tmp_path, capsys, monkeypatch):
+    """Without a network, and so without the packages that one needs."""
+    monkeypatch.setitem(sys.modules, "onnx", None)
+    out = tmp_path / "hand"
+    assert main(["export", "force_pi", f"gripper={one_sensor}", f"out={out}", "ceiling_n=1.8"]) == 0
+    first, second = capsys.readouterr().out.splitlines()
+    assert first == (
+        f"{out}: contract.json (one_sensor, 25 Hz, goal 0.08 to 1.425 N, at most 3 mm a step, ceiling 1.8 N)"
+    )
+    assert second.startswith("a step takes ")
+    assert [path.name for path in out.iterdir()] == ["contract.json"]
+    controller = GraspController.load(out, gripper=out)
+    assert controller.contract.gripper.forces == ("f_l_n",)
+    assert GraspController.baseline(gripper=out, kp=0.3).policy.gains.kp == 0.3
+    with pytest.raises(DeployError, match=r"made for one_sensor \(2 positions and 1 force: q_l_m, q_r_m, f_l_n\)"):
+        GraspController.load(out, gripper="tiago")
+
+
+def test_force_pi_of_the_papers_gripper_by_default(tmp_path):
+    export.export_policy("force_pi", tmp_path / "out")
+    assert GraspController.load(tmp_path / "out").contract == GraspController.baseline().contract
+
+
+def test_gripper_beside_a_run(run, tmp_path, capsys):
+    assert main(["export", str(run), "gripper=franka_hand", f"out={tmp_path / 'out'}"]) == 2
+    assert capsys.readouterr().err.endswith("run was trained on tiago; leave gripper= out\n")
+    assert not (tmp_path / "out").exists()
+
+
+def test_gripper_without_force_readings(one_sensor, tmp_path, capsys):
+    text = one_sensor.read_text().replace(", force_sensor: force_l}", "}")
+    (one_sensor.parent / "none.yaml").write_text(text)
+    assert main(["export", "force_pi", f"gripper={one_sensor.parent / 'none.yaml'}", f"out={tmp_path / 'out'}"]) == 2
+    assert "a policy that controls forces must read some" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_limits_follow_from_the_gripper():
+    """Those of the paper's gripper are what they were chosen to be; an effort is read with both signs."""
+    contract = contract_of(TrainConfig())
+    assert (contract.ceiling_n, contract.position_reading_m) == (2.0, (-0.002, 0.047))
+    assert (contract.force_reading_n, contract.gap_s, contract.stall) == ((-1.0, 20.0), (0.02, 0.1), None)
+    effort = contract_of(TrainConfig(gripper="so101_gripper"))
+    assert effort.force_reading_n[0] == -effort.force_reading_n[1] < -effort.ceiling_n
+    assert effort.stall == pytest.approx(0.002)

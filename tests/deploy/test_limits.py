@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import dataclasses
 import logging
 import math
 
 import numpy as np
 import pytest
 
-from forcegrasp.deploy import Contract, GraspController
+from forcegrasp.deploy import GraspController
 from forcegrasp.errors import DeployError
 
 NAN, INF = math.nan, math.inf
@@ -30,8 +31,10 @@ class Scripted:
         return np.array(self.actions[min(len(self.seen), len(self.actions)) - 1])
 
 
-def controller(*actions, goal: float = 0.5, **contract) -> GraspController:
-    made = GraspController(Scripted(*actions or ([-1.0, -1.0],)), Contract(**contract))
+def controller(*actions, goal: float = 0.5, gripper: str = "tiago", **contract) -> GraspController:
+    own = GraspController.baseline(gripper=gripper).contract
+    contract = dataclasses.replace(own, **({"inductive_bias": True} | contract))
+    made = GraspController(Scripted(*actions or ([-1.0, -1.0],)), contract)
     made.reset(goal)
     return made
 
@@ -70,9 +73,12 @@ BAD = {
     "millimetres": (([30.0, 30.0], [0.1, 0.1]), "position reading can't be true"),
     "force too large": (([0.03, 0.03], [0.1, 21.0]), "force reading can't be true: [0.1, 21] is not in [-1, 20] N"),
     "force too negative": (([0.03, 0.03], [-1.5, 0.1]), "force reading can't be true"),
-    "no reading": ((None, [0.1, 0.1]), "position reading is not two numbers"),
-    "three readings": (([0.03, 0.03], [0.1, 0.1, 0.1]), "force reading is not two numbers"),
-    "text": ((["a", "b"], [0.1, 0.1]), "position reading is not two numbers"),
+    "no reading": ((None, [0.1, 0.1]), "position reading does not fit: tiago needs 2 positions and 2 forces; holding"),
+    "three readings": (
+        ([0.03, 0.03], [0.1, 0.1, 0.1]),
+        "force reading does not fit: tiago needs 2 positions and 2 forces",
+    ),
+    "text": ((["a", "b"], [0.1, 0.1]), "position reading does not fit"),
 }
 
 
@@ -217,3 +223,43 @@ def test_command_is_the_callers_own():
     command = made.step(OPEN, [0.0, 0.0])
     command[:] = 0.0
     assert made.step(OPEN, [NAN, 0.0]) == pytest.approx([0.037, 0.037])
+
+
+def test_readings_of_another_gripper_are_refused_by_their_numbers():
+    made = GraspController.baseline(gripper="franka_hand")
+    made.reset(1.0)
+    with pytest.raises(DeployError, match="position reading does not fit: franka_hand needs 1 position and 2 forces"):
+        made.step([0.03, 0.03], [0.0, 0.0])
+    assert made.step(0.03, [0.0, 0.0]) == pytest.approx([0.028])  # of one motor, the number may come alone
+    made.step(0.03, 0.0)
+    assert made.fault.startswith("force reading does not fit: franka_hand needs 1 position and 2 forces")
+
+
+def test_action_of_another_gripper_is_not_commanded():
+    made = controller([-1.0, -1.0], gripper="franka_hand", goal=1.0)
+    assert (made.step([0.03], [0.0, 0.0]) == [0.03]).all()
+    assert made.fault == "action does not fit: [-1, -1], not one per motor; holding"
+
+
+@pytest.mark.parametrize("forces", [[7.0, 0.3], [0.3, 7.0]])
+def test_above_the_ceiling_the_one_motor_does_not_close(forces):
+    made = controller([-1.0], [1.0], gripper="franka_hand", goal=1.0)
+    assert made.step(0.03, forces) == pytest.approx([0.03])
+    assert made.fault.startswith("force is above the ceiling of 6.667 N")
+    assert made.step(0.03, forces)[0] > 0.03
+
+
+def test_units_of_a_hinge():
+    made = controller([-1.0], gripper="so101_gripper", goal=1.0)
+    made.step(0.8, 0.0)
+    made.step(1.0, 0.0)
+    assert made.fault == "position reading can't be true: [1] is not in [-0.03556, 0.8356] rad; holding"
+    made.step(0.8, -40.0)  # an effort that opens
+    assert made.fault is None
+
+
+def test_effort_of_a_motor_that_moves_is_no_contact():
+    made = controller([-1.0], gripper="so101_gripper", goal=1.0)
+    for position, force, contact in ((0.8, 2.0, 0), (0.79, 2.0, 0), (0.7885, 0.3, 0), (0.788, 2.0, 1), (0.77, 0.0, 1)):
+        made.step(position, force)
+        assert made.policy.seen[-1]["had_contact"] == [contact]

@@ -11,7 +11,7 @@ from pathlib import Path
 import polars as pl
 
 from forcegrasp.cli.main import main
-from forcegrasp.deploy.contract import read_contract
+from forcegrasp.deploy.contract_file import read_contract
 from forcegrasp.measure import MeasurementSet, check_set, read_set
 from forcegrasp.physics import default_gripper
 from tools.reliability.attacks.attack import MARK, Attack, not_files, replace
@@ -166,6 +166,7 @@ def attacks() -> Iterator[Attack]:
         "9" * 5000,
         "NaN",
         '{"format": "forcegrasp-policy/1"}',
+        '{"format": "forcegrasp-policy/2"}',
         " " * 2_000_000,
     ):
         yield Attack(
