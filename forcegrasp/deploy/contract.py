@@ -124,7 +124,7 @@ class Contract:
         """The control loop in one line."""
         goal = " to ".join(f"{n:.4g}" for n in self.goal_range_n)
         in_metres = self.gripper.unit == "m"
-        step = f"{self.max_delta_m * 1000:g} mm" if in_metres else f"{self.max_delta_m:g} {self.gripper.unit}"
+        step = f"{self.max_delta_m * 1000:.4g} mm" if in_metres else f"{self.max_delta_m:.4g} {self.gripper.unit}"
         return (
             f"{self.gripper.name}, {1 / self.control_period_s:g} Hz, goal {goal} N, at most {step} a step,"
             f" ceiling {self.ceiling_n:.4g} N"
