@@ -15,8 +15,8 @@ NOTES = """
              the hand-written controller
 
 Writes policy.onnx and contract.json (readings, scaling, stacking, limits). forcegrasp.deploy.GraspController runs them
-with numpy and onnxruntime: see docs/deploy.md. Needs pip install 'forcegrasp[onnx]'. For force_pi gripper=DESCRIPTION
-it writes contract.json alone, and neither needs the other packages.
+with numpy and onnxruntime: see docs/deploy.md. Needs pip install 'forcegrasp[onnx]'. For force_pi it writes
+contract.json alone, without that extra; gripper= says for which gripper.
 """
 
 

@@ -180,9 +180,8 @@ class ExportConfig:
     gripper: str = option(
         "", "gripper of force_pi by name, or the path of a description; the paper's if empty. A run has its own"
     )
-    ceiling_n: float = of_gripper(
-        math.nan,
-        "ceiling_n",
+    ceiling_n: float | None = option(
+        None,
         "force above which no finger is closed further; a third above what the simulated gripper reaches if left out",
         unit="N",
         low=1e-4,

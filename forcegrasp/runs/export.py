@@ -19,7 +19,7 @@ import torch
 from torch import nn
 
 from forcegrasp.assets import DEFAULT_GRIPPER
-from forcegrasp.config import ActionConfig, TrainConfig, is_left_out
+from forcegrasp.config import ActionConfig, TrainConfig
 from forcegrasp.controllers import ForcePI
 from forcegrasp.deploy import Contract, ForcePIGains, GraspController, GripperInterface, OnnxPolicy
 from forcegrasp.deploy.contract_file import FORCE_PI, INPUT, NETWORK_FILE, OUTPUT, write_contract
@@ -50,15 +50,13 @@ class Exported:
     step_us: float  #: median time of a controller's step on this machine, microseconds
 
 
-def export_policy(
-    name: str | Path, out: str | Path, ceiling_n: float = math.nan, gripper: str = ""
-) -> Exported:
+def export_policy(name: str | Path, out: str | Path, ceiling_n: float | None = None, gripper: str = "") -> Exported:
     """Writes ``policy.onnx`` and ``contract.json``, and tries them out.
 
     Args:
       name: a run directory, the name of a shipped policy, or ``force_pi``, which needs no network.
       out: the folder to write; must not exist, or be empty.
-      ceiling_n: force above which no motor may close further, newtons; the gripper's if NaN.
+      ceiling_n: force above which no motor may close further, newtons; the gripper's if None.
       gripper: of ``force_pi``, by name or the path of its description; the paper's if empty.
 
     Raises:
@@ -91,7 +89,7 @@ def export_policy(
     return Exported(contract, difference, median_step_us(GraspController.load(out)))
 
 
-def _export_force_pi(gripper: str, out: Path, ceiling_n: float) -> Exported:
+def _export_force_pi(gripper: str, out: Path, ceiling_n: float | None) -> Exported:
     contract = _named(FORCE_PI, TrainConfig(gripper=gripper, action=ActionConfig(inductive_bias=False)), ceiling_n)
     law = ForcePI(load_gripper(gripper))
     out.mkdir(parents=True, exist_ok=True)
@@ -99,7 +97,7 @@ def _export_force_pi(gripper: str, out: Path, ceiling_n: float) -> Exported:
     return Exported(contract, None, median_step_us(GraspController.load(out)))
 
 
-def _named(name: Path | str, config: TrainConfig, ceiling_n: float) -> Contract:
+def _named(name: Path | str, config: TrainConfig, ceiling_n: float | None) -> Contract:
     """The contract, or a DeployError that names the policy."""
     try:
         return contract_of(config, ceiling_n)
@@ -107,7 +105,7 @@ def _named(name: Path | str, config: TrainConfig, ceiling_n: float) -> Contract:
         raise DeployError(f"{name}: {error}") from error
 
 
-def contract_of(config: TrainConfig, ceiling_n: float = math.nan) -> Contract:
+def contract_of(config: TrainConfig, ceiling_n: float | None = None) -> Contract:
     """The contract of a training: goals are those that it could draw.
 
     Raises:
@@ -138,7 +136,7 @@ def contract_of(config: TrainConfig, ceiling_n: float = math.nan) -> Contract:
         joint_range_m=(0.0, gripper.stroke),
         goal_range_n=(float(min(grasp.goal_force_min_n, reached.min())), float(reached.max())),
         control_period_s=gripper.period_s,
-        ceiling_n=ceiling if is_left_out(ceiling_n) else ceiling_n,
+        ceiling_n=ceiling if ceiling_n is None else ceiling_n,
         position_reading_m=(-beyond, gripper.stroke + beyond),
         force_reading_n=(-highest if gripper.force == "motor" else lowest, highest),
         gap_s=(_GAP[0] * gripper.period_s, _GAP[1] * gripper.period_s),

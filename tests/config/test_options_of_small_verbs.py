@@ -23,7 +23,7 @@ def exporting(monkeypatch, **values: Any) -> tuple:
     asked = []
 
     def stop(*arguments):
-        asked.extend(map(str, arguments))  # a NaN is not its like
+        asked.extend(arguments)
         raise ForcegraspError("enough")
 
     monkeypatch.setattr("forcegrasp.runs.export.export_policy", stop)
