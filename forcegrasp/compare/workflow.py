@@ -14,6 +14,7 @@ from forcegrasp.compare.comparison import Comparison
 from forcegrasp.compare.diagnose import Diagnosis, diagnose
 from forcegrasp.compare.fit import Fit, Simulators, fit_exactly, fit_once
 from forcegrasp.compare.floor import beyond_fit, numerical_error, numerical_floor
+from forcegrasp.compare.given_noise import check_given_noise
 from forcegrasp.compare.heldout import heldout_residual, make_folds, rms
 from forcegrasp.compare.intervals import intervals, standard_errors, warnings
 from forcegrasp.compare.problem import Problem
@@ -60,7 +61,7 @@ def load(path: str | Path) -> Loaded[MeasurementSet] | Loaded[FinalForceTable]:
     gripper = load_gripper(measured.gripper, measured.path)
     if isinstance(measured, FinalForceTable):
         return Loaded(measured, gripper, check_table(measured, gripper.open_m))
-    return Loaded(measured, gripper, check_set(measured, gripper.open_m))
+    return Loaded(measured, gripper, check_set(measured, gripper.open_m) + check_given_noise(measured))
 
 
 def fit_model(loaded: Loaded[MeasurementSet], seed: int, progress: Progress) -> tuple[Target, Simulators, BaseFit]:
