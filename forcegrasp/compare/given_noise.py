@@ -36,7 +36,8 @@ def check_given_noise(measured: MeasurementSet) -> list[str]:
         least, most = noise_range(measured.grasps, readings)
         shown = min(max(std, least), most)
         apart = max(std / shown, shown / std)
-        line = f"{show(measured.path / 'meta.yaml')}: {key}: {std:.3g} {unit} is given, the readings show {shown:.2g} {unit}"
+        where = f"{show(measured.path / 'meta.yaml')}: {key}"
+        line = f"{where}: {std:.3g} {unit} is given, the readings show {shown:.2g} {unit}"
         noisy = all(is_noisy([signals[:, finger] for signals in readings]) for finger in range(2))
         if apart > REFUSE and noisy:
             raise MeasurementError(f"{line}; correct it, in {unit}, or leave it out to have it estimated")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -70,6 +71,16 @@ def fit_model(loaded: Loaded[MeasurementSet], seed: int, progress: Progress) -> 
     problem = Problem(loaded.gripper, target.grasps)
     simulators = Simulators(problem)
     return target, simulators, fit_base(target, problem, simulators, np.random.default_rng(seed), progress)
+
+
+def warn_of_other_set(loaded: Loaded[MeasurementSet], model: Model, name: object) -> Loaded[MeasurementSet]:
+    """The set, with a warning if a model says that it was fitted to another one; ``name`` is the model's file."""
+    own = loaded.measured.fingerprint
+    if model.data.get("fingerprint", own) == own:
+        return loaded
+    other = model.data.get("set", "a set without a name")
+    warning = f"model={name}: was fitted to other measurements ({other}) than {loaded.measured.path}"
+    return dataclasses.replace(loaded, warnings=[*loaded.warnings, warning])
 
 
 def apply_model(

@@ -46,7 +46,7 @@ def check_copies(measured: MeasurementSet) -> list[str]:
 
 
 def is_noisy(signals: Sequence[np.ndarray]) -> bool:
-    """Whether one sensor's signals ``(T,)`` jitter all the time; without noise they rest, or bend one way for a while."""
+    """Whether one sensor's signals ``(T,)`` jitter all the time; without noise they rest or bend for a while."""
     reach = max(float(np.ptp(signal)) for signal in signals)
     turns = pairs = steps = 0
     for signal in signals:

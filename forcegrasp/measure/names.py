@@ -24,7 +24,7 @@ def misfits(
       names: that are there.
       required: that must be there.
       optional: that may be there.
-      more: whether others may be there, if they are no misspelling of one of these and none that is required is missing.
+      more: whether others may be there, if they are no misspelling of these, and none that is required is missing.
     """
     absent = [name for name in (*required, *optional) if name not in names]
     missing = [name for name in required if name not in names]

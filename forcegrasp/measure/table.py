@@ -13,6 +13,7 @@ from forcegrasp.errors import MeasurementError
 from forcegrasp.measure.folder import MAX_NAME, show
 from forcegrasp.measure.names import misfits
 
+
 @dataclass(frozen=True)
 class Columns:
     """The columns that a file may have."""
