@@ -44,7 +44,10 @@ def spell_out(
     key, what = PLAIN[verb]
     given = [a for a in spelled if a.startswith(f"{key}=")]
     if key in lists:
-        value = f"[{','.join(map(quote, [*plain, *(str(one) for a in given for one in parse(a).value())]))}]"
+        listed = [parse(a).value() for a in given]
+        if not all(isinstance(value, list) for value in listed):
+            raise ConfigError(f"{' '.join(given)}: {key} are a list, written {key}=[a,b]; or give them without {key}=")
+        value = f"[{','.join(map(quote, [*plain, *(str(one) for value in listed for one in value)]))}]"
     elif len(plain + given) > 1:
         raise ConfigError(f"{verb}: one {what} at a time, not {' and '.join(plain + given)}")
     else:

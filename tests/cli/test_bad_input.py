@@ -140,6 +140,7 @@ MISTAKES = [
     (["curves", "empty"], "empty: no run in it"),
     (["curves", "finished", "empty"], "empty: no run in it"),
     (["curves", "folder=finished"], "did you mean folders"),
+    (["curves", "finished", "folders=range(1,3)"], "folders are a list"),
     (["curves", "silent"], "no run in it has finished a batch yet"),
     (["curves", "headless"], "no run in it has finished a batch yet"),
     (["curves", "broken"], "broken/config.yaml: not a valid configuration"),

@@ -1,4 +1,4 @@
-"""However an option is typed that means the same, the same comes out: in brackets or not, plainly, by its other name."""
+"""However an option is typed, the same comes out: in brackets or not, plainly, by its other name."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ ALIKE = [
     ("render", "policies", ["runs/seed=0"], ["policies=['runs/seed=0']", "policy=runs/seed=0", "policies=runs/seed=0"]),
     ("evaluate", "policies", ["ib", "close"], ["policies=[ib,close]", "policy=[ib,close]"]),
     ("diagnose", "effects", ["backlash"], ["effects=[backlash]", "effects=backlash", "effect=backlash"]),
-    ("record", "effects", ["backlash gap_m=0.001"], ["effects=['backlash gap_m=0.001']", "effect=backlash gap_m=0.001"]),
+    ("record", "effects", ["stiction slip=1"], ["effects=['stiction slip=1']", "effect=stiction slip=1"]),
     ("add", "effect", "backlash", ["effect=backlash", "effects=backlash", "effects=[backlash]"]),
     ("train", "ppo.hidden", [8], ["ppo.hidden=[8]", "ppo.hidden=8"]),
     ("train", "observation.parts", ["force"], ["observation.parts=[force]", "observation.parts=force"]),
