@@ -46,7 +46,9 @@ def spell_out(
     if key in lists:
         listed = [parse(a).value() for a in given]
         if not all(isinstance(value, list) for value in listed):
-            raise ConfigError(f"{' '.join(given)}: {key} are a list, written '{key}=[a,b]'; or give them without {key}=")
+            raise ConfigError(
+                f"{' '.join(given)}: {key} are a list, written '{key}=[a,b]'; or give them without {key}="
+            )
         value = f"[{','.join(map(quote, [*plain, *(str(one) for value in listed for one in value)]))}]"
     elif len(plain + given) > 1:
         raise ConfigError(f"{verb}: one {what} at a time, not {' and '.join(plain + given)}")
@@ -78,7 +80,9 @@ def _refuse_both_names(verb: str, arguments: list[str], options: Mapping[str, An
         key = _rename(argument, options).partition("=")[0]
         given = [a for a in arguments if _rename(a, options).partition("=")[0] == key]
         if len(given) > 1 and any(a.partition("=")[0] != key for a in given):
-            several = f"several {key} are given as '{key}=[A,B]'" if isinstance(options[key], list) else f"give one {key}"
+            several = (
+                f"several {key} are given as '{key}=[A,B]'" if isinstance(options[key], list) else f"give one {key}"
+            )
             raise ConfigError(f"{verb}: {' and '.join(given)} are the same option; {several}")
 
 
