@@ -138,7 +138,7 @@ def load_gripper(name: str | Path, folder: str | Path = "") -> Gripper:
     if re.fullmatch(r"\w+", name):
         path = shipped / f"{name}.yaml"
         if not path.is_file():
-            known = [p.stem for p in shipped.glob("*.yaml")]
+            known = [p.stem for p in shipped.glob("*.yaml") if FORMAT in p.read_text("utf-8")]  # others are no grippers
             raise ConfigError(f"gripper={name}: no such gripper{closest(name, known)}; or give a description's path")
     else:
         path = Path(folder) / name

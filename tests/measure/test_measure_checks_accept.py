@@ -223,6 +223,11 @@ def _noise():
     return np.random.default_rng(0).normal(0, 0.013, (100, 2))
 
 
+def _smooth(grasp):
+    """What a simulation without noise reads on both sides."""
+    return 200 * np.maximum(grasp.radius_m - grasp.command_m, 0)[:, [0, 0]]
+
+
 WARNED = {
     "a gap": (lambda g: _without(g, lambda x: (x.time_s < 1) | (x.time_s > 1.5)), "a gap of 0.5"),
     "one grasp": (lambda g: g[:1], "one grasp only"),
@@ -233,6 +238,14 @@ WARNED = {
     "a deaf finger": (
         lambda g: [change(x, force_n=x.force_n * [1, 0]) for x in g],
         "f_r_n: the right finger feels nothing",
+    ),
+    "smooth forces, twice": (
+        lambda g: [change(x, force_n=_smooth(x)) for x in g],
+        "f_l_n and f_r_n: the same readings in every row; is one a copy?",
+    ),
+    "coarse forces, twice": (
+        lambda g: [change(x, force_n=0.5 * np.round(x.force_n[:, [0, 0]] / 0.5)) for x in g],
+        "f_l_n and f_r_n: the same",
     ),
     "a free motion": (lambda g: [*g, change(g[0], name="free", force_n=_noise())], "no contact"),
 }
