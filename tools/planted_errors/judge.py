@@ -17,8 +17,8 @@ from tools.planted_errors.listing import Error
 
 CAUGHT, SURVIVED, TIMEOUT, BROKEN, STALE = "caught", "survived", "timeout", "broken", "stale"
 _FAILED = re.compile(r"^(?:FAILED|ERROR) ((\S+?\.py)\S*)", re.MULTILINE)
-# What takes seconds to import and is the same for every error: processes with tests are forked from one that has it.
-_HEAVY = ["pytest", "numpy", "scipy.stats", "scipy.optimize", "mujoco", "torch", "torchrl.envs", "polars"]
+#: What takes seconds to import and is the same for every error: processes with tests are forked from one that has it.
+HEAVY = ["pytest", "numpy", "scipy.stats", "scipy.optimize", "mujoco", "torch", "torchrl.envs", "polars"]
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class Judge:
         self.tree, self.timeout_s = tree, timeout_s
         self._sound: dict[str, bool] = {}
         self._processes = multiprocessing.get_context("forkserver")
-        self._processes.set_forkserver_preload(_HEAVY)
+        self._processes.set_forkserver_preload(HEAVY)
 
     def judge(self, error: Error) -> Outcome:
         """Runs the tests that are named, then, if they pass, all those in their folders."""

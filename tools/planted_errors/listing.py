@@ -1,9 +1,9 @@
 """The errors to plant, as lists/ has them: a file per package, short enough to read.
 
 ```
-forcegrasp/physics/plant.py | tests/physics/test_reference.py tests/golden     the file, and the tests that should notice
-- self._sign = 1.0                      what stands there, exactly once
-+ self._sign = -1.0                     what is planted in its place; nothing takes it out
+forcegrasp/physics/plant.py | tests/physics/test_reference.py tests/golden     a file; tests that should notice
+- self._sign = 1.0                                                             what stands there, exactly once
++ self._sign = -1.0                                                            what is planted; nothing removes it
 ```
 """
 
