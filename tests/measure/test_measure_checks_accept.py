@@ -9,6 +9,7 @@ import pytest
 from measured_rig import OPEN_M, change, closing, cycles, make_grasp, make_set, standard_grasps
 
 from forcegrasp.measure import check_set
+from forcegrasp.measure.check_liveness import feels
 
 
 def _force(change_force):
@@ -244,6 +245,13 @@ def test_warning(grasps, case):
     warnings = check_set(make_set(vary(grasps)), OPEN_M)
     assert any(words in warning for warning in warnings), warnings
     assert all(warning.isprintable() for warning in warnings)
+
+
+def test_a_touch_as_light_as_the_noise_is_felt_and_noise_alone_is_not():
+    force = np.random.default_rng(3).normal(0, 0.013, (500, 2))
+    assert feels(force) == [False, False]
+    force[200:300, 1] += 2 * 0.013
+    assert feels(force) == [False, True]
 
 
 def test_checking_changes_nothing(measured):

@@ -123,6 +123,7 @@ def _pytest(tree: Path, place: Path, tests: tuple[str, ...]) -> None:
     os.chdir(tree)
     os.environ |= {"PYTHONPATH": str(tree), "COLUMNS": "500"}
     sys.path.insert(0, str(tree))
+    sys.dont_write_bytecode = False  # what is compiled once serves many errors
     for name in [name for name in sys.modules if name.partition(".")[0] in ("forcegrasp", "tools")]:
         del sys.modules[name]  # those of the checkout
     import pytest
