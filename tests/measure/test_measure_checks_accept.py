@@ -11,7 +11,7 @@ from measured_rig import OPEN_M, change, closing, cycles, make_grasp, make_set, 
 from forcegrasp.errors import MeasurementError
 from forcegrasp.measure import check_set
 from forcegrasp.measure.check_liveness import feels
-from forcegrasp.measure.check_signs import _check_free_air
+from forcegrasp.measure.check_signs import _check_follows, _check_free_air
 
 
 def _force(change_force):
@@ -254,6 +254,13 @@ def test_a_touch_as_light_as_the_noise_is_felt_and_noise_alone_is_not():
     assert feels(force) == [False, False]
     force[200:300, 1] += 2 * 0.013
     assert feels(force) == [False, True]
+
+
+def test_a_delay_of_half_a_period_is_no_wrong_direction():
+    grasp = make_grasp(0)
+    command, position = (0.022 + 0.01 * np.sin(2 * np.pi * (grasp.time_s - late) / 0.8) for late in (0.0, 0.4))
+    grasp = change(grasp, command_m=np.stack([command] * 2, axis=1), position_m=np.stack([position] * 2, axis=1))
+    _check_follows(make_set([grasp]), 0, OPEN_M)
 
 
 def test_free_air_of_an_object_on_the_right_ends_early_for_the_right_finger():
