@@ -6,12 +6,18 @@ import numpy as np
 import pytest
 
 from forcegrasp.physics import GraspParameters
+from forcegrasp.physics.parameters import kappa_of_force_scale
 
 
 def test_softness_interpolates_between_hard_and_soft():
     grasps = GraspParameters([0.0, 0.25, 0.5, 1.0], -9, 0.025, 0, 0.1)
     np.testing.assert_allclose(grasps.rho_m, [0.003, 0.00475, 0.0065, 0.010], rtol=1e-15)
     np.testing.assert_allclose(grasps.force_scale, [5, 3.875, 2.75, 0.5], rtol=1e-15)
+
+
+def test_softness_of_a_force_scale_is_the_inverse_and_stays_a_softness():
+    np.testing.assert_allclose(kappa_of_force_scale(np.array([5, 3.875, 0.5])), [0, 0.25, 1], rtol=1e-15)
+    np.testing.assert_array_equal(kappa_of_force_scale(np.array([9.0, 0.1])), [0, 1])  # beyond the paper's interval
 
 
 def test_scalars_are_broadcast_and_nothing_is_shared():
