@@ -36,6 +36,8 @@ forcegrasp train hydra.run.dir=runs/mine                                        
 
 - **A preset** is a file in `conf/` that says only what differs from the defaults. Options given beside it win.
 - **A range** is `[low, high]`, drawn uniformly. **A unit** ends the name where there is one: `_m` metres, `_n` newtons.
+- **A list of one** may be typed without brackets (`policies=ib`, `effects=backlash`), `policy=` is `policies=`, and
+  a set needs no `data=` (`forcegrasp compare my_set`).
 - **A misspelt name or a value out of bounds** is refused in one line, before anything is written.
 - **What a run used** is in its folder, as `config.yaml`.
 

@@ -69,9 +69,9 @@ def compare(
     loaded, tell = _open(data, progress)
     if measuring.is_table(loaded):
         return _analyse(loaded, "compare", model=model)
-    given = None if model is None else _model(model)
+    given, loaded = (None, loaded) if model is None else _beside(model, loaded, tell)
     comparison, used, notes = workflow.compare(loaded, given, seed, tell)
-    name = "" if model is None else str(model) if isinstance(model, (str, Path)) else repr(model)
+    name = "" if model is None else _name(model)
     return CompareResult(loaded, comparison, used, name, (*notes, *used.warnings))
 
 
@@ -124,7 +124,7 @@ def diagnose(
     loaded, tell = _open(data, progress)
     if measuring.is_table(loaded):
         return _analyse(loaded, "diagnosis", model=model, effects=only)
-    given = None if model is None else _model(model)
+    given, loaded = (None, loaded) if model is None else _beside(model, loaded, tell)
     diagnosis, _ = workflow.diagnose_set(loaded, given, [effect.name for effect in tried], seed, tell)
     return DiagnoseResult(loaded, diagnosis, advise(diagnosis), tuple(tried), only, given is None)
 
@@ -156,7 +156,8 @@ def add(
     loaded, tell = _open(data, progress)
     grasps = measuring.refuse_table(loaded, "add")
     measuring.refuse_one_grasp(grasps)
-    added = workflow.add_effect(grasps, _model(model), chosen, tell)
+    given, grasps = _beside(model, grasps, tell)
+    added = workflow.add_effect(grasps, given, chosen, tell)
     measuring.refuse_useless(added, chosen, "forcegrasp.diagnose")
     return _written(AddResult(grasps, added, chosen, path))
 
@@ -194,6 +195,19 @@ def _open(data: AnySet, progress: Progress | None) -> tuple[Loaded[MeasurementSe
 
 def _nothing(line: str) -> None:
     """Tells nobody."""
+
+
+def _beside(model: AnyModel, loaded: Loaded[MeasurementSet], tell: Progress) -> tuple[Model, Loaded[MeasurementSet]]:
+    """The model, and the set, with a warning if the model was fitted to another one."""
+    given = _model(model)
+    warned = workflow.warn_of_other_set(loaded, given, _name(model))
+    for warning in warned.warnings[len(loaded.warnings) :]:
+        tell(f"warning: {warning}")
+    return given, warned
+
+
+def _name(model: AnyModel) -> str:
+    return str(model) if isinstance(model, (str, Path)) else repr(model)
 
 
 def _model(model: AnyModel) -> Model:

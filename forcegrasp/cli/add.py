@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from forcegrasp.cli.options import compose, help_text
-from forcegrasp.cli.results import default_out, narrator, need
+from forcegrasp.cli.results import default_out, narrator, need, print_table
 
 PURPOSE = "add an effect to a model, fit it again, and see the error fall"
 NOTES = """
+  SET              the same as data=SET
   data=my_set      the grasps to fit to
   model=FILE       what forcegrasp fit or add wrote
   effect=NAME      see forcegrasp effects; forcegrasp diagnose tells which
@@ -17,14 +18,12 @@ NOTES = """
 def main(arguments: list[str]) -> int:
     """Runs the verb; returns the exit status."""
     if any(a in ("-h", "--help") for a in arguments):
-        print(help_text("add", PURPOSE, NOTES), end="")
+        print(help_text("add", PURPOSE, NOTES, "SET"), end="")
         return 0
     config = compose("add", arguments)
     data = need(config.data, "data", "my_set")
     old = need(config.model, "model", "model.yaml")
     need(config.effect, "effect", "backlash")
-
-    from rich.console import Console
 
     from forcegrasp.cli.measuring import (
         check_effects,
@@ -33,25 +32,25 @@ def main(arguments: list[str]) -> int:
         refuse_one_grasp,
         refuse_table,
         refuse_useless,
+        take_model,
         tell_warnings,
         write_results,
     )
     from forcegrasp.compare import fit_output, workflow
-    from forcegrasp.effects.model_file import read_model, write_model
+    from forcegrasp.effects.model_file import write_model
 
     (effect,) = check_effects("effect", [config.effect])
     folder = check_folder(default_out("add", ""))
     path = check_file(folder / "model.yaml" if not config.out else need(config.out, "out", "better.yaml"))
     loaded = refuse_table(workflow.load(data), "add")
     refuse_one_grasp(loaded)
-    model = read_model(old)
+    model, loaded = take_model(old, loaded)
     tell_warnings(loaded)
     added = workflow.add_effect(loaded, model, effect, narrator())
     refuse_useless(added, effect, f"forcegrasp diagnose data={data} model={old}")
     lead = fit_output.add_answer(added, effect)
-    console = Console(highlight=False)
-    console.print(fit_output.printed_fall(added, effect))
-    console.print(fit_output.printed_parameters(added.model))
+    print_table(fit_output.printed_fall(added, effect))
+    print_table(fit_output.printed_parameters(added.model))
     print("\n".join([lead, *(f"warning: {warning}" for warning in added.model.warnings)]))
     write_model(added.model, path)
     print(f"wrote {path}. Train with it: forcegrasp train model={path}")

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 
 from forcegrasp.cli.options import compose, help_text
-from forcegrasp.cli.results import default_out, narrator, need
+from forcegrasp.cli.results import default_out, narrator, need, print_table
 
 PURPOSE = "show where a model fails on measured grasps, in units and as a multiple of the sensor noise"
 NOTES = """
+  SET              the same as data=SET
   data=my_set      a folder with meta.yaml, grasps.csv and samples.csv (or samples.parquet); or, for a table of final
                    forces, with meta.yaml and table.csv
   model=FILE       what forcegrasp fit or add wrote; a model that was fitted to other grasps is tested on all of these
@@ -18,30 +20,39 @@ NOTES = """
 def main(arguments: list[str]) -> int:
     """Runs the verb; returns the exit status."""
     if any(a in ("-h", "--help") for a in arguments):
-        print(help_text("compare", PURPOSE, NOTES), end="")
+        print(help_text("compare", PURPOSE, NOTES, "SET"), end="")
         return 0
     config = compose("compare", arguments)
     data = need(config.data, "data", "my_set")
 
-    from rich.console import Console
-
-    from forcegrasp.cli.measuring import check_folder, is_table, report_table, tell_warnings, write_results
+    from forcegrasp.cli.measuring import (
+        BASE_MODEL,
+        check_folder,
+        is_table,
+        report_table,
+        take_model,
+        tell_warnings,
+        write_results,
+    )
     from forcegrasp.compare import compare_output, workflow
-    from forcegrasp.effects.model_file import read_model
+    from forcegrasp.effects.model_file import write_model
 
     out = check_folder(default_out("compare", config.out))
     loaded = workflow.load(data)
     if is_table(loaded):
         report_table(loaded, "compare", out, model=config.model)
         return 0
-    model = read_model(Path(config.model)) if config.model else None
+    model, loaded = take_model(Path(config.model), loaded) if config.model else (None, loaded)
     tell_warnings(loaded)
     comparison, used, notes = workflow.compare(loaded, model, config.seed, narrator())
     notes, name = [*notes, *used.warnings], config.model or "base model, fitted to this set"
     lead = compare_output.answer(comparison)
-    console = Console(highlight=False)
-    console.print(compare_output.printed(comparison))
+    print_table(compare_output.printed(comparison))
     print("\n".join([lead, *compare_output.details(comparison), *(f"note: {note}" for note in notes)]))
+    if model is None:
+        known = out / BASE_MODEL
+        write_model(dataclasses.replace(used, warnings=tuple(notes)), known)
+        print(f"wrote {known}. Which effect is missing? forcegrasp diagnose data={data} model={known}")
     write_results(
         out,
         "compare",

@@ -20,9 +20,8 @@ def main(arguments: list[str]) -> int:
     if any(a in ("-h", "--help") for a in arguments):
         print(help_text("curves", PURPOSE, NOTES, "FOLDER ..."), end="")
         return 0
-    plain = [a for a in arguments if "=" not in a or Path(a).is_dir()]  # Hydra names folders seed=0, too
-    config = compose("curves", [a for a in arguments if a not in plain])
-    folders = [Path(folder) for folder in [*plain, *config.folders]]
+    config = compose("curves", arguments)
+    folders = [Path(folder) for folder in config.folders]
     if not folders:
         raise ConfigError("which runs? forcegrasp curves runs/SWEEP")
 

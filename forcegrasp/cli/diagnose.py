@@ -5,10 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 from forcegrasp.cli.options import compose, help_text
-from forcegrasp.cli.results import default_out, narrator, need
+from forcegrasp.cli.results import default_out, narrator, need, print_table
 
 PURPOSE = "find out which physical effect a model lacks, and which grasp to record next"
 NOTES = """
+  SET              the same as data=SET
   data=my_set      a folder with meta.yaml, grasps.csv and samples.csv (or samples.parquet); or, for a table of final
                    forces, with meta.yaml and table.csv
   model=FILE       what forcegrasp fit or add wrote; its parameters are fitted again
@@ -16,32 +17,34 @@ NOTES = """
 
   The verdict is one of: effect (one or several, in the order found), one_of (these data can't tell which), explained
   (nothing is missing), unknown (none of the effects), not_fitted (the base model can't be fitted to these data).
-  If effects are found, model.yaml beside the report holds the model with all of them (with one_of: with the first).
+  Beside the report, base_model.yaml holds the base model that was fitted, if none is given; if effects are found,
+  model.yaml holds the model with all of them (with one_of: with the first).
 """
 
 
 def main(arguments: list[str]) -> int:
     """Runs the verb; returns the exit status."""
     if any(a in ("-h", "--help") for a in arguments):
-        print(help_text("diagnose", PURPOSE, NOTES), end="")
+        print(help_text("diagnose", PURPOSE, NOTES, "SET"), end="")
         return 0
     config = compose("diagnose", arguments)
     data = need(config.data, "data", "my_set")
 
-    from rich.console import Console
-
     from forcegrasp.cli.measuring import (
+        BASE_MODEL,
+        base_model,
         check_effects,
         check_folder,
         is_table,
         report_table,
+        take_model,
         tell_warnings,
         write_results,
     )
     from forcegrasp.compare import diagnose_output, workflow
     from forcegrasp.compare.advice import advise
     from forcegrasp.effects import catalogue
-    from forcegrasp.effects.model_file import read_model, write_model
+    from forcegrasp.effects.model_file import write_model
 
     tried = check_effects("effects", config.effects) or list(catalogue().values())
     out = check_folder(default_out("diagnose", config.out))
@@ -49,7 +52,7 @@ def main(arguments: list[str]) -> int:
     if is_table(loaded):
         report_table(loaded, "diagnosis", out, model=config.model, effects=config.effects)
         return 0
-    model = read_model(Path(config.model)) if config.model else None
+    model, loaded = take_model(Path(config.model), loaded) if config.model else (None, loaded)
     tell_warnings(loaded)
     diagnosis, _ = workflow.diagnose_set(loaded, model, [e.name for e in tried], config.seed, narrator())
     advice = advise(diagnosis)
@@ -57,10 +60,13 @@ def main(arguments: list[str]) -> int:
     if config.effects:
         lead += f" Only {', '.join(config.effects)} were tried."
     if table is not None:
-        Console(highlight=False).print(table)
+        print_table(table)
     print("\n".join([f"{diagnosis.verdict}: {lead}", *diagnose_output.lines(diagnosis, advice)]))
+    known = config.model or out / BASE_MODEL
+    if model is None:
+        write_model(base_model(diagnosis.base, diagnosis.target, loaded), out / BASE_MODEL)
+        print(f"wrote {known}: the base model, fitted to this set")
     if diagnosis.verdict in ("effect", "one_of"):
-        known = config.model or "model.yaml"
         print(f"add it: forcegrasp add data={data} model={known} effect={diagnosis.effects[0]} out=better.yaml")
         better = workflow.model_of(diagnosis.fit, diagnosis.target, loaded, diagnosis.numerical)
         write_model(better, out / "model.yaml")

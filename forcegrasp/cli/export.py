@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from forcegrasp.cli.measuring import check_folder
 from forcegrasp.cli.options import compose, help_text
 from forcegrasp.cli.results import default_out
@@ -25,19 +23,15 @@ def main(arguments: list[str]) -> int:
     if any(a in ("-h", "--help") for a in arguments):
         print(help_text("export", PURPOSE, NOTES, "RUN"), end="")
         return 0
-    plain = [a for a in arguments if "=" not in a or Path(a).is_dir()]  # Hydra names folders seed=0, too
-    config = compose("export", [a for a in arguments if a not in plain])
-    policies = [*plain, *([config.run] if config.run else [])]
-    if not policies or not policies[0].strip():
+    config = compose("export", arguments)
+    if not config.run.strip():
         raise ConfigError("which run? forcegrasp export runs/RUN")
-    if len(policies) > 1:
-        raise ConfigError(f"export: one run at a time, not {' and '.join(policies)}")
     out = check_folder(default_out("export", config.out))
 
     from forcegrasp.runs.export import CHECKS, export_policy
 
     try:
-        done = export_policy(policies[0], out, config.ceiling_n, config.gripper)
+        done = export_policy(config.run, out, config.ceiling_n, config.gripper)
     except OSError as error:
         raise ConfigError(f"out={out}: could not write ({error.strerror})") from error
     if done.difference is None:

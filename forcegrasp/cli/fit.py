@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from forcegrasp.cli.options import compose, help_text
-from forcegrasp.cli.results import default_out, narrator, need
+from forcegrasp.cli.results import default_out, narrator, need, print_table
 
 PURPOSE = "fit a gripper's base model to measured grasps and write it as a file"
 NOTES = """
+  SET              the same as data=SET
   data=my_set      a folder with meta.yaml, grasps.csv and samples.csv (or samples.parquet)
   out=model.yaml   text that may be edited: values with 95 % intervals; the report goes into runs/fit_TIME
 """
@@ -15,12 +16,10 @@ NOTES = """
 def main(arguments: list[str]) -> int:
     """Runs the verb; returns the exit status."""
     if any(a in ("-h", "--help") for a in arguments):
-        print(help_text("fit", PURPOSE, NOTES), end="")
+        print(help_text("fit", PURPOSE, NOTES, "SET"), end="")
         return 0
     config = compose("fit", arguments)
     data = need(config.data, "data", "my_set")
-
-    from rich.console import Console
 
     from forcegrasp.cli.measuring import (
         base_model,
@@ -40,8 +39,7 @@ def main(arguments: list[str]) -> int:
     target, _, base = workflow.fit_model(loaded, config.seed, narrator())
     model = base_model(base, target, loaded)
     lead = fit_output.fit_answer(base, target)
-    console = Console(highlight=False)
-    console.print(fit_output.printed_parameters(model))
+    print_table(fit_output.printed_parameters(model))
     print("\n".join([lead, *(f"warning: {warning}" for warning in model.warnings)]))
     write_model(model, path)
     print(f"wrote {path}. Which effect is missing? forcegrasp diagnose data={data} model={path}")

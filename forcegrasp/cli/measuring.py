@@ -56,6 +56,15 @@ def check_file(file: Path) -> Path:
     return file
 
 
+def take_model(path: Path, loaded: Loaded[MeasurementSet]) -> tuple[Model, Loaded[MeasurementSet]]:
+    """Reads a model, and returns it and the set, with a warning if the model was fitted to another one."""
+    from forcegrasp.compare.workflow import warn_of_other_set
+    from forcegrasp.effects.model_file import read_model
+
+    model = read_model(path)
+    return model, warn_of_other_set(loaded, model, path)
+
+
 def tell_warnings(loaded: Loaded) -> None:
     """Prints what is odd about a set."""
     for warning in loaded.warnings:

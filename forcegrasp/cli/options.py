@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 from importlib.resources import files
 from typing import Any
 
+from forcegrasp.cli.spelling import spell_out
 from forcegrasp.config import (
     AddConfig,
     CompareConfig,
@@ -85,6 +86,15 @@ def compose_sweep(overrides: list[str]) -> tuple[dict[str, str], str]:
     return swept, _folder("hydra.sweep.dir", hydra["sweep"]["dir"])
 
 
+def spell_sweep(verb: str, overrides: list[str]) -> list[str]:
+    """Returns a sweep's overrides as Hydra wants them: each value of a list in brackets."""
+    return spell_out(verb, overrides, _defaults(verb), parse_override, sweep=True)
+
+
+def _defaults(verb: str) -> dict[str, Any]:
+    return {name: value for name, _, value in leaves(SCHEMAS[verb])}
+
+
 def _compose(verb: str, overrides: list[str], own: Sequence[str] = ()) -> tuple[Any, dict[str, Any]]:
     """Returns the verb's configuration, checked, and Hydra's own: run, sweep and sweeper."""
     from hydra import compose as hydra_compose
@@ -96,7 +106,8 @@ def _compose(verb: str, overrides: list[str], own: Sequence[str] = ()) -> tuple[
     from omegaconf.errors import OmegaConfBaseException
 
     register_schemas()
-    choices, known = groups(verb), [name for name, _, _ in leaves(SCHEMAS[verb])]
+    overrides = spell_out(verb, overrides, _defaults(verb), parse_override)
+    choices, known = groups(verb), list(_defaults(verb))
     if verb == "train":
         choices, known = choices | {"hydra/launcher": LAUNCHERS}, [*known, *HYDRA_OPTIONS]
     for override in overrides:

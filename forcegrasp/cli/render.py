@@ -10,7 +10,7 @@ from forcegrasp.errors import ConfigError
 
 PURPOSE = "play one grasp and show it as a video: the scene, the forces, the object's displacement"
 NOTES = """
-  policy=NAME        the same as policies=[NAME]: a run directory, a shipped policy or a controller
+  policy=NAME        a run directory, a shipped policy or a controller
   'policies=[A,B]'   several, on the same grasp, one below the other
 
 What is not given of the grasp is drawn from the seed.
@@ -22,12 +22,7 @@ def main(arguments: list[str]) -> int:
     if any(a in ("-h", "--help") for a in arguments):
         print(help_text("render", PURPOSE, NOTES, everything="--all" in arguments), end="")
         return 0
-    alone = [a.partition("=")[2] for a in arguments if a.startswith("policy=")]
-    rest = [a for a in arguments if not a.startswith("policy=")]
-    if len(alone) > 1 or (alone and any(a.startswith("policies=") for a in rest)):
-        raise ConfigError("several policies are given as 'policies=[A,B]'")
-    config = compose("render", rest)
-    config.policies = alone or config.policies
+    config = compose("render", arguments)
     out = Path(config.out or f"runs/render_{time.strftime('%Y-%m-%d_%H-%M-%S')}.gif")
     if out.suffix.lower() != ".gif":
         raise ConfigError(f"out={out}: videos are written as GIF; name a file that ends with .gif")

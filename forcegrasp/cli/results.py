@@ -7,9 +7,15 @@ import math
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from forcegrasp.errors import ConfigError
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+# Wider than any table.
+_WIDEST = 10_000
 
 
 def default_out(verb: str, out: str) -> Path:
@@ -36,6 +42,26 @@ def narrator() -> Callable[[str], None]:
         print(f"  [{time.monotonic() - start:4.0f} s] {text}", flush=True)
 
     return tell
+
+
+def print_table(table: Table) -> None:
+    """Prints a table in which no name is cut off: cells wrap between words; lines that are still too wide run on."""
+    from rich.cells import cell_len
+    from rich.console import Console
+    from rich.measure import Measurement
+
+    console = Console(highlight=False)
+    texts = [[str(column.header), *map(str, column.cells)] for column in table.columns]
+    widths = [max(map(cell_len, column)) for column in texts]
+    least = [max(map(cell_len, " ".join(column).split()), default=0) for column in texts]
+    frame = Measurement.get(console, console.options.update(width=_WIDEST), table).maximum - sum(widths)
+    while sum(widths) + frame > console.width and widths != least:
+        widest = max(range(len(widths)), key=lambda k: widths[k] if widths[k] > least[k] else 0)
+        widths[widest] -= 1
+    for column, width in zip(table.columns, widths, strict=True):
+        column.width = width
+    console.width = max(console.width, sum(widths) + frame)
+    console.print(table)
 
 
 def write_json(path: Path, content: dict[str, Any]) -> None:

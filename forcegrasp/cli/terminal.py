@@ -14,6 +14,8 @@ SIGNS = {
 }
 #: Categories of Unicode that no line can hold: control characters, line and paragraph ends, bytes that are no text.
 _NEVER_SHOWN = {"Cc", "Zl", "Zp", "Cs"}
+#: Kinds of signs that turn the direction of all that follows in a line.
+_TURNING = {"LRE", "RLE", "LRO", "RLO", "PDF", "LRI", "RLI", "FSI", "PDI"}
 _HANDLER = "forcegrasp.in_ascii"
 
 
@@ -47,4 +49,8 @@ def in_ascii(character: str) -> str:
 
 def in_a_line(text: str) -> str:
     """A message without line breaks, and without what else would steer a terminal; names of files may hold both."""
-    return "".join(ascii(c)[1:-1] if unicodedata.category(c) in _NEVER_SHOWN else c for c in text)
+
+    def shown(c: str) -> bool:
+        return unicodedata.category(c) not in _NEVER_SHOWN and unicodedata.bidirectional(c) not in _TURNING
+
+    return "".join(c if shown(c) else ascii(c)[1:-1] for c in text)

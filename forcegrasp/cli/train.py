@@ -10,7 +10,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
-from forcegrasp.cli.options import compose, compose_run, compose_sweep, help_text, parse_override
+from forcegrasp.cli.options import compose, compose_run, compose_sweep, help_text, parse_override, spell_sweep
 from forcegrasp.errors import ConfigError, ForcegraspError
 
 if TYPE_CHECKING:
@@ -111,6 +111,7 @@ def _join(config) -> None:
 def _sweep(overrides: list[str]) -> int:
     if preset := next((o for o in overrides if o.startswith("sweep=") and "," in o), ""):
         raise ConfigError(f"{preset}: one preset at a time")
+    overrides = spell_sweep("train", overrides)
     launcher = next((o for o in overrides if o.startswith("hydra/launcher=submitit_")), "")
     if launcher and not find_spec("hydra_plugins.hydra_submitit_launcher"):
         raise ConfigError(f"{launcher} needs an extra: pip install 'forcegrasp[cluster]'")

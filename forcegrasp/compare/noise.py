@@ -126,12 +126,12 @@ def _is_white(scores: np.ndarray, beyond: float, partitions: Sequence[np.ndarray
     """
     count = int(np.isfinite(scores).sum())
     lags = [np.nansum(scores[:, k:] * scores[:, :-k]) / count for k in range(1, _LAGS + 1)]
-    if _at_most(np.mean(np.square(lags)), 1 / count, _LAGS) > _IN_TIME * beyond:
+    if _at_most(float(np.mean(np.square(lags))), 1 / count, _LAGS) > _IN_TIME * beyond:
         return False
     for partition in partitions:
         groups = _grouped(scores, partition)
         differing = sum(len(values) * (np.mean(values**2) - 1) ** 2 for values in groups) / count
-        if _at_most(differing, 2 * len(groups) / count, len(groups)) > _BETWEEN_GROUPS * beyond:
+        if _at_most(float(differing), 2 * len(groups) / count, len(groups)) > _BETWEEN_GROUPS * beyond:
             return False
     return True
 

@@ -89,10 +89,8 @@ def estimate_noise(grasps: tuple[MeasuredGrasp, ...]) -> np.ndarray:
     """
     differences: list[np.ndarray] = []
     for grasp in grasps:
-        signals = np.concatenate([grasp.position_m, grasp.force_n], axis=1)
-        still = _held_for(grasp) >= _HELD_S
-        third = np.diff(signals, n=3, axis=0)
-        differences.append(third[still[3:] & still[:-3]] if (still[3:] & still[:-3]).sum() > 5 else third)
+        third, held = third_differences(grasp, np.concatenate([grasp.position_m, grasp.force_n], axis=1))
+        differences.append(third[held] if held.sum() > 5 else third)
     third = np.concatenate(differences)
     sigma = []
     for pair, kind in ((slice(0, 2), "positions"), (slice(2, 4), "forces")):
@@ -105,6 +103,17 @@ def estimate_noise(grasps: tuple[MeasuredGrasp, ...]) -> np.ndarray:
             )
         sigma += [estimate, estimate]
     return np.array(sigma)
+
+
+def third_differences(grasp: MeasuredGrasp, signals: np.ndarray, stride: int = 1) -> tuple[np.ndarray, np.ndarray]:
+    """Third differences ``(n, k)`` of signals ``(T, k)``, and in which of them the command is held, ``(n,)``.
+
+    A difference is taken over samples that are ``stride`` apart.
+    """
+    for _ in range(3):
+        signals = signals[stride:] - signals[:-stride]
+    time, reach = grasp.time_s, 3 * stride
+    return signals, _held_for(grasp)[reach:] >= _HELD_S + time[reach:] - time[:-reach]
 
 
 def find_phases(grasp: MeasuredGrasp, force_std_n: np.ndarray) -> np.ndarray:

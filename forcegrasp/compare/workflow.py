@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +15,7 @@ from forcegrasp.compare.comparison import Comparison
 from forcegrasp.compare.diagnose import Diagnosis, diagnose
 from forcegrasp.compare.fit import Fit, Simulators, fit_exactly, fit_once
 from forcegrasp.compare.floor import beyond_fit, numerical_error, numerical_floor
+from forcegrasp.compare.given_noise import check_given_noise
 from forcegrasp.compare.heldout import heldout_residual, make_folds, rms
 from forcegrasp.compare.intervals import intervals, standard_errors, warnings
 from forcegrasp.compare.problem import Problem
@@ -61,7 +63,7 @@ def load(path: str | Path) -> Loaded[MeasurementSet] | Loaded[FinalForceTable]:
     gripper = load_gripper(measured.gripper, measured.path)
     if isinstance(measured, FinalForceTable):
         return Loaded(measured, gripper, check_table(measured, gripper.stroke))
-    return Loaded(measured, gripper, check_set(measured, gripper.stroke))
+    return Loaded(measured, gripper, check_set(measured, gripper.stroke) + check_given_noise(measured))
 
 
 def fit_model(loaded: Loaded[MeasurementSet], seed: int, progress: Progress) -> tuple[Target, Simulators, BaseFit]:
@@ -70,6 +72,16 @@ def fit_model(loaded: Loaded[MeasurementSet], seed: int, progress: Progress) -> 
     problem = Problem(loaded.gripper, target.grasps)
     simulators = Simulators(problem)
     return target, simulators, fit_base(target, problem, simulators, np.random.default_rng(seed), progress)
+
+
+def warn_of_other_set(loaded: Loaded[MeasurementSet], model: Model, name: object) -> Loaded[MeasurementSet]:
+    """The set, with a warning if a model says that it was fitted to another one; ``name`` is the model's file."""
+    own = loaded.measured.fingerprint
+    if model.data.get("fingerprint", own) == own:
+        return loaded
+    other = model.data.get("set", "a set without a name")
+    warning = f"model={name}: was fitted to other measurements ({other}) than {loaded.measured.path}"
+    return dataclasses.replace(loaded, warnings=[*loaded.warnings, warning])
 
 
 def apply_model(

@@ -89,9 +89,9 @@ class RecordConfig:
 class CompareConfig:
     """`forcegrasp compare`."""
 
-    data: str = option("", "folder of the measurement set")
+    data: str = option("", "folder of the measurement set; also given plainly, without data=")
     model: str = option("", "model file; the gripper's base model, fitted to the set, if empty")
-    out: str = option("", "where to write report.html and compare.json; runs/compare_TIME if empty")
+    out: str = option("", "where to write report.html, compare.json and base_model.yaml; runs/compare_TIME if empty")
     seed: int = option(0, "seed of the fit's starts", low=0, high=2**31 - 1)
 
 
@@ -99,7 +99,7 @@ class CompareConfig:
 class FitConfig:
     """`forcegrasp fit`."""
 
-    data: str = option("", "folder of the measurement set")
+    data: str = option("", "folder of the measurement set; also given plainly, without data=")
     out: str = option("", "model file to write; runs/fit_TIME/model.yaml if empty")
     seed: int = option(0, "seed of the fit's starts", low=0, high=2**31 - 1)
 
@@ -108,9 +108,9 @@ class FitConfig:
 class DiagnoseConfig:
     """`forcegrasp diagnose`."""
 
-    data: str = option("", "folder of the measurement set")
+    data: str = option("", "folder of the measurement set; also given plainly, without data=")
     model: str = option("", "model file to start from; the base model is fitted to the set if empty")
-    out: str = option("", "where to write report.html and diagnosis.json; runs/diagnose_TIME if empty")
+    out: str = option("", "where to write report.html, diagnosis.json and models; runs/diagnose_TIME if empty")
     effects: list[str] = option([], "effects to consider; all of the catalogue if empty")
     seed: int = option(0, "seed of the fit's starts and of the null distribution", low=0, high=2**31 - 1)
 
@@ -119,7 +119,7 @@ class DiagnoseConfig:
 class AddConfig:
     """`forcegrasp add`."""
 
-    data: str = option("", "folder of the measurement set")
+    data: str = option("", "folder of the measurement set; also given plainly, without data=")
     model: str = option("", "model file to add to")
     effect: str = option("", "effect to add, see forcegrasp effects")
     out: str = option("", "model file to write; runs/add_TIME/model.yaml if empty")

@@ -2,33 +2,59 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from pathlib import Path
+
 import numpy as np
 
 from forcegrasp.errors import MeasurementError
 from forcegrasp.measure.folder import show
 from forcegrasp.measure.samples import place
-from forcegrasp.measure.schema import COMMAND, OBJECT, POSITION, MeasuredGrasp, MeasurementSet
+from forcegrasp.measure.schema import COMMAND, FORCE, OBJECT, POSITION, MeasuredGrasp, MeasurementSet
 
 #: Beyond this many times the gripper's range, a length is in another unit.
 _OTHER_UNIT = 10
 #: Beyond this many times the range, a finger is where the gripper can't be.
 _OUT_OF_REACH = 1.5
+#: Beyond this, a force is none of a gripper's.
+_LARGEST_N = 1e5
 _CLOCKS = ((1e6, "nanoseconds", "1e9"), (1e3, "microseconds", "1e6"), (1, "milliseconds", "1000"))
 
 
 def check_units(measured: MeasurementSet, open_m: float, closed_m: float) -> list[str]:
     """Raises MeasurementError about lengths or times in another unit; returns warnings about odd ones."""
     reach = abs(open_m - closed_m)
-    _check_noise(measured, reach)
+    _check_position_noise(measured, reach)
     warnings = []
     for grasp in measured.grasps:
         _check_lengths(measured, grasp, open_m, closed_m)
         _check_clock(measured, grasp)
+        for name, force in zip(FORCE, grasp.force_n.T, strict=True):
+            check_forces(force, lambda index, grasp=grasp, name=name: place(measured.path, grasp, index, name))
         warnings += _warnings(measured, grasp, reach)
+    check_force_noise(measured.path, measured.force_std_n, np.concatenate([g.force_n.ravel() for g in measured.grasps]))
     return warnings
 
 
-def _check_noise(measured: MeasurementSet, reach: float) -> None:
+def check_forces(force: np.ndarray, where: Callable[[int], str]) -> None:
+    """Raises MeasurementError about the first force ``(n,)`` that no gripper has; ``where`` places it by its index."""
+    absurd = np.abs(force) > _LARGEST_N
+    if absurd.any():
+        index = int(absurd.argmax())
+        raise MeasurementError(f"{where(index)}: {force[index]:g} is no force of a gripper; give newtons")
+
+
+def check_force_noise(path: Path, std: float | None, force: np.ndarray) -> None:
+    """Raises MeasurementError if the noise that is given is larger than all that the forces ``(n,)`` do."""
+    spread = float(np.ptp(force))
+    if spread and (std or 0) > spread:
+        raise MeasurementError(
+            f"{show(path / 'meta.yaml')}: force_std_n: {std:g} is more than the {spread:.3g} N from the smallest to the"
+            " largest force: looks like millinewtons, divide by 1000"
+        )
+
+
+def _check_position_noise(measured: MeasurementSet, reach: float) -> None:
     if (measured.position_std_m or 0) > 0.1 * reach:
         raise MeasurementError(
             f"{show(measured.path / 'meta.yaml')}: position_std_m: {measured.position_std_m:g} is more than a tenth of"

@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from forcegrasp.errors import MeasurementError
+from forcegrasp.measure.check_copies import check_copies
 from forcegrasp.measure.check_liveness import check_liveness
 from forcegrasp.measure.check_signs import check_signs
-from forcegrasp.measure.check_units import check_units
+from forcegrasp.measure.check_units import check_force_noise, check_forces, check_units
 from forcegrasp.measure.folder import show
 from forcegrasp.measure.samples import MIN_SAMPLES, check_samples, place
-from forcegrasp.measure.schema import FinalForceTable, MeasuredGrasp, MeasurementSet
+from forcegrasp.measure.schema import FinalForceTable, MeasurementSet
 
 #: A pause this many times the median sample interval is worth a warning.
 _GAP = 5
@@ -47,7 +48,7 @@ def check_set(measured: MeasurementSet, open_m: float, closed_m: float = 0.0) ->
     check_signs(measured, open_m, closed_m)
     if len(measured.grasps) == 1:
         warnings.append(f"{show(measured.path)}: one grasp only; nothing can be held out to test a finding on")
-    return warnings + _gaps(measured) + _copies(measured)
+    return [*measured.notes, *warnings, *_gaps(measured), *check_copies(measured)]
 
 
 def check_table(table: FinalForceTable, open_m: float) -> list[str]:
@@ -61,6 +62,8 @@ def check_table(table: FinalForceTable, open_m: float) -> list[str]:
             f"{show(path)}: row {index + 2}, column delta_q_m: {delta[index]:g} where the gripper opens {open_m:g} m:"
             " looks like millimetres, divide by 1000"
         )
+    check_forces(force, lambda index: f"{show(path)}: row {index + 2}, column final_force_n")
+    check_force_noise(table.path, table.force_std_n, force)
     if not force.any():
         raise MeasurementError(f"{show(path)}: column final_force_n: all forces are zero; is the sensor connected?")
     if len(delta) > 2 and np.ptp(delta) > 0 and np.ptp(force) > 0 and np.corrcoef(delta, force)[0, 1] < -0.8:
@@ -68,7 +71,8 @@ def check_table(table: FinalForceTable, open_m: float) -> list[str]:
             f"{show(path)}: column final_force_n: falls as delta_q_m grows; larger deltas must press harder, with f ≥ 0"
         )
     counts = {name: table.objects.count(name) for name in dict.fromkeys(table.objects)}
-    return [f"{show(path)}: object {show(name)} has {n} rows only" for name, n in counts.items() if n < 3]
+    few = [f"{show(path)}: object {show(name)} has {n} rows only" for name, n in counts.items() if n < 3]
+    return [*table.notes, *few]
 
 
 def _gaps(measured: MeasurementSet) -> list[str]:
@@ -81,15 +85,4 @@ def _gaps(measured: MeasurementSet) -> list[str]:
                 f"{place(measured.path, grasp, longest + 1, 't_s')}: a gap of {steps[longest]:.3g} s where samples are"
                 f" {np.median(steps):.3g} s apart; it stays a gap"
             )
-    return warnings
-
-
-def _copies(measured: MeasurementSet) -> list[str]:
-    """Grasps that agree to the last bit: right for a noiseless simulation, a slip anywhere else."""
-    seen: dict[bytes, MeasuredGrasp] = {}
-    warnings = []
-    for grasp in measured.grasps:
-        first = seen.setdefault(np.hstack([grasp.position_m, grasp.force_n]).tobytes(), grasp)
-        if first is not grasp:
-            warnings.append(f"{place(measured.path, grasp)}: the same readings as grasp {show(first.name)}; copied?")
     return warnings

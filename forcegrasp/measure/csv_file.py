@@ -27,11 +27,11 @@ def read_csv(path: Path, columns: Columns) -> Table:
     """
     try:
         rows = _count_rows(path) - 1
-        header = _header(path, columns)
-        schema = {name: pl.String if name in columns.text else pl.Float64 for name in header}
+        header, skipped = _header(path, columns)
+        schema = {name: pl.Float64 if name in columns.numbers else pl.String for name in header}
         frame, problem = None, ""
         try:
-            frame = pl.read_csv(path, schema=schema).head(rows)
+            frame = pl.read_csv(path, schema=schema).head(rows).drop(skipped)
             problem = "rows and line ends don't match" if frame.height != rows else ""
         except pl.exceptions.PolarsError as error:
             problem = str(error).split("\n")[0]
@@ -41,7 +41,7 @@ def read_csv(path: Path, columns: Columns) -> Table:
             raise MeasurementError(f"{show(path)}: not CSV that can be read: {show(problem, 100)}")
     except OSError as error:
         raise MeasurementError(f"{show(path)}: not readable ({error.strerror})") from error
-    table = Table(path, frame, first_row=2)
+    table = Table(path, frame, first_row=2, skipped=tuple(skipped))
     table.check_cells(columns)
     return table
 
@@ -84,14 +84,14 @@ def _count_rows(path: Path) -> int:
     return lines
 
 
-def _header(path: Path, columns: Columns) -> list[str]:
+def _header(path: Path, columns: Columns) -> tuple[list[str], list[str]]:
+    """Returns the columns, and those of them that are to be skipped."""
     with open(path, encoding="utf-8-sig", newline="\n") as file:
         line = file.readline().removesuffix("\n").removesuffix("\r")
     if "\r" in line:
         raise MeasurementError(f"{show(path)}: row 1: lines end with CR alone; save the file with LF or CRLF")
     header = _cells(path, 1, line)
-    columns.check_header(path, header, " row 1:")
-    return header
+    return header, columns.check_header(path, header, " row 1:")
 
 
 def _cells(path: Path, row: int, line: str) -> list[str]:

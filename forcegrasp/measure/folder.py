@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import difflib
+import shlex
 import stat
 from pathlib import Path
 
 from forcegrasp.errors import MeasurementError
+from forcegrasp.measure.schema import FORMAT
 
 MAX_BYTES = 2_000_000_000
 MAX_ROWS = 20_000_000
@@ -38,6 +40,15 @@ def open_folder(path: str | Path) -> Path:
     return folder
 
 
+def _starter(path: Path) -> str:
+    """The command that writes a meta.yaml to begin with; "" for any other file."""
+    if path.name != "meta.yaml":
+        return ""
+    kind = "final_force" if (path.parent / "table.csv").exists() else "grasps"
+    text = f"format: {FORMAT}\\nkind: {kind}\\ngripper: tiago\\n"
+    return f"; write it, with your gripper: printf '{text}' > {shlex.quote(show(path))}"
+
+
 def find_file(folder: Path, name: str) -> Path:
     """Returns the path of one file of the set.
 
@@ -48,7 +59,7 @@ def find_file(folder: Path, name: str) -> Path:
     try:
         if not path.is_symlink() and not path.exists():
             near = difflib.get_close_matches(name, [entry.name for entry in folder.iterdir()], n=1, cutoff=0.6)
-            hint = f"; rename {show(near[0])} to {name}, unpacked if it is packed" if near else ""
+            hint = f"; rename {show(near[0])} to {name}, unpacked if it is packed" if near else _starter(path)
             raise MeasurementError(f"{show(path)}: missing{hint}")
         if not path.resolve(strict=True).is_relative_to(folder.resolve()):
             raise MeasurementError(f"{show(path)}: links to a file outside the folder; copy that file here")

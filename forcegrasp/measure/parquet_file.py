@@ -31,10 +31,11 @@ def read_parquet(path: Path, columns: Columns) -> Table:
     try:
         with _without_stderr():
             schema = pl.read_parquet_schema(path)
-        columns.check_header(path, list(schema))
+        skipped = columns.check_header(path, list(schema))
+        schema = {name: kind for name, kind in schema.items() if name not in skipped}
         _check_types(path, schema, columns)
         with _without_stderr():
-            frame = pl.read_parquet(path, use_statistics=False)
+            frame = pl.read_parquet(path, columns=list(schema), use_statistics=False)
     except MeasurementError:
         raise
     except (pl.exceptions.PolarsError, pl.exceptions.PanicException, OSError, ValueError) as error:
@@ -43,7 +44,7 @@ def read_parquet(path: Path, columns: Columns) -> Table:
     if frame.height != footer.rows:
         raise MeasurementError(f"{show(path)}: {frame.height} rows where its footer says {footer.rows}; write it again")
     cast = [pl.col(name).cast(pl.String if name in columns.text else pl.Float64) for name in frame.columns]
-    table = Table(path, frame.select(cast), first_row=1)
+    table = Table(path, frame.select(cast), first_row=1, skipped=tuple(skipped))
     table.check_cells(columns)
     return table
 

@@ -76,11 +76,12 @@ def _read_table(folder: Path, meta: Reader, facts: dict[str, Any]) -> FinalForce
     if meta.get("position_std_m") is not None:
         raise meta.refuse("position_std_m", "a table of final forces has no positions; remove it")
     _refuse_files(folder, "final_force", ("grasps.csv", "samples.csv", "samples.parquet"))
-    frame = read_csv(find_file(folder, "table.csv"), _FINAL).frame
-    objects = tuple(frame["object"].to_list())
-    delta, force = (np.array(frame[name].to_numpy()) for name in _FINAL.numbers)
+    rows = read_csv(find_file(folder, "table.csv"), _FINAL)
+    objects = tuple(rows.frame["object"].to_list())
+    delta, force = (np.array(rows.frame[name].to_numpy()) for name in _FINAL.numbers)
     fingerprint = fingerprint_of_table(facts["gripper"], facts["force_std_n"], objects, delta, force)
-    return FinalForceTable(**facts, objects=objects, delta_q_m=delta, final_force_n=force, fingerprint=fingerprint)
+    readings = {"objects": objects, "delta_q_m": delta, "final_force_n": force}
+    return FinalForceTable(**facts, **readings, fingerprint=fingerprint, notes=rows.notes())
 
 
 def _read_grasps(folder: Path, meta: Reader, facts: dict[str, Any]) -> MeasurementSet:
@@ -101,6 +102,7 @@ def _read_grasps(folder: Path, meta: Reader, facts: dict[str, Any]) -> Measureme
         position_std_m=position_std,
         grasps=grasps,
         fingerprint=fingerprint_of_set(facts["gripper"], position_std, facts["force_std_n"], grasps),
+        notes=table.notes() + samples.notes(),
     )
 
 

@@ -99,11 +99,10 @@ def record(
     force = with_noise(readings.force, force_std_n, rng.standard_normal(readings.force.shape), steps[1])
     full = tuple(dataclasses.replace(g, position_m=position[i], force_n=force[i]) for i, g in enumerate(bare))
     name = gripper.path.stem if gripper.is_shipped else str(gripper.path.resolve())
-    fingerprint = fingerprint_of_set(name, position_std_m, force_std_n, full)
+    noise = (position_std_m or None, force_std_n or None)  # a set without noise does not give any
+    fingerprint = fingerprint_of_set(name, *noise, full)
     source = f"simulated by forcegrasp record, plan {plan}, seed {seed}"
-    measured = MeasurementSet(
-        Path(), "recorded", name, source, "none: simulated", position_std_m, force_std_n, full, fingerprint
-    )
+    measured = MeasurementSet(Path(), "recorded", name, source, "none: simulated", *noise, full, fingerprint)
     return Recorded(measured, base)
 
 

@@ -63,6 +63,7 @@ class MeasurementSet(ShortRepr):
     force_std_n: float | None  #: noise of the forces, if known
     grasps: tuple[MeasuredGrasp, ...]
     fingerprint: str  #: sha256 of all that a result can depend on; see ``fingerprint_of_set``
+    notes: tuple[str, ...] = field(default=(), compare=False)  #: what was odd when it was read, one line each
 
     def summary(self) -> str:
         objects = counted(len({grasp.object for grasp in self.grasps}), "object")
@@ -83,6 +84,7 @@ class FinalForceTable(ShortRepr):
     delta_q_m: np.ndarray  #: ``(n,)``
     final_force_n: np.ndarray  #: ``(n,)``
     fingerprint: str  #: sha256 of all that a result can depend on
+    notes: tuple[str, ...] = field(default=(), compare=False)  #: what was odd when it was read, one line each
 
     def summary(self) -> str:
         objects = counted(len(set(self.objects)), "object")

@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 
-from forcegrasp.errors import MeasurementError, closest
+from forcegrasp.errors import MeasurementError
 from forcegrasp.measure.folder import MAX_NAME, show
+from forcegrasp.measure.names import misfits
 
 
 @dataclass(frozen=True)
@@ -22,20 +23,20 @@ class Columns:
     optional: tuple[str, ...] = ()  #: need not be there
     blank: tuple[str, ...] = ()  #: may have empty cells
 
-    def check_header(self, path: Path, names: Sequence[str], row: str = "") -> None:
-        """Raises MeasurementError unless these are columns of such a file, each once, and none is missing."""
+    def check_header(self, path: Path, names: Sequence[str], row: str = "") -> list[str]:
+        """Returns the columns to skip: unknown ones that are no misspelling of one that could be there.
+
+        Raises:
+          MeasurementError: about all columns that are missing, misspelt, without a name or there twice.
+        """
         known = self.text + self.numbers
         if len(names) == 1 and any(mark in names[0] for mark in ";\t|"):
             raise MeasurementError(f"{show(path)}:{row} columns must be separated by commas; save it as plain CSV")
-        for name in names:
-            if name not in known:
-                hint = closest(name, known) if name else "; every column needs a name"
-                raise MeasurementError(f"{show(path)}:{row} unknown column {show(name)}{hint}")
-            if list(names).count(name) > 1:
-                raise MeasurementError(f"{show(path)}:{row} column {name} is there twice; remove one")
-        for name in known:
-            if name not in names and name not in self.optional:
-                raise MeasurementError(f"{show(path)}:{row} column {name} is missing; add it")
+        required = [name for name in known if name not in self.optional]
+        problem = misfits("column", names, required, self.optional, more=True)
+        if problem:
+            raise MeasurementError(f"{show(path)}:{row} {problem}")
+        return [name for name in names if name not in known]
 
 
 @dataclass(frozen=True)
@@ -45,6 +46,12 @@ class Table:
     path: Path
     frame: pl.DataFrame
     first_row: int  #: what an editor (CSV) or a viewer (Parquet) shows as the number of the first row of data
+    skipped: tuple[str, ...] = ()  #: unknown columns of the file, which are not in the frame
+
+    def notes(self) -> tuple[str, ...]:
+        """What the user should know about columns that were skipped, in a line."""
+        names = ", ".join(show(name) for name in self.skipped)
+        return (f"{show(self.path)}: unknown columns are skipped: {names}",) if names else ()
 
     def refuse(self, index: int, column: str, problem: str) -> MeasurementError:
         """The error to raise about one cell; ``index`` counts rows from 0."""

@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from forcegrasp import plain_yaml
-from forcegrasp.errors import MeasurementError, closest
+from forcegrasp.errors import MeasurementError
 from forcegrasp.measure.folder import show
+from forcegrasp.measure.names import misfits
 
 _MAX_BYTES = 100_000
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?", re.ASCII)
@@ -42,12 +43,9 @@ class Reader:
         self._content, self._place = content, place
         if not isinstance(content, dict):
             raise MeasurementError(f"{place}: must hold {', '.join(required)}, each as `key: value`")
-        for key in content:
-            if key not in required + optional:
-                raise MeasurementError(f"{place}: unknown key {show(key)}{closest(key, required + optional)}")
-        for key in required:
-            if key not in content:
-                raise MeasurementError(f"{place}: {key} is missing; add it")
+        problem = misfits("key", list(content), required, optional)
+        if problem:
+            raise MeasurementError(f"{place}: {problem}")
 
     def refuse(self, key: str, problem: str) -> MeasurementError:
         """The error to raise about one key."""

@@ -119,6 +119,17 @@ def test_a_model_may_be_a_file_a_model_or_a_result(work, model):
         fg.compare(data, 3)
 
 
+@pytest.mark.parametrize("verb", ["compare", "diagnose", "add"])
+def test_a_model_of_another_set_is_told(verb, work, model, capsys):
+    text = model.read_text("utf-8")
+    fingerprint = read_model(model).data["fingerprint"]
+    model.write_text(text.replace(fingerprint, "f" * len(fingerprint)), "utf-8")
+    more = ("force_bias",) if verb == "add" else ()
+    result = getattr(fg, verb)("my_set", model, *more, progress=print)
+    assert "was fitted to other measurements" in capsys.readouterr().out
+    assert "was fitted to other measurements" in result.data.warnings[-1]
+
+
 @pytest.mark.parametrize("kind", [str, Path])
 def test_models_are_written_where_it_is_said(kind, work, model):
     made = {name: kind(f"new/{name}.yaml") for name in ("fit", "add")}

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from forcegrasp.calibration import close, closing_speed, fit_power_grasp, power_grasps
+from forcegrasp.calibration.power_grasp_fit import _least_squares
 from forcegrasp.calibration.stiffness import kappa_values
 from forcegrasp.errors import ConfigError, ForcegraspError, MeasurementError
 from forcegrasp.physics import GraspParameters, GraspSimulator
@@ -26,6 +27,11 @@ def test_closing_is_that_of_the_simulator():
         np.testing.assert_array_equal(closing.position_m[:, sample], simulator.joint_position)
         np.testing.assert_array_equal(closing.force_n[:, sample], simulator.force)
     assert (simulator.force[1] > 0.1).all()
+
+
+def test_samples_are_four_milliseconds_apart_from_the_first_command_on():
+    closing = close(0.003, 0.4, touching=False)
+    np.testing.assert_allclose(closing.time_s, np.arange(101) * 0.004, atol=1e-12)
 
 
 def test_closing_speeds_at_full_action():
@@ -85,6 +91,13 @@ def test_the_clock_may_count_from_anywhere():
     assert there.value == pytest.approx(here.value, abs=0.001)
     assert there.start_s - 1.7e9 == pytest.approx(here.start_s, abs=1e-4)
     np.testing.assert_array_equal(there.time_s, time[: len(there.time_s)] + 1.7e9)
+
+
+def test_interval_of_a_mean_is_students():
+    values = np.tile([1.0, -1.0], 5)  # neighbours are unlike, so that each counts in full
+    vector, half = _least_squares(lambda x: x[0] - values, [-3.0], [3.0], [])
+    assert vector[0] == pytest.approx(0.0, abs=1e-6)
+    assert half == pytest.approx(2.2622 * np.sqrt(10 / 9 / 10), rel=1e-3)  # t of nine degrees of freedom
 
 
 def test_residuals_in_runs_widen_the_interval():

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+
 import numpy as np
 import pytest
 from scipy.stats import linregress
@@ -80,6 +82,19 @@ def test_objects_of_any_radius_and_place():
     values = {"radius_m": [0.018, 0.03], "offset_m": [0.004, -0.01], "force_scale": 1.0}
     stairs = staircase(values=values, deltas_m=[0.001, 0.002, 0.003], tier="fast")
     np.testing.assert_allclose(stairs.force_n, [[0.1, 0.2, 0.3]] * 2, rtol=0.01)
+
+
+def test_fingers_start_a_millimetre_from_an_object_off_the_middle(monkeypatch):
+    started = {}
+
+    def note_the_start(*_, start_m, **__):
+        started["m"] = start_m
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(sys.modules["forcegrasp.calibration.staircase"], "close", note_the_start)
+    with pytest.raises(KeyboardInterrupt):
+        staircase(values={"radius_m": 0.02, "offset_m": [0.0, 0.004, -0.01]}, deltas_m=[0.001])
+    np.testing.assert_allclose(started["m"], [0.021, 0.025, 0.031])
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ from forcegrasp.cli.main import VERBS, main
 from forcegrasp.cli.options import SCHEMAS, groups, leaves
 from forcegrasp.controllers import CONTROLLERS as KNOWN_CONTROLLERS
 from forcegrasp.effects import catalogue
-from forcegrasp.physics.gripper import load_gripper
+from forcegrasp.physics.gripper_file import load_gripper
 from forcegrasp.policies import shipped_policies
 
 #: What is typed, and what may then follow: the whole last word each, as far as its shell replaces it.

@@ -6,14 +6,18 @@ import contextlib
 import csv
 import io
 import json
+import shlex
 import shutil
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 import yaml
+from rich import box
+from rich.table import Table
 
 from forcegrasp.cli.main import main
+from forcegrasp.cli.results import print_table
 
 # the loop takes half a minute: one worker should run it, once
 pytestmark = pytest.mark.xdist_group("measuring verbs")
@@ -49,8 +53,9 @@ def loop(tmp_path_factory) -> SimpleNamespace:
     printed["record"] = run(folder, "record", "out=my_set", "grasps=6", "objects=1", "effects=[force_bias]")
     shorten(folder / "my_set", 3.6)
     printed["fit"] = run(folder, "fit", "data=my_set", "out=model.yaml")
-    printed["diagnose"] = run(folder, "diagnose", "data=my_set", "model=model.yaml", FEW, "out=diagnosis")
-    printed["add"] = run(folder, "add", "data=my_set", "model=model.yaml", "effect=force_bias", "out=new/better.yaml")
+    printed["diagnose"] = run(folder, "diagnose", "data=my_set", FEW, "out=diagnosis")
+    suggested = shlex.split(printed["diagnose"].split("add it: forcegrasp ")[1].splitlines()[0])
+    printed["add"] = run(folder, *(a for a in suggested if not a.startswith("out=")), "out=new/better.yaml")
     printed["compare"] = run(folder, "compare", "data=my_set", "model=new/better.yaml", "out=comparison")
     results = {
         verb: json.loads(next(folder.glob(pattern)).read_text())
@@ -98,6 +103,70 @@ def test_the_error_falls_when_it_is_added(loop):
     assert loop.add["error_after"] < 0.5 * loop.add["error_before"]
     assert loop.compare["floor_ratio"] == pytest.approx(loop.add["error_after"], rel=0.02)
     assert "no failure" in loop.printed["compare"]
+
+
+def test_diagnose_writes_the_base_model_beside_the_report_and_suggests_it(loop):
+    paths = (loop.folder / "diagnosis" / "base_model.yaml", loop.folder / "model.yaml")
+    beside, fitted = (yaml.safe_load(path.read_text()) for path in paths)
+    assert (beside["effects"], beside["data"]) == ({}, fitted["data"])
+    assert beside["base"]["position_gain"]["value"] == pytest.approx(fitted["base"]["position_gain"]["value"], rel=1e-3)
+    assert "add data=my_set model=diagnosis/base_model.yaml effect=force_bias" in loop.printed["diagnose"]
+    assert "model=model.yaml" not in loop.printed["diagnose"]
+
+
+def test_compare_writes_the_base_model_beside_the_report_and_suggests_it(folder, capsys, monkeypatch):
+    from forcegrasp.compare import workflow
+    from forcegrasp.effects.model_file import read_model
+
+    fitted, real = read_model(Path("model.yaml")), workflow.compare
+    monkeypatch.setattr(workflow, "compare", lambda loaded, model, *rest: real(loaded, fitted, *rest))  # saves a fit
+    assert main(["compare", "my_set", "out=where"]) == 0
+    assert "diagnose data=my_set model=where/base_model.yaml" in capsys.readouterr().out
+    beside = yaml.safe_load((folder / "where" / "base_model.yaml").read_text())
+    assert {**beside, "mujoco": ""} == {**yaml.safe_load((folder / "model.yaml").read_text()), "mujoco": ""}
+    assert main(["compare", "my_set", "model=better.yaml", "out=there"]) == 0
+    assert not (folder / "there" / "base_model.yaml").exists()
+    assert "base_model" not in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("verb", ["compare", "diagnose", "add"])
+@pytest.mark.parametrize("other", [True, False])
+def test_a_model_of_other_measurements_is_used_with_a_warning(verb, other, folder, capsys, monkeypatch):
+    from forcegrasp.compare import workflow
+    from forcegrasp.errors import ConfigError
+
+    def stop(loaded, model, *rest):
+        raise ConfigError(f"with {model.data['set']} and {len(loaded.warnings)} warnings")
+
+    for name in ("compare", "diagnose_set", "add_effect"):
+        monkeypatch.setattr(workflow, name, stop)
+    if other:
+        text = (folder / "model.yaml").read_text()
+        (folder / "model.yaml").write_text(text.replace("fingerprint: ", "fingerprint: 0").replace("my_set", "hers"))
+    assert main([verb, "my_set", "model=model.yaml", *(["effect=backlash"] if verb == "add" else [])]) == 2
+    captured = capsys.readouterr()
+    warning = "warning: model=model.yaml: was fitted to other measurements (hers) than my_set\n"
+    assert captured.out == (warning if other else "")
+    assert captured.err == f"forcegrasp: with {'hers and 1' if other else 'my_set and 0'} warnings\n"
+
+
+def test_noise_that_is_given_is_held_against_the_readings_before_anything_is_fitted(folder, capsys, monkeypatch):
+    from forcegrasp.compare import workflow
+
+    meta = (folder / "my_set" / "meta.yaml").read_text()
+    monkeypatch.setattr(workflow, "make_target", None)  # nothing may be fitted
+    for given, told in (
+        ("13", "looks like millinewtons"),
+        ("1.0e+300", "looks like"),
+        ("0.2", "0.2 N is given, the readings show 0.01"),
+    ):
+        (folder / "my_set" / "meta.yaml").write_text(meta.replace("force_std_n: 0.013", f"force_std_n: {given}"))
+        for verb in ("compare", "fit", "diagnose"):
+            assert main([verb, "my_set"]) == 2
+            captured = capsys.readouterr()
+            assert captured.err.count("\n") == 1
+            assert told in captured.err
+            assert not captured.out
 
 
 def test_models_are_text_with_intervals(loop):
@@ -162,7 +231,14 @@ MISTAKES = [
     ("compare", ["data=my_set", "model=my_set"], "my_set: could not read the model"),
     ("diagnose", ["data=my_set", "model=file"], "forcegrasp-model/1"),
     ("diagnose", ["data=my_set", "effects=[backlsh]"], "effects=backlsh: no such effect; did you mean backlash"),
-    ("diagnose", ["data=my_set", "effects=backlash"], "effects"),
+    ("diagnose", ["my_set", "effects=backlsh"], "effects=backlsh: no such effect; did you mean backlash"),
+    *((verb, ["nowhere"], "nowhere: no such measurement set") for verb in ("compare", "fit", "diagnose")),
+    *((verb, ["my_set", "data=table"], "one set at a time") for verb in ("compare", "fit", "diagnose", "add")),
+    ("compare", ["my_set", "table"], "one set at a time, not my_set and table"),
+    ("compare", ["-q", "my_set"], "key=value"),
+    ("add", ["my_set", "model=model.yaml", "effects=backlsh"], "did you mean backlash"),
+    ("add", ["my_set", "model=model.yaml", "effects=[backlash,stiction]"], "one effect at a time"),
+    ("add", ["my_set", "model=model.yaml", "effect=backlash", "effects=[stiction]"], "the same option"),
     ("fit", ["data=my_set", "out=my_set"], "it is a folder; name a file: out=my_set/model.yaml"),
     ("fit", ["data=my_set", "out=file/model.yaml"], "could not write"),
     ("add", ["data=my_set"], "model is missing: model=model.yaml"),
@@ -191,3 +267,19 @@ def test_mistake(verb, arguments, told, folder, capsys):
     assert "Traceback" not in captured.err
     assert all(line.startswith("warning: ") for line in captured.out.splitlines())
     assert sorted(folder.rglob("*")) == before
+
+
+@pytest.mark.parametrize("width", [120, 80, 40, 10])
+def test_no_name_is_cut_off_in_a_table(width, capsys, monkeypatch):
+    table = Table("", "effect", "gain", "error, × noise", "parameters", box=box.SIMPLE_HEAD)
+    names = ["viscoelastic_contact", "force_gain_asymmetry"]
+    for name in names:
+        table.add_row("1", f"{name} standard", "+43927", "3.05 → 1.00", "time_constant_s 0.132 s, stiffness_share 0.1")
+    monkeypatch.setenv("COLUMNS", str(width))
+    print_table(table)
+    printed = capsys.readouterr().out
+    assert "…" not in printed
+    for word in (*names, "standard", "parameters", "time_constant_s", "stiffness_share", "+43927"):
+        assert word in printed
+    if width >= 80:
+        assert max(map(len, printed.splitlines())) <= width

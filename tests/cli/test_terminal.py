@@ -80,3 +80,8 @@ def test_error_of_a_file_whose_name_has_a_line_break_is_one_line(finished, tmp_p
     err = capsys.readouterr().err
     assert err.count("\n") == 1
     assert in_a_line("seed\n0") in err
+
+
+@pytest.mark.parametrize("turn", "\u202e\u202b\u2067\u2066")
+def test_nothing_turns_the_direction_of_a_message(turn):
+    assert in_a_line(f"a{turn}b ا é") == f"a\\u{ord(turn):04x}b ا é"

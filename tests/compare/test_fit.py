@@ -382,7 +382,9 @@ def test_one_interval_everywhere(fitted):
 def test_noise_that_is_not_as_said_is_no_missing_effect(fitted, shape):
     rng, target = np.random.default_rng(5), fitted.target
     noise = (
-        3 * rng.standard_normal(target.signals.shape) if shape == "normal" else rng.standard_t(3, target.signals.shape)
+        3 * rng.standard_normal(target.signals.shape)
+        if shape == "normal"
+        else 2 * rng.standard_t(3, target.signals.shape)
     )
     clean = exact(fitted.problem, truth_of(fitted.problem))
     signals = np.where(target.mask[..., None], clean + SIGMA * noise, 0)

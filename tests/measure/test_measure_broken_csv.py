@@ -113,7 +113,7 @@ def test_each_column(folder, file, change):
             if name in ("split", "object_offset_m", OBJECT):
                 continue
             rows = [",".join(c for i, c in enumerate(line.split(",")) if i != index) for line in lines]
-            expected = [f"column {name} is missing"]
+            expected = [f"missing columns: {name};"]
         else:
             new = {
                 "misspell": name + "x",
@@ -123,7 +123,7 @@ def test_each_column(folder, file, change):
                 "empty": "",
             }[change]
             rows = [",".join(new if i == index else c for i, c in enumerate(header)), *lines[1:]]
-            expected = ["twice"] if change == "twice" else ["unknown column"]
+            expected = ["twice"] if change == "twice" else ["unknown columns: "]
         (folder / file).write_text("\n".join(rows))
         refuse(folder, file, "row 1", *expected)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -31,6 +32,20 @@ def test_file_for_a_folder(folder, file):
 def test_missing(folder, file):
     (folder / file).unlink()
     refuse(folder, file, "missing")
+
+
+@pytest.mark.parametrize(("table", "kind"), [(False, "grasps"), (True, "final_force")])
+def test_a_first_meta_yaml_is_offered(folder, table, kind):
+    """The command in the message writes one that can be read."""
+    (folder / "meta.yaml").unlink()
+    if table:
+        (folder / "grasps.csv").unlink()
+        (folder / "samples.csv").unlink()
+        (folder / "table.csv").write_text("object,delta_q_m,final_force_n\nfoam,0.001,0.1\n")
+    command = refuse(folder, "meta.yaml: missing; write it").partition("gripper: printf")[2]
+    subprocess.run(f"printf {command}", shell=True, check=True)
+    assert kind in (folder / "meta.yaml").read_text()
+    assert read_set(folder).gripper == "tiago"
 
 
 @pytest.mark.parametrize("file", FILES)

@@ -5,7 +5,9 @@ from __future__ import annotations
 import pytest
 from measured_rig import refuse
 
+from forcegrasp.errors import MeasurementError
 from forcegrasp.measure import read_set
+from forcegrasp.measure.yaml_file import Reader
 
 VALID = {
     "format": "forcegrasp-measurements/1",
@@ -125,3 +127,10 @@ def test_bytes(folder, case):
 def test_positions_in_a_table_of_forces(folder):
     (folder / "meta.yaml").write_text(_text(kind="final_force", position_std_m="1e-5"))
     refuse(folder, "position_std_m")
+
+
+@pytest.mark.parametrize("key", ["first", "second", "third"])
+def test_every_key_that_must_be_there_is_asked_for(key):
+    content = {name: "1" for name in ("first", "second", "third") if name != key}
+    with pytest.raises(MeasurementError, match=f"^here: {key} is missing; add it$"):
+        Reader(content, "here", ("first", "second", "third"))

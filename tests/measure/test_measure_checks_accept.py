@@ -8,7 +8,10 @@ import numpy as np
 import pytest
 from measured_rig import OPEN_M, change, closing, cycles, make_grasp, make_set, standard_grasps
 
+from forcegrasp.errors import MeasurementError
 from forcegrasp.measure import check_set
+from forcegrasp.measure.check_liveness import feels
+from forcegrasp.measure.check_signs import _check_follows, _check_free_air
 
 
 def _force(change_force):
@@ -223,6 +226,11 @@ def _noise():
     return np.random.default_rng(0).normal(0, 0.013, (100, 2))
 
 
+def _smooth(grasp):
+    """What a simulation without noise reads on both sides."""
+    return 200 * np.maximum(grasp.radius_m - grasp.command_m, 0)[:, [0, 0]]
+
+
 WARNED = {
     "a gap": (lambda g: _without(g, lambda x: (x.time_s < 1) | (x.time_s > 1.5)), "a gap of 0.5"),
     "one grasp": (lambda g: g[:1], "one grasp only"),
@@ -234,6 +242,14 @@ WARNED = {
         lambda g: [change(x, force_n=x.force_n * [1, 0]) for x in g],
         "f_r_n: the right finger feels nothing",
     ),
+    "smooth forces, twice": (
+        lambda g: [change(x, force_n=_smooth(x)) for x in g],
+        "f_l_n and f_r_n: the same readings in every row; is one a copy?",
+    ),
+    "coarse forces, twice": (
+        lambda g: [change(x, force_n=0.5 * np.round(x.force_n[:, [0, 0]] / 0.5)) for x in g],
+        "f_l_n and f_r_n: the same",
+    ),
     "a free motion": (lambda g: [*g, change(g[0], name="free", force_n=_noise())], "no contact"),
 }
 
@@ -244,6 +260,32 @@ def test_warning(grasps, case):
     warnings = check_set(make_set(vary(grasps)), OPEN_M)
     assert any(words in warning for warning in warnings), warnings
     assert all(warning.isprintable() for warning in warnings)
+
+
+def test_a_touch_as_light_as_the_noise_is_felt_and_noise_alone_is_not():
+    force = np.random.default_rng(3).normal(0, 0.013, (500, 2))
+    assert feels(force) == [False, False]
+    force[200:300, 1] += 2 * 0.013
+    assert feels(force) == [False, True]
+
+
+def test_a_delay_of_half_a_period_is_no_wrong_direction():
+    grasp = make_grasp(0)
+    command, position = (0.022 + 0.01 * np.sin(2 * np.pi * (grasp.time_s - late) / 0.8) for late in (0.0, 0.4))
+    grasp = change(grasp, command_m=np.stack([command] * 2, axis=1), position_m=np.stack([position] * 2, axis=1))
+    _check_follows(make_set([grasp]), 0, OPEN_M)
+
+
+def test_free_air_of_an_object_on_the_right_ends_early_for_the_right_finger():
+    grasp = make_grasp(0, radius=0.02, offset=0.01)
+    right = np.linspace(OPEN_M, 0.010, len(grasp.time_s))
+    force = np.zeros((len(right), 2))
+    chatters = (right < 0.03) & (right > 0.018)  # it touches at 30 mm
+    force[:, 1] = np.where(chatters, np.sin(np.arange(len(right))), right < 0.018)
+    grasp = change(grasp, position_m=np.stack([np.full_like(right, OPEN_M), right], axis=1), force_n=force)
+    _check_free_air(make_set([grasp]), grasp, OPEN_M)
+    with pytest.raises(MeasurementError, match="in free air"):
+        _check_free_air(make_set([grasp]), change(grasp, offset_m=-0.01), OPEN_M)
 
 
 def test_checking_changes_nothing(measured):

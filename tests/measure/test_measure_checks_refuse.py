@@ -124,6 +124,10 @@ CASES = {
         ),
         ["closing direction", "q_l_m"],
     ),
+    "forces of 1e308": (_last(force_n=lambda g: _put(g.force_n, (3, 0), 1e308)), ["'g5'", "f_l_n: 1e+308 is no force"]),
+    "forces of -1e308": (_each(force_n=lambda g: 0 * g.force_n - 1e308), ["f_l_n: -1e+308 is no force"]),
+    "one force sensor twice": (_each(force_n=lambda g: g.force_n[:, [1, 1]]), ["f_l_n and f_r_n: the same readings"]),
+    "one encoder twice": (_each(position_m=lambda g: g.position_m[:, [0, 0]]), ["q_l_m and q_r_m: the same readings"]),
     "forces of the wrong sign": (_each(force_n=lambda g: -g.force_n), ["f_l_n", "pressing gives negative forces"]),
     "left force of the wrong sign": (_each(force_n=lambda g: g.force_n * [-1, 1]), ["f_l_n", "negative"]),
     "right force of the wrong sign": (_each(force_n=lambda g: g.force_n * [1, -1]), ["f_r_n", "negative"]),
@@ -196,10 +200,18 @@ def test_too_few_samples(grasps, count):
         check_set(make_set([*grasps, short]), OPEN_M)
 
 
-@pytest.mark.parametrize("name", ["position_std_m"])
-def test_noise_in_mm(measured, grasps, name):
-    with pytest.raises(MeasurementError, match=MM):
-        check_set(make_set(grasps, **{name: 0.027}), OPEN_M)
+@pytest.mark.parametrize(
+    ("name", "value", "words"),
+    [
+        ("position_std_m", 0.027, MM),
+        ("position_std_m", 1e300, MM),
+        ("force_std_n", 13.0, "force_std_n: 13 is more than the .* N from the smallest .*: looks like millinewtons"),
+        ("force_std_n", 1e300, "millinewtons"),
+    ],
+)
+def test_noise_in_another_unit(grasps, name, value, words):
+    with pytest.raises(MeasurementError, match=words):
+        check_set(make_set(grasps, **{name: value}), OPEN_M)
 
 
 @pytest.mark.parametrize("samples", ["csv", "parquet"])
@@ -226,11 +238,20 @@ def _table(path, delta, force, objects=None):
         ([0.0003, 0.0006, 0.0009], [0, 0, 0], "all forces are zero"),
         ([0.0003, 0.0006, 0.0009], [0, -0.1, -0.2], "final_force_n: falls"),
         ([-0.0003, -0.0006, -0.0009], [0, 0.1, 0.2], "falls"),
+        ([0.0003, 0.0006, 0.0009], [0, 0.1, 1e308], "row 4, column final_force_n: 1e\\+308 is no force"),
+        ([0.0003, 0.0006, 0.0009], [1e308, 0, -1e308], "row 2, column final_force_n"),
     ],
 )
 def test_table_refused(tmp_path, delta, force, words):
     with pytest.raises(MeasurementError, match=words):
         check_table(_table(tmp_path, delta, force), OPEN_M)
+
+
+@pytest.mark.parametrize("std", [13.0, 1e300])
+def test_noise_of_a_table_in_another_unit(tmp_path, std):
+    table = replace(_table(tmp_path, [0.0003, 0.0006, 0.0009], [0, 0.1, 0.2]), force_std_n=std)
+    with pytest.raises(MeasurementError, match=r"meta.yaml: force_std_n: .*the 0.2 N .*looks like millinewtons"):
+        check_table(table, OPEN_M)
 
 
 def test_table_of_the_paper(root_table, tmp_path):

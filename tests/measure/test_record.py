@@ -213,3 +213,10 @@ def test_wrong_words_are_one_clear_error(text, told):
     message = str(caught.value)
     assert told in message
     assert "\n" not in message
+
+
+def test_a_set_without_noise_gives_none_and_can_be_read(tmp_path):
+    write_set(plain().measured, tmp_path / "set")
+    measured = read_set(tmp_path / "set")
+    assert (measured.position_std_m, measured.force_std_n) == (None, None)
+    assert check_set(measured, TIAGO.open_m) == []

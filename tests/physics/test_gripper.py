@@ -342,6 +342,8 @@ def test_missing_description(tmp_path):
     assert "Is a directory" in _refusal(_folder(tmp_path / "folder.yaml"))
     with pytest.raises(ConfigError, match=r"gripper=tiaga: no such gripper; did you mean tiago\?; or give"):
         load_gripper("tiaga")
+    with pytest.raises(ConfigError, match=r"gripper=robotiq: no such gripper; known: tiago; or give"):
+        load_gripper("robotiq")  # models and objects lie beside the grippers and are none
 
 
 def _folder(path: Path) -> Path:

@@ -14,6 +14,11 @@ def test_softness_interpolates_between_hard_and_soft():
     np.testing.assert_allclose(training.force_scale(kappa), [5, 3.875, 2.75, 0.5], rtol=1e-15)
 
 
+def test_softness_of_a_force_scale_is_the_inverse_and_stays_a_softness():
+    np.testing.assert_allclose(default_gripper().training.kappa_of_force_scale(np.array([5, 3.875, 0.5])), [0, 0.25, 1], rtol=1e-15)
+    np.testing.assert_array_equal(default_gripper().training.kappa_of_force_scale(np.array([9.0, 0.1])), [0, 1])  # beyond the paper's interval
+
+
 def test_scalars_are_broadcast_and_nothing_is_shared():
     kappa = np.array([0.1, 0.2, 0.3])
     grasps = GraspParameters(kappa, -9, 0.025, 0, 0.1)

@@ -88,6 +88,7 @@ def test_partial_reset_touches_its_slots_only(draw, tier):
     np.testing.assert_array_equal(_state(simulator)[others], before[others])
     np.testing.assert_array_equal(simulator.parameters.as_array()[ids], new.as_array())
     np.testing.assert_array_equal(simulator.parameters.as_array()[others], grasps.as_array()[others])
+    np.testing.assert_array_equal(simulator.steps, np.where(np.isin(np.arange(n), ids), 0, STEPS))
 
     after = _run(simulator, deltas[STEPS:])
     np.testing.assert_array_equal(after[:, others], undisturbed[STEPS:, others])

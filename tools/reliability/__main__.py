@@ -21,6 +21,7 @@ NAMES = (
     "measurements",
     "physics",
     "divergence",
+    "command_lines",
     "hostile",
     "suites",
     "soak",

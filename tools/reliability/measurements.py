@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from forcegrasp.cli.main import main
+from forcegrasp.compare.given_noise import check_given_noise
 from forcegrasp.effects.model_file import read_model
 from forcegrasp.errors import ForcegraspError
 from forcegrasp.measure import MeasurementSet, check_set, read_set
@@ -91,6 +92,7 @@ def _read(folder: Path, file: str, names_row: bool) -> tuple[str, str]:
             measured = read_set(folder)
             assert isinstance(measured, MeasurementSet)  # which a table is not
             check_set(measured, default_gripper().stroke)
+            check_given_noise(measured)
     except ForcegraspError as error:
         return "refused", _wrong_with(str(error), folder, names_row)
     return "read", ""
