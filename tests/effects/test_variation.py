@@ -12,7 +12,7 @@ from forcegrasp.effects.model_file import Fitted, FoundEffect, Model, write_mode
 from forcegrasp.effects.variation import ModelVariation, read_model_of
 from forcegrasp.errors import ConfigError
 from forcegrasp.physics import GraspParameters, GraspSimulator
-from forcegrasp.physics.gripper_file import load_gripper
+from forcegrasp.physics.gripper_file import default_gripper, load_gripper
 from forcegrasp.physics.plant import Plant
 
 TIAGO = load_gripper("tiago")
