@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 import re
 import sys
 from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, Any, cast
 
-from forcegrasp.cli.options import compose, compose_run, compose_sweep, help_text, parse_override, spell_sweep
+from forcegrasp.assets import DEFAULT_GRIPPER
+from forcegrasp.cli.options import compose, compose_run, compose_sweep, help_text, parse_override
 from forcegrasp.errors import ConfigError, ForcegraspError
 
 if TYPE_CHECKING:
     from forcegrasp.config import TrainConfig
+    from forcegrasp.physics import Gripper
     from forcegrasp.runs.run_dir import RunDir
 
 #: Why a run of a sweep failed, in its folder.
@@ -32,7 +35,7 @@ NOTES = """
                      forcegrasp train -m sweep=ablation                   the combinations of a preset
                      the same sweep with hydra.sweep.dir=FOLDER goes on with what is in that folder
   resume=RUN_DIR     go on with an interrupted run, exactly as if it had not been interrupted
-  hydra.run.dir=DIR  where to write the run; runs/TIME_EXPERIMENT_MODEL_SEED by default
+  hydra.run.dir=DIR  where to write the run; runs/TIME_EXPERIMENT_GRIPPER_MODEL_SEED by default
 
 Watch a training with: tensorboard --logdir runs. Ctrl-C saves and ends; so do SIGTERM, SIGHUP and SIGUSR1.
 """
@@ -61,31 +64,53 @@ def _run(overrides: list[str]) -> int:
     config, run_dir = compose_run("train", overrides, _run_name(overrides))
     if preset := next((o for o in overrides if o.startswith("sweep=") and o != "sweep=none"), ""):
         raise ConfigError(f"{preset} is several runs: add -m to run one after another")
-    _check(config)
+    config, gripper = _check(config)
     _join(config)
     return _begin(config, Path(run_dir), overrides)
 
 
 def _run_name(overrides: list[str]) -> list[str]:
-    """An override that puts the model, if there is one and the same for all runs, into the run's name; else none."""
-    models = [parse_override(text) for text in overrides if text.startswith("model=")]
-    if not models or models[-1].is_sweep_override() or not str(models[-1].value()):
+    """An override that puts gripper and model, where they are given, into the run's name; else none."""
+    given = {parsed.get_key_element(): parsed for parsed in map(parse_override, overrides)}
+    names = [_name_of(key, given[key]) for key in ("gripper", "model") if key in given]
+    if not any(names):
         return []
-    path = Path(str(models[-1].value()))
+    return [f"hydra.job.name='${{hydra:runtime.choices.experiment}}_{'_'.join(filter(None, names))}'"]
+
+
+def _name_of(key: str, given: Any) -> str:
+    """What a gripper or a model adds to the run's name; empty for the default one, and for models that differ."""
+    if given.is_sweep_override():
+        plain = key == "gripper" and all(name.isidentifier() for name in given.sweep_string_iterator())
+        return "${gripper}" * plain
+    path = Path(str(given.value()))
+    if str(path) in (".", DEFAULT_GRIPPER):
+        return ""
     stem = path.parent.name if path.stem == "model" and path.parent.name else path.stem  # runs/diagnose_TIME/model.yaml
-    name = re.sub(r"[^\w.-]", "_", stem)[:_LONGEST]
-    return [f"hydra.job.name='${{hydra:runtime.choices.experiment}}_{name}'"]
+    return re.sub(r"[^\w.-]", "_", stem)[:_LONGEST]
 
 
-def _check(config) -> None:
-    """Refuses a model that can't be read, and an engine or Ray where it can't run, before anything is written."""
+def _completed(config: TrainConfig) -> tuple[TrainConfig, Gripper]:
+    """The configuration with what it leaves to the gripper's description, and the gripper."""
+    from forcegrasp.physics import load_gripper
+    from forcegrasp.physics.completion import complete
+
+    gripper = load_gripper(config.gripper)
+    return dataclasses.replace(complete(config, gripper), gripper=gripper.name_or_path), gripper
+
+
+def _check(config: TrainConfig) -> tuple[TrainConfig, Gripper]:
+    """Refuses what can't be trained before anything is written; returns the whole configuration, and the gripper."""
+    from forcegrasp.config import validate
     from forcegrasp.gpu import check_engine
     from forcegrasp.gpu.installation import check_gripper_for_warp
-    from forcegrasp.physics import load_gripper
+    from forcegrasp.physics import GraspSampler
     from forcegrasp.physics.gripper import NO_FORCES
 
     check_engine(config.physics)
-    gripper = load_gripper(config.gripper)
+    config, gripper = _completed(config)
+    validate(config)
+    GraspSampler(config.grasp, gripper).set_ranges(config.curriculum.radius_m, config.curriculum.offset_m)
     if not gripper.forces:
         raise ConfigError(f"gripper={config.gripper}: {NO_FORCES}")
     if config.physics.engine == "warp":
@@ -98,6 +123,7 @@ def _check(config) -> None:
         from forcegrasp.train.cluster import find_ray
 
         find_ray()
+    return config, gripper
 
 
 def _join(config) -> None:
@@ -231,6 +257,7 @@ def _begin_or_resume(path: Path, config: TrainConfig, overrides: list[str]) -> i
     """Goes on with this very run if a scheduler started its job anew, or if the sweep was typed again."""
     from forcegrasp.runs.run_dir import RunDir
 
+    config, _ = _completed(config)
     _join(config)
     if RunDir(path).has_checkpoint and RunDir.open(path).config() == config:
         return _resume(path)

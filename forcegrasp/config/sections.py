@@ -44,7 +44,12 @@ class GraspConfig:
 
     kappa: list[float] = option([0.0, 1.0], "softness of the object; 0 is hard", source="paper, Sec. 3", low=0, high=1)
     b2: list[float] = of_gripper(
-        [], "servo_gain_range", "servo gain that is drawn; the paper's velocity gain b₂", source="paper, Sec. 3"
+        [],
+        "servo_gain_range",
+        "servo gain that is drawn; the paper's velocity gain b₂",
+        source="paper, Sec. 3",
+        low=-1e6,
+        high=1e6,
     )
     radius_m: list[float] = of_gripper(
         [], "radius_m", "object radius; the paper's w_o", unit="m", source="paper, Table 2", low=1e-4, high=1
@@ -53,13 +58,8 @@ class GraspConfig:
         [], "offset_m", "object offset along the grasp axis, o_y", unit="m", source="paper, Table 2", low=-1, high=1
     )
     deformation_m: float = of_gripper(
-        math.nan,
-        "deformation_m",
-        "largest object deformation d_p, both sides together",
-        unit="m",
-        source="authors' code",
-        low=0,
-        high=1,
+        math.nan, "deformation_m", "largest object deformation d_p, both sides together", unit="m",
+        source="authors' code", low=0, high=0.5,
     )
     goal_force_min_n: float = of_gripper(
         math.nan, "goal_force_min_n", "smallest goal force", unit="N", source="authors' code", low=1e-4, high=1e4

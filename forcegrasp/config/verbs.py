@@ -201,7 +201,7 @@ class RenderConfig:
     seed: int = option(0, "seed of what is not given, and of the sensor noise", low=0, high=2**31 - 1)
     kappa: float | None = option(None, "softness of the object; 0 is hard", source="paper, Sec. 3", low=0, high=1)
     b2: float | None = option(
-        None, "servo gain that training draws; the paper's velocity gain b₂", source="paper, Sec. 3"
+        None, "servo gain that training draws; the paper's velocity gain b₂", source="paper, Sec. 3", low=-1e6, high=1e6
     )
     radius_m: float | None = option(
         None, "object radius; the paper's w_o", unit="m", source="paper, Table 2", low=1e-4, high=1

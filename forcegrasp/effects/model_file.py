@@ -84,7 +84,7 @@ def write_model(model: Model, path: str | Path) -> None:
     path = Path(path)
     content: dict[str, Any] = {
         "format": FORMAT,
-        "gripper": _gripper_name(model.gripper),
+        "gripper": model.gripper.name_or_path,
         "mujoco": mujoco.__version__,
         "data": dict(model.data),
         "base": {name: _dump(v) for name, v in model.base.items()},
@@ -243,10 +243,6 @@ def _refuse(path: Path, where: str, problem: str) -> ConfigError:
     key = where if len(where) <= _LONGEST_KEY else f"{where[:_LONGEST_KEY]}…"
     text = ": ".join(filter(None, (str(path), key, problem)))
     return ConfigError(" ".join("".join(c if c.isprintable() else " " for c in text).split()))
-
-
-def _gripper_name(gripper: Gripper) -> str:
-    return gripper.path.stem if gripper.is_shipped else str(gripper.path.resolve())
 
 
 class _Numbers(dict):

@@ -26,6 +26,7 @@ from forcegrasp.errors import ConfigError
 from forcegrasp.physics import GraspParameters, Gripper, load_gripper
 from forcegrasp.physics.completion import complete
 from forcegrasp.physics.gripper import NO_FORCES
+from forcegrasp.physics.sensors import rounding_steps
 from forcegrasp.transforms import (
     ActionChangePenalty,
     ActionScale,
@@ -62,7 +63,7 @@ def build_env(
 ) -> TransformedEnv:
     """Returns ``n`` grasps with ``observation`` ``(n, size · frames)`` in and ``action`` ``(n, motors)`` in [−1, 1] out.
 
-    Readings come first (noise), then what is computed from readings (contact, error), then memory, then the stacked
+    Readings come first (noise, then rounding), then what is computed from readings (contact, error), then memory, then the stacked
     observation; on the way back the action is denormalised, then biased. Parts left out use their defaults, and options
     left out the gripper's (by name, or the path of its description). A ``model`` fitted to measurements, or its file,
     brings its base parameters and effects, drawn anew for every grasp.
@@ -87,8 +88,9 @@ def build_env(
             out_keys=["sensed_position", "sensed_force"],
             std=[sensors.position_std_m, sensors.force_std_n],
             device=grasps.device,
+            step=rounding_steps((found.effect, found.values) for found in model.effects).tolist() if model else None,
         ),
-        HadContact(sensors.contact_threshold_n, gripper.stall),
+        HadContact(sensors.contact_threshold_n, stall=gripper.stall),
         ForceError(),
         LastAction(),
         ActionChangePenalty(reward.action_weight),

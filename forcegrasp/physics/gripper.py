@@ -108,6 +108,11 @@ class Gripper(ShortRepr):
         """Whether it comes with the package, and so is known by its name."""
         return self.path.parent == shipped_folder()
 
+    @property
+    def name_or_path(self) -> str:
+        """What files say of it, to find it again: its name if it is shipped, else where its description is."""
+        return self.path.stem if self.is_shipped else str(self.path.resolve())
+
     @functools.cached_property
     def opening(self) -> OpeningLaw:
         """How wide the pads stand apart, and how far each moves, at every position of the motors."""

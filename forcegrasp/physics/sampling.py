@@ -7,6 +7,7 @@ import dataclasses
 import numpy as np
 
 from forcegrasp.config import GraspConfig, check_deformation
+from forcegrasp.errors import ConfigError
 from forcegrasp.physics.completion import complete
 from forcegrasp.physics.gripper import Gripper
 from forcegrasp.physics.gripper_file import default_gripper
@@ -39,17 +40,29 @@ class GraspSampler:
       gripper: whose objects they are; the paper's by default.
 
     Raises:
-      ConfigError: if the smallest object could be squeezed flat (paper, eq. 3: d_p < r).
+      ConfigError: if the smallest object could be squeezed flat (paper, eq. 3: d_p < r), the largest does not fit in, or
+        a servo gain is out of the description's bounds.
     """
 
     def __init__(self, config: GraspConfig, gripper: Gripper | None = None) -> None:
         self.gripper = gripper or default_gripper()
         self.config = complete(config, self.gripper)
+        self._check_gain(self.config.b2)
         self.set_ranges(self.config.radius_m, self.config.offset_m)
+
+    def _check_gain(self, b2: list[float]) -> None:
+        gain = self.gripper.parameters.get(self.gripper.training.servo_gain)
+        if gain and not gain.low <= b2[0] <= b2[1] <= gain.high:
+            limits = f"[{gain.low:g}, {gain.high:g}] {gain.unit}"
+            raise ConfigError(f"grasp.b2={b2}: must lie in {limits}, the bounds of {gain.name} of {self.gripper.name}")
 
     def set_ranges(self, radius_m: list[float], offset_m: list[float]) -> None:
         """Narrows or widens the object ranges, as the curriculum does."""
         check_deformation(self.config.deformation_m, radius_m, "radius_m")
+        largest = float(self.gripper.opening.opening_m[-1]) / 2
+        if radius_m[1] >= largest:
+            name = self.gripper.name
+            raise ConfigError(f"radius_m={radius_m}: {name} opens so wide that it takes radii below {largest:g} m")
         self.config = dataclasses.replace(self.config, radius_m=list(radius_m), offset_m=list(offset_m))
 
     def __call__(self, rng: np.random.Generator, ids: np.ndarray) -> GraspParameters:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,6 +14,15 @@ if TYPE_CHECKING:
 def is_rounding(effect: type[Effect]) -> bool:
     """Whether an effect comes after the noise, as a converter's rounding does: readings lie on its grid."""
     return effect.after_noise
+
+
+def rounding_steps(effects: Iterable[tuple[type[Effect], np.ndarray]]) -> np.ndarray:
+    """Steps that positions and forces are rounded to after the noise, ``(2,)``; 0 rounds nothing.
+
+    Args:
+      effects: each with the values of its parameters; those that do not round are left out.
+    """
+    return next((values for effect, values in effects if is_rounding(effect)), np.zeros(2))
 
 
 class ReadingEffects:

@@ -113,7 +113,8 @@ def train(config: TrainConfig, run: RunDir, resume: bool = False) -> bool:
 
 def _train(config: TrainConfig, run: RunDir, resume: bool) -> bool:
     trainer = Trainer(config, run.model(config))
-    config, total = trainer.config, config.ppo.total_frames
+    config, period_s = trainer.config, trainer.gripper.period_s
+    total = config.ppo.total_frames
     if resume and run.has_checkpoint:
         trainer.restore(*run.load())
     batch = None
@@ -129,10 +130,8 @@ def _train(config: TrainConfig, run: RunDir, resume: bool) -> bool:
             values = trainer.prepare()
             batch = next(batches)
             collected = time.perf_counter()
-            figures = {
-                name: float(value.mean())
-                for name, value in summarise(batch, config.sensors, trainer.gripper.period_s).items()
-            }
+            summary = summarise(batch, config.sensors, period_s)
+            figures = {name: float(value.mean()) for name, value in summary.items()}
             rate = trainer.ppo.set_progress(trainer.frames / total)
             losses = trainer.ppo.update(batch, trainer.shuffle)
             ended = time.perf_counter()

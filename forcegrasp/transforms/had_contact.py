@@ -17,22 +17,23 @@ class HadContact(Transform):
     The memory lives in the tensordict: h(t+1) is written from f(t+1) and h(t), so partial resets and batched envs need
     no bookkeeping.
 
-    Where the force is read from the motor's effort, which moving takes as well, a motor that still moves has no contact.
+    Where the force is read from the motor's effort, which moving takes as well, a motor that still moves has no
+    contact: with ``stall``, the force counts only in steps in which the motor moved by less than that.
 
     Args:
       threshold: f_θ, newtons.
-      stall: largest movement of a motor in a step that may be contact, m or rad; any by default.
       in_key: measured force, newtons, ``(*B, channels)``.
       out_key: the flags, float 0 or 1, ``(*B, channels)``.
+      stall: a motor that moves by as much in a step, m or rad, has no contact; infinite by default.
       position_key: measured position, m or rad, ``(*B, channels)``; read only where ``stall`` is given.
     """
 
     def __init__(
         self,
         threshold: float,
-        stall: float = math.inf,
         in_key: NestedKey = "sensed_force",
         out_key: NestedKey = "had_contact",
+        stall: float = math.inf,
         position_key: NestedKey = "sensed_position",
     ) -> None:
         super().__init__(in_keys=[in_key], out_keys=[out_key])

@@ -8,7 +8,7 @@ import pytest
 import yaml
 
 from forcegrasp.cli.options import SCHEMAS, compose, compose_sweep, groups, leaves
-from forcegrasp.config import EvaluateConfig, TrainConfig
+from forcegrasp.config import EvaluateConfig, TrainConfig, is_left_out
 from forcegrasp.runs.started_with import DEFAULT_EXPERIMENT
 
 CONF = Path(__file__).parents[2] / "conf"
@@ -31,7 +31,8 @@ def preset(verb: str, group: str, choice: str) -> Path:
 
 
 def options(config) -> dict:
-    return {name: value for name, _, value in leaves(config)}
+    """Every option's value; None where it is left to the gripper (NaN does not equal itself)."""
+    return {n: None if e.metadata["of_gripper"] and is_left_out(v) else v for n, e, v in leaves(config)}
 
 
 def changed(before, after) -> dict:

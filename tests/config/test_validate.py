@@ -19,12 +19,19 @@ def is_number(value) -> bool:
     return isinstance(value, (int, float)) and not isinstance(value, bool)
 
 
+def sample(entry, default):
+    """A default; of an option that is left to the gripper, a value of its kind."""
+    low = entry.metadata["low"]
+    return (default if not entry.metadata["of_gripper"] else [low, low] if isinstance(default, list) else float(low))
+
+
 def first(default):
     return default[0] if isinstance(default, list) and default else default
 
 
 def selected(condition) -> dict:
-    chosen = [leaf for leaf in LEAVES if condition(leaf[2].metadata, leaf[3])]
+    every = [(verb, name, entry, sample(entry, default)) for verb, name, entry, default in LEAVES]
+    chosen = [leaf for leaf in every if condition(leaf[2].metadata, leaf[3])]
     return {
         "argnames": ("verb", "name", "meta", "default"),
         "argvalues": [(verb, name, entry.metadata, default) for verb, name, entry, default in chosen],
@@ -34,7 +41,7 @@ def selected(condition) -> dict:
 
 NUMBERS = selected(lambda meta, default: is_number(first(default)))
 RANGES = selected(lambda meta, default: isinstance(default, list) and isinstance(first(default), float))
-LISTS = selected(lambda meta, default: isinstance(default, list) and default)
+LISTS = selected(lambda meta, default: isinstance(default, list) and default and not meta["of_gripper"])
 CHOICES = selected(lambda meta, default: meta["choices"])
 
 
@@ -53,7 +60,7 @@ def with_option(verb: str, name: str, value):
     if name == "grasp.deformation_m":  # objects it fits into, for its own bounds to be what counts
         for part in (config.grasp, getattr(config, "curriculum", None)):
             if part:
-                part.radius_m = [0.04, 0.04]
+                part.radius_m = [1.0, 1.0]
     if name in ("collector.workers", "collector.address"):  # which direct collection has not, and grasps to share
         config.collector.kind, config.ppo.grasps = "ray", 4096
     return config
@@ -92,7 +99,7 @@ def test_numbers_out_of_bounds_are_refused(verb, name, meta, default):
         below, above = int(low) - 1, int(high) + 1
     else:
         below, above = math.nextafter(low, -math.inf), math.nextafter(high, math.inf)
-    for value in (below, above, -math.inf, math.inf, math.nan):
+    for value in (below, above, -math.inf, math.inf, *([] if meta["of_gripper"] else [math.nan])):
         message = refused(verb, name, like(default, value))
         assert "must lie in" in message
 
@@ -102,10 +109,15 @@ def test_ranges_are_two_numbers_in_order(verb, name, meta, default):
     low, high = meta["low"], meta["high"]
     validate(with_option(verb, name, [low, high]))
     validate(with_option(verb, name, [low, low]))
-    for value in ([high, low], [low], [low, low, high], []):
+    for value in ([high, low], [low], [low, low, high], *([] if meta["of_gripper"] else [[]])):
         assert "[low, high]" in refused(verb, name, value)
     for value in ([math.nan, high], [low, math.nan]):
         refused(verb, name, value)
+
+
+@pytest.mark.parametrize(**selected(lambda meta, default: meta["of_gripper"]))
+def test_what_is_left_out_is_left_to_the_gripper(verb, name, meta, default):
+    validate(with_option(verb, name, [] if isinstance(default, list) else math.nan))
 
 
 @pytest.mark.parametrize(**LISTS)

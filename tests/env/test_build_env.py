@@ -26,7 +26,8 @@ from forcegrasp.effects.variation import read_model_of
 from forcegrasp.env import build_env, seed_env
 from forcegrasp.env.reward import normalised_force_reward
 from forcegrasp.errors import ConfigError
-from forcegrasp.physics import FixedGrasps
+from forcegrasp.physics import FixedGrasps, default_gripper
+from forcegrasp.physics.completion import complete
 from forcegrasp.physics.gripper_file import load_gripper
 
 FAST = PhysicsConfig(tier="fast", threads=1)
@@ -158,7 +159,8 @@ def test_actions_are_clipped_biased_and_scaled(config):
         both, np.maximum(config.bias_floor, 1 - np.abs(error) / goal), np.where(had, config.bias_one_contact, 1)
     )
     phi = phi if config.inductive_bias else np.ones_like(phi)
-    delta = np.clip(rollout.get("action").double().numpy(), -1, 1) * config.max_delta_m * phi
+    largest = complete(config, default_gripper()).max_delta_m
+    delta = np.clip(rollout.get("action").double().numpy(), -1, 1) * largest * phi
     command = np.clip(rollout.get("joint_position").double().numpy() + delta, 0, 0.045)
     np.testing.assert_allclose(rollout.get(("next", "commanded_position")), command, atol=1e-8)
     assert {True, False} == {*had.ravel()}

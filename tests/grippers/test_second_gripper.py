@@ -12,6 +12,7 @@ from forcegrasp.effects.base import Effect
 from forcegrasp.effects.registry import catalogue
 from forcegrasp.physics.gripper_file import load_gripper
 from forcegrasp.physics.plant import Plant, write_base
+from forcegrasp.physics.sensors import is_rounding, with_noise
 
 SECOND = Path(__file__).with_name("second.yaml")
 VARIANTS = [(name, variant) for name, effect in catalogue().items() for variant in effect.variants]
@@ -45,7 +46,12 @@ def _roll(n: int, effects: Sequence[Row] = (), times: int = 1) -> np.ndarray:
         for command in COMMAND:
             plant.advance(np.tile(command, (n, 1)), 40)
             truth = (plant.position, plant.object_position[:, None])
-            seen.append(np.concatenate([plant.measured_force, plant.measured_position, *truth], axis=1))
+            force, position = plant.measured_force.copy(), plant.measured_position.copy()
+            for effect, _, rows, values in effects:
+                if is_rounding(effect):  # of readings, after a noise of 0
+                    position[rows] = with_noise(position[rows], 0.0, 0.0, values[0, 0])
+                    force[rows] = with_noise(force[rows], 0.0, 0.0, values[0, 1])
+            seen.append(np.concatenate([force, position, *truth], axis=1))
     assert not plant.warnings().any()
     return np.reshape(seen, (times, len(COMMAND), n, 7))
 

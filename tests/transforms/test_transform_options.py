@@ -36,9 +36,12 @@ CHANGED = [
     (ObservationNoise, "out_keys", ["reading"]),
     (ObservationNoise, "std", [0.2]),
     (ObservationNoise, "seed", 1),
+    (ObservationNoise, "step", [0.25]),
     (HadContact, "threshold", 0.7),
+    (HadContact, "stall", 0.2),
     (HadContact, "in_key", "spare"),
     (HadContact, "out_key", "spare"),
+    (HadContact, "position_key", "spare"),
     (ForceError, "goal_key", "spare"),
     (ForceError, "force_key", "spare"),
     (ForceError, "out_key", "error"),
@@ -59,9 +62,13 @@ CHANGED = [
     (ActionScale, "delta_key", "spare_delta"),
     (ActionScale, "action_key", "spare"),
 ]
+#: What else has to be given for an option to matter.
+NEEDED = {(HadContact, "position_key"): {"stall": 0.2}}
 SIZES = {
     **dict.fromkeys(
-        ["joint_position", "force", "sensed_force", "force_error", "last_action", "had_contact", "spare"], 2
+        ["joint_position", "sensed_position", "force", "sensed_force", "force_error", "last_action", "had_contact"]
+        + ["spare"],
+        2,
     ),
     "goal_force": 1,
 }
@@ -116,7 +123,8 @@ def test_noise_is_drawn_on_its_device(monkeypatch) -> None:
 
 @pytest.mark.parametrize(("kind", "option", "value"), CHANGED, ids=lambda item: getattr(item, "__name__", str(item)))
 def test_option_changes_something(kind: type, option: str, value: Any) -> None:
-    default, same = (everything(kind(**BASE[kind])) for _ in range(2))
-    changed = everything(kind(**{**BASE[kind], option: value}))
+    base = BASE[kind] | NEEDED.get((kind, option), {})
+    default, same = (everything(kind(**base)) for _ in range(2))
+    changed = everything(kind(**base | {option: value}))
     assert all(is_equal(default[part], same[part]) for part in default)
     assert not all(is_equal(default[part], changed[part]) for part in default)
