@@ -38,6 +38,7 @@ from forcegrasp.calibration.power_grasp import PAPER_B2
 from forcegrasp.calibration.staircase import PAPER_SLOPES_N_M
 from forcegrasp.config import TrainConfig
 from forcegrasp.physics import default_gripper
+from forcegrasp.physics.completion import complete
 from forcegrasp.physics.sampling import offset_limits_m
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -149,7 +150,7 @@ def draw_gripper(axes: Axes) -> None:
 
 def draw_constraints(axes: Axes) -> None:
     """Offsets that are allowed by radius, millimetres."""
-    config = TrainConfig().grasp
+    config = complete(TrainConfig().grasp, default_gripper())
     depth, (low, high) = config.deformation_m, config.radius_m
     radii = np.linspace(depth, 0.040, 400)
     sampled = radii[(radii >= low) & (radii <= high)]

@@ -29,7 +29,7 @@ class Value(nn.Module):
     ) -> None:
         super().__init__()
         ranges = _parameter_ranges(gripper)
-        self.direct, self.stroke, self.force = gripper.is_direct, gripper.stroke, _usual_force(gripper)
+        self.direct, self.stroke, self.force = gripper.is_direct, gripper.stroke, _large_force(gripper)
         extra = len(ranges) + 2 + len(gripper.motors) + 1 if privileged else 0
         self.net = MLP(
             in_features=observation_size + extra, out_features=1, num_cells=list(hidden), activation_class=nn.Tanh
@@ -57,15 +57,17 @@ class Value(nn.Module):
 
 
 def _parameter_ranges(gripper: Gripper) -> list[tuple[float, float]]:
-    """What the grasp's parameters (kappa, b2, radius, offset, goal force) usually are, to bring them to about [-1, 1]."""
+    """Where kappa, b2, radius, offset and goal force of a grasp usually lie, to bring them to about [-1, 1]."""
     training = gripper.training
-    room = min(training.offset_m[1], training.radius_m[1] - training.deformation_m) / 2
-    return [(0.0, 1.0), training.servo_gain_range, training.radius_m, (-room, room), (0.0, 2 * _usual_force(gripper))]
+    middle, depth = sum(training.offset_m) / 2, training.deformation_m
+    offset = (middle - depth, middle + depth)
+    return [(0.0, 1.0), training.servo_gain_range, training.radius_m, offset, (0.0, _large_force(gripper))]
 
 
-def _usual_force(gripper: Gripper) -> float:
-    """A force of the size that goals have, newtons."""
-    return gripper.training.max_force_n * float(gripper.training.force_scale(0.5)) / 2
+def _large_force(gripper: Gripper) -> float:
+    """Two thirds of the largest force of any object, newtons: few goals lie above."""
+    training = gripper.training
+    return training.max_force_n * max(float(training.force_scale(kappa)) for kappa in (0.0, 1.0)) / 3 * 2
 
 
 #: What an update reports, by the names of torchrl's loss.

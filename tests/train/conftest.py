@@ -8,7 +8,10 @@ from pathlib import Path
 
 import pytest
 
+from forcegrasp.assets import DEFAULT_GRIPPER
 from forcegrasp.config import TrainConfig, validate
+from forcegrasp.physics import load_gripper
+from forcegrasp.physics.completion import complete
 from forcegrasp.runs.run_dir import RunDir
 from forcegrasp.train.loop import train
 
@@ -20,8 +23,8 @@ TINY = {
 }
 
 
-def tiny_config(seed: int = 0, **sections: dict) -> TrainConfig:
-    config = TrainConfig(seed=seed)
+def tiny_config(seed: int = 0, gripper: str = DEFAULT_GRIPPER, **sections: dict) -> TrainConfig:
+    config = TrainConfig(seed=seed, gripper=gripper)
     for options in (TINY, sections):
         for section, values in options.items():
             owner = getattr(config, section)
@@ -29,7 +32,7 @@ def tiny_config(seed: int = 0, **sections: dict) -> TrainConfig:
                 assert hasattr(owner, name), name
                 setattr(owner, name, value)
     validate(config)
-    return config
+    return complete(config, load_gripper(config.gripper))
 
 
 def read_metrics(run: RunDir) -> list[dict[str, float]]:
@@ -46,7 +49,7 @@ def train_in(path: Path, config: TrainConfig) -> RunDir:
 
 @pytest.fixture(scope="session")
 def tiny() -> Callable[..., TrainConfig]:
-    """``tiny(seed=0, ppo={...}, ...)``: five batches of two short grasps, unless told otherwise."""
+    """``tiny(seed=0, gripper="NAME", ppo={...}, ...)``: five batches of two short grasps, unless told otherwise."""
     return tiny_config
 
 
