@@ -24,6 +24,8 @@ from forcegrasp.config import (
 )
 from forcegrasp.errors import ConfigError
 from forcegrasp.evaluate.compare_policies import evaluate
+from forcegrasp.physics import load_gripper
+from forcegrasp.physics.completion import complete
 from forcegrasp.runs import checkpoint
 from forcegrasp.runs.run_dir import RunDir
 from forcegrasp.train.loop import Trainer, train
@@ -74,6 +76,7 @@ ELSEWHERE = ("physics.engine", "physics.device")
 #: The same, for the options of training alone.
 TRAIN_CASES: dict[str, Any] = {
     "seed": 1,
+    "gripper": "franka_hand",
     "model": str(MODEL),
     **SHARED_CASES,
     "observation.parts": ["position", "force"],
@@ -130,6 +133,7 @@ EVALUATE_CASES: dict[str, Any] = {
     "objects": "paper",
     "kappas": 3,
     "trials": 3,
+    "gripper": "franka_hand",
     "seed": 1,
     "model": str(MODEL),
     **SHARED_CASES,
@@ -141,6 +145,7 @@ EVALUATE_CASES: dict[str, Any] = {
 RENDER_CASES: dict[str, Any] = {
     "policies": "[informed]",
     "out": "elsewhere.gif",
+    "gripper": "franka_hand",
     "seed": 1,
     "kappa": 0.1,
     "b2": -6.5,
@@ -187,6 +192,7 @@ def _is_outcome(path: Path) -> bool:
 def trained(folder: Path, **values: Any) -> dict[str, Any]:
     """What a tiny training leaves behind, less what merely repeats its configuration or tells its speed."""
     config = with_options(TrainConfig(), TINY_TRAINING | values)
+    config = complete(config, load_gripper(config.gripper))
     run = RunDir.create(folder, config, [])
     assert train(config, run)
     files = sorted(str(path.relative_to(folder)) for path in folder.rglob("*.*") if _is_outcome(path))
@@ -311,7 +317,7 @@ def test_engine_and_device_reach_the_simulator(verb, tmp_path, monkeypatch):
     """What they simulate is tested in tests/gpu; here they may be missing."""
     asked = []
 
-    def begin(n, tier, device):
+    def begin(n, tier, device, gripper):
         asked.append(device)
         raise ConfigError("enough")
 

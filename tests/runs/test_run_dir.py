@@ -21,6 +21,8 @@ from forcegrasp.config import TrainConfig
 from forcegrasp.errors import CheckpointError
 from forcegrasp.runs import checkpoint
 from forcegrasp.runs.policy import load_policy
+from forcegrasp.physics import default_gripper
+from forcegrasp.physics.completion import complete
 from forcegrasp.runs.run_dir import RunDir, fingerprint
 
 
@@ -133,7 +135,8 @@ def test_older_checkpoints_are_removed_only_after_the_new_one_is_written(run, mo
 
 
 def test_config_round_trip(tmp_path):
-    config = compose("train", ["experiment=no_rand", "sensors=authors", "ppo.hidden=[3,4,5]", "ppo.learning_rate=1e-7"])
+    changed = ["experiment=no_rand", "sensors=authors", "ppo.hidden=[3,4,5]", "ppo.learning_rate=1e-7"]
+    config = complete(compose("train", changed), default_gripper())
     run = RunDir.create(tmp_path / "run", config, [])
     assert RunDir.open(run.path).config() == config
     assert yaml.safe_load(run.config_path.read_text())["grasp"]["b2"] == [-9.0, -9.0]
@@ -274,7 +277,8 @@ def test_failed_creation_can_be_repeated(tmp_path, monkeypatch):
         patch.setattr(os, "replace", full)
         with pytest.raises(CheckpointError, match="No space left"):
             RunDir.create(tmp_path / "run", TrainConfig(), [])
-    assert RunDir.create(tmp_path / "run", TrainConfig(), []).config() == TrainConfig()
+    config = complete(TrainConfig(), default_gripper())
+    assert RunDir.create(tmp_path / "run", config, []).config() == config
 
 
 def test_provenance(run):
