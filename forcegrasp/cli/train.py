@@ -64,15 +64,15 @@ def _run(overrides: list[str]) -> int:
     config, run_dir = compose_run("train", overrides, _run_name(overrides))
     if preset := next((o for o in overrides if o.startswith("sweep=") and o != "sweep=none"), ""):
         raise ConfigError(f"{preset} is several runs: add -m to run one after another")
-    config, gripper = _check(config)
+    config = _check(config)
     _join(config)
     return _begin(config, Path(run_dir), overrides)
 
 
 def _run_name(overrides: list[str]) -> list[str]:
     """An override that puts gripper and model, where they are given, into the run's name; else none."""
-    given = {parsed.get_key_element(): parsed for parsed in map(parse_override, overrides)}
-    names = [_name_of(key, given[key]) for key in ("gripper", "model") if key in given]
+    given = {text.partition("=")[0]: text for text in overrides}
+    names = [_name_of(key, parse_override(given[key])) for key in ("gripper", "model") if key in given]
     if not any(names):
         return []
     return [f"hydra.job.name='${{hydra:runtime.choices.experiment}}_{'_'.join(filter(None, names))}'"]
@@ -99,8 +99,8 @@ def _completed(config: TrainConfig) -> tuple[TrainConfig, Gripper]:
     return dataclasses.replace(complete(config, gripper), gripper=gripper.name_or_path), gripper
 
 
-def _check(config: TrainConfig) -> tuple[TrainConfig, Gripper]:
-    """Refuses what can't be trained before anything is written; returns the whole configuration, and the gripper."""
+def _check(config: TrainConfig) -> TrainConfig:
+    """Refuses what can't be trained before anything is written; returns the whole configuration."""
     from forcegrasp.config import validate
     from forcegrasp.gpu import check_engine
     from forcegrasp.gpu.installation import check_gripper_for_warp
@@ -123,7 +123,7 @@ def _check(config: TrainConfig) -> tuple[TrainConfig, Gripper]:
         from forcegrasp.train.cluster import find_ray
 
         find_ray()
-    return config, gripper
+    return config
 
 
 def _join(config) -> None:

@@ -58,8 +58,13 @@ class GraspConfig:
         [], "offset_m", "object offset along the grasp axis, o_y", unit="m", source="paper, Table 2", low=-1, high=1
     )
     deformation_m: float = of_gripper(
-        math.nan, "deformation_m", "largest object deformation d_p, both sides together", unit="m",
-        source="authors' code", low=0, high=0.5,
+        math.nan,
+        "deformation_m",
+        "largest object deformation d_p, both sides together",
+        unit="m",
+        source="authors' code",
+        low=0,
+        high=0.5,
     )
     goal_force_min_n: float = of_gripper(
         math.nan, "goal_force_min_n", "smallest goal force", unit="N", source="authors' code", low=1e-4, high=1e4

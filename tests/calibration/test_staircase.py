@@ -50,12 +50,18 @@ def test_slopes_of_the_paper():
     # The law's 100 N/m per f_α: sponge and wood differ by less than a tenth of the interval [0.5, 5].
     scales = match_force_scale([278.0, 330.0], 100.0)
     np.testing.assert_allclose(scales, [2.78, 3.30])
-    np.testing.assert_allclose(default_gripper().training.kappa_of_force_scale(scales), [(5 - 2.78) / 4.5, (5 - 3.30) / 4.5])
+    np.testing.assert_allclose(
+        default_gripper().training.kappa_of_force_scale(scales), [(5 - 2.78) / 4.5, (5 - 3.30) / 4.5]
+    )
 
 
 def test_kappa_and_force_scale_are_inverse():
     kappa = np.linspace(0, 1, 11)
-    np.testing.assert_allclose(default_gripper().training.kappa_of_force_scale(default_gripper().training.force_scale(kappa)), kappa, atol=1e-12)
+    np.testing.assert_allclose(
+        default_gripper().training.kappa_of_force_scale(default_gripper().training.force_scale(kappa)),
+        kappa,
+        atol=1e-12,
+    )
     np.testing.assert_array_equal(default_gripper().training.kappa_of_force_scale(np.array([0.1, 9.0])), [1.0, 0.0])
 
 

@@ -22,7 +22,7 @@ def is_number(value) -> bool:
 def sample(entry, default):
     """A default; of an option that is left to the gripper, a value of its kind."""
     low = entry.metadata["low"]
-    return (default if not entry.metadata["of_gripper"] else [low, low] if isinstance(default, list) else float(low))
+    return default if not entry.metadata["of_gripper"] else [low, low] if isinstance(default, list) else float(low)
 
 
 def first(default):

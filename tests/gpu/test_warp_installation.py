@@ -44,4 +44,6 @@ def test_a_device_that_the_engine_cannot_use():
 
 def test_no_effects(installed):
     with pytest.raises(ConfigError, match="model: engine warp simulates the nominal gripper alone"):
-        GraspEnv(2, PhysicsConfig(engine="warp"), GraspConfig(), model=read_model_of(default_gripper(), "virtual_robot"))
+        GraspEnv(
+            2, PhysicsConfig(engine="warp"), GraspConfig(), model=read_model_of(default_gripper(), "virtual_robot")
+        )

@@ -307,7 +307,11 @@ TOUCH = '<touch name="touch_east" site="east"/>'
         ("</mujoco>", "", "not XML"),
         ("<mujoco", "\x00\x01", "not XML"),
         ('axis="1 0 0" range', 'axis="0 0 0" range', "MuJoCo refuses it"),
-        (WEST, '<joint name="west" type="hinge"/>', "fingers.closed=0.05: the left joint goes from 0 to 0.000872665 rad"),
+        (
+            WEST,
+            '<joint name="west" type="hinge"/>',
+            "fingers.closed=0.05: the left joint goes from 0 to 0.000872665 rad",
+        ),
         (WEST, '<joint name="west" axis="0 0 1"/>', "fingers.joints: 'west' must open towards -x"),
         (WEST, '<joint name="west" axis="-1 0 0"/>', "fingers.joints: 'west' must open towards -x"),
         (WEST, '<joint name="west" range="0 0.04"/>', "fingers.closed=0.05: the left joint goes from 0 to 0.04 m"),

@@ -19,10 +19,10 @@ import yaml
 from forcegrasp.cli.options import compose
 from forcegrasp.config import TrainConfig
 from forcegrasp.errors import CheckpointError
-from forcegrasp.runs import checkpoint
-from forcegrasp.runs.policy import load_policy
 from forcegrasp.physics import default_gripper
 from forcegrasp.physics.completion import complete
+from forcegrasp.runs import checkpoint
+from forcegrasp.runs.policy import load_policy
 from forcegrasp.runs.run_dir import RunDir, fingerprint
 
 
