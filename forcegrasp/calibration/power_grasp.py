@@ -23,7 +23,7 @@ def power_grasps(
 
     Args:
       values: of the parameter, ``(n,)``.
-      parameter: its name in the gripper's description; ``velocity_gain`` is TIAGo's b₂, in N·s/m.
+      parameter: its name in the gripper's description; ``velocity_gain`` is the paper's b₂, in N·s/m.
       radius_m: radius of an object in the middle of the grasp; none by default.
       delta_m: Δq, metres.
       seconds: how long.

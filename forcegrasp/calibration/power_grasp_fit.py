@@ -14,7 +14,7 @@ from forcegrasp.calibration.power_grasp import speed
 from forcegrasp.calibration.rig import FINAL_S, MAX_DELTA_M, SAMPLE_S, close, parameter_of
 from forcegrasp.errors import ConfigError, MeasurementError
 from forcegrasp.physics.gripper import Gripper
-from forcegrasp.physics.gripper_file import load_gripper
+from forcegrasp.physics.gripper_file import default_gripper
 
 # Values of the parameter that are simulated, to interpolate between: 25 of b₂ come within 1 µm of a simulation.
 _TABLE = 25
@@ -72,14 +72,14 @@ def fit_power_grasp(
       delta_m: Δq that was commanded again and again, metres.
       start_s: when the first command was sent, if that is known.
       period_s: seconds between two commands; the gripper's by default.
-      gripper: TIAGo's by default.
+      gripper: the paper's by default.
       tier: physics tier.
 
     Raises:
       MeasurementError: if the trajectory is none that could be fitted; says why.
       ConfigError: if there is no such parameter, or the start lies outside the measurement.
     """
-    gripper = gripper or load_gripper("tiago")
+    gripper = gripper or default_gripper()
     entry = parameter_of(gripper, parameter)
     clock_s, position = _free_closing(time_s, position_m, gripper)
     time = clock_s - clock_s[0]  # a robot's clock may count from 1970, where differences drown in round-off

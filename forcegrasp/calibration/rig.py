@@ -10,12 +10,12 @@ import numpy as np
 
 from forcegrasp.errors import ConfigError, PhysicsError, closest
 from forcegrasp.physics.gripper import Gripper
-from forcegrasp.physics.gripper_file import load_gripper
+from forcegrasp.physics.gripper_file import default_gripper
 from forcegrasp.physics.gripper_parts import BaseParameter
 from forcegrasp.physics.plant import Plant, write_base
 
-#: Largest position delta, Δq_max, metres (paper, appendix).
-MAX_DELTA_M = 0.003
+#: Largest position delta, Δq_max, of the paper's gripper, metres (paper, appendix).
+MAX_DELTA_M = default_gripper().max_step
 #: Seconds between two samples.
 SAMPLE_S = 0.004
 #: Seconds at the end over which a final value is averaged.
@@ -74,7 +74,7 @@ def close(
       seconds: how long.
       values: base parameters by their names in the gripper's description, each ``(n,)`` or one for all; what is not
         named keeps the scene's value.
-      gripper: TIAGo's by default.
+      gripper: the paper's by default.
       touching: whether there is anything to touch; without, fingers close until they stop.
       start_m: where the fingers start, metres, ``(n,)`` or one for all; open by default.
       tier: physics tier, ``"reference"`` or ``"fast"``.
@@ -85,7 +85,7 @@ def close(
       ConfigError: if a parameter is unknown, a value is none that can be simulated, or lengths differ.
       PhysicsError: if a simulation diverged.
     """
-    gripper = gripper or load_gripper("tiago")
+    gripper = gripper or default_gripper()
     given = {"delta_m": delta_m, **(values or {})} | ({} if start_m is None else {"start_m": start_m})
     columns = _columns(gripper, given)
     delta = columns.pop("delta_m")

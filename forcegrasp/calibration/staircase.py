@@ -12,7 +12,7 @@ from forcegrasp.calibration.stiffness import RADIUS_M, kappa_values
 from forcegrasp.compare.final_force_shapes import BIAS, bootstrap, fit_shape
 from forcegrasp.errors import ConfigError, MeasurementError
 from forcegrasp.physics.gripper import Gripper
-from forcegrasp.physics.gripper_file import load_gripper
+from forcegrasp.physics.gripper_file import default_gripper
 
 #: The paper's commands: from 0.3 mm in steps of 0.3 mm up to Δq_max. Metres.
 DELTAS_M = np.arange(1, 11) * MAX_DELTA_M / 10
@@ -67,7 +67,7 @@ def staircase(
         objects have a radius of 25 mm unless it is given.
       deltas_m: Δq, metres, ``(d,)``.
       seconds: how long each squeeze is held.
-      gripper: TIAGo's by default.
+      gripper: the paper's by default.
       **more: further arguments of :func:`~forcegrasp.calibration.rig.close`.
 
     Raises:
@@ -75,7 +75,7 @@ def staircase(
     """
     if (kappa is None) == (values is None):
         raise ConfigError("a staircase needs the objects' kappa, or their values, and not both")
-    gripper = gripper or load_gripper("tiago")
+    gripper = gripper or default_gripper()
     given = {"radius_m": RADIUS_M} | (dict(values or {}) if kappa is None else kappa_values(kappa))
     columns = {name: column_of(name, value) for name, value in given.items()}
     objects = max(map(len, columns.values()))

@@ -14,7 +14,7 @@ _RADII, _START_RADII, _DEFORMATION = (0.4, 0.75), (0.5, 0.6), 0.4
 # Noise of encoders as a share of the stroke, and of force sensors as one of the largest force; a finger counts as
 # touching at so many times the noise, and the smallest goal is so many times that.
 _POSITION_NOISE, _FORCE_NOISE, _TOUCHING, _SMALLEST_GOAL = 6e-4, 0.02, 4.0, 2.0
-# The hand-written controller closes with this share of the largest step: 4 of 3 mm on TIAGo (authors' code).
+# The hand-written controller closes with this share of the largest step: 4 mm of 3 mm in the authors' code.
 _CLOSING = 4 / 3
 
 

@@ -33,7 +33,7 @@ _PERIOD_S, _STEP = 0.04, 1 / 15
 
 
 def load_gripper(name: str | Path, folder: str | Path = "") -> Gripper:
-    """Returns a gripper by name (``tiago``) or by the path of its description.
+    """Returns a gripper by name (see :func:`shipped_grippers`) or by the path of its description.
 
     Args:
       name: what ``gripper:`` says in a measurement set.

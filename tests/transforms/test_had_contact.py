@@ -8,6 +8,7 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from tensordict import TensorDict
 from torchrl.envs import TransformedEnv
 
 from forcegrasp.transforms import HadContact
@@ -83,3 +84,17 @@ def test_each_episode_starts_anew(fake_grasp, play) -> None:
     starts = torch.cat([torch.ones(ROWS, 1, 1, dtype=torch.bool), rollout["next", "done"][:, :-1]], 1)
     assert starts.sum() > 2 * ROWS
     np.testing.assert_array_equal(rollout["had_contact"].numpy(), (~starts).expand(-1, -1, 2).numpy())
+
+
+def test_a_motor_that_moves_has_no_contact() -> None:
+    """Where its effort is read: force counts only in steps in which it stood nearly still."""
+    moves, forces = [0.02, 0.0009, 0.0011, 0.0], [1.0, 0.01, 1.0, 1.0]
+    transform, position = HadContact(0.05, stall=0.001), 0.5
+    frame = TensorDict({"sensed_force": torch.zeros(1, 1), "sensed_position": torch.full((1, 1), position)}, [1])
+    frame, seen = transform._reset(frame, frame), []
+    for move, force in zip(moves, forces, strict=True):
+        position -= move
+        values = {"sensed_force": torch.full((1, 1), force), "sensed_position": torch.full((1, 1), position)}
+        frame = transform._step(frame, TensorDict(values, [1]))
+        seen.append(bool(frame["had_contact"]))
+    assert seen == [False, False, False, True]

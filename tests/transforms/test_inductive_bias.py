@@ -65,6 +65,29 @@ def test_phases_of_a_grasp(h: list, error: list, want: list) -> None:
     np.testing.assert_allclose(bias, [want], rtol=1e-6)
 
 
+@pytest.mark.parametrize(
+    ("h", "error", "want"),
+    [
+        ([0, 0], [0.5, 0.5], 1),
+        ([1, 0], [0.0, 0.5], 1),  # between the touches it closes on
+        ([0, 1], [0.5, 0.0], 1),
+        ([1, 1], [0.02, -0.03], 0.95),  # of the mean error
+        ([1, 1], [0.5, 0.5], 0.9),
+        ([0], [0.5], 1),
+        ([1], [0.02], 0.96),
+        ([1], [0.5], 0.9),
+    ],
+)
+def test_phases_of_a_grasp_with_one_motor(h: list, error: list, want: float) -> None:
+    bias = contact_bias(*tensors([h], [error], [[0.5]]), 0.1, 0.9, 1)
+    np.testing.assert_allclose(bias, [[want]], rtol=1e-6)
+
+
+def test_two_motors_with_one_reading_move_alike() -> None:
+    bias = contact_bias(*tensors([[1], [0]], [[0.02], [0.02]], [[0.5], [0.5]]), 0.1, 0.9, 2)
+    np.testing.assert_allclose(bias, [[0.96, 0.96], [1, 1]], rtol=1e-6)
+
+
 def test_never_reverses_with_floor_zero() -> None:
     bias = contact_bias(*tensors([[1, 1]], [[9.0, -9.0]], [[0.5]]), 0.0, 0.0, 2)
     assert bias.tolist() == [[0.0, 0.0]]

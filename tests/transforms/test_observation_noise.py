@@ -134,3 +134,11 @@ def test_lengths_must_agree(out_keys: list[str], std: list[float]) -> None:
 
 def test_readings_may_leave_the_bounds_of_the_truth(fake_grasp) -> None:
     check_env_specs(TransformedEnv(fake_grasp(bounded=True), ObservationNoise(**KEYS, std=[0.0, 1.0])))
+
+
+def test_rounding_comes_after_the_noise() -> None:
+    frames, step = make_frames().double(), [1e-3, 0.1]
+    noisy, rounded = (ObservationNoise(**KEYS, std=STDS, seed=2, step=s)(frames.clone()) for s in (None, step))
+    for key, size in zip(KEYS["out_keys"], step, strict=True):
+        np.testing.assert_array_equal(rounded[key], size * (noisy[key] / size).round())
+        assert not torch.equal(rounded[key], noisy[key])
