@@ -17,8 +17,8 @@ class ForcePI(TensorDictModuleBase):
 
     A finger that has not touched closes at full speed; one that has waits for the other; once all have, the force
     errors divided by the assumed stiffness k enter a PI law and all motors get the same position delta:
-    Δq = −(1/F) Σ_i (K_p e_i + K_i I_i), e_i = Δf_i / k, over F force readings, where the one integral I runs on over all
-    of them. Where readings and motors are not one to one, motors close until every reading has shown contact.
+    Δq = −(1/F) Σ_i (K_p e_i + K_i I_i), e_i = Δf_i / k, over F force readings, where the one integral I runs on over
+    all of them. Where readings and motors are not one to one, motors close until every reading has shown contact.
 
     The integral lives in the tensordict (``force_integral``, metre (or radian) seconds, ``(*B, 1)``); an environment
     carries it once :meth:`make_tensordict_primer` is appended to it.

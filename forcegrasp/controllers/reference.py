@@ -29,9 +29,9 @@ class Constant(TensorDictModuleBase):
 class InformedFeedForward(TensorDictModuleBase):
     """Static feed-forward that is told the object's force scale: waits on first touch, then commands one position.
 
-    f = f_max · f_α · Δq / Δq_max at rest in the simulator, hence a = −f_goal / (f_max · f_α) once every reading has shown
-    contact. It looks at no force and makes nothing faster, so that it is no upper bound: the force rises as the servo lets
-    it, and a controller that pushes harder at first can be better.
+    f = f_max · f_α · Δq / Δq_max at rest in the simulator, hence a = −f_goal / (f_max · f_α) once every reading has
+    shown contact. It looks at no force and makes nothing faster, so that it is no upper bound: the force rises as the
+    servo lets it, and a controller that pushes harder at first can be better.
     """
 
     def __init__(self, gripper: Gripper | None = None) -> None:

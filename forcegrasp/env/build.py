@@ -61,12 +61,12 @@ def build_env(
     model: Model | str | Path | None = None,
     seed: int = 0,
 ) -> TransformedEnv:
-    """Returns ``n`` grasps with ``observation`` ``(n, size · frames)`` in and ``action`` ``(n, motors)`` in [−1, 1] out.
+    """Returns ``n`` grasps with ``observation`` ``(n, size · frames)`` in, ``action`` ``(n, motors)`` in [−1, 1] out.
 
-    Readings come first (noise, then rounding), then what is computed from readings (contact, error), then memory, then the stacked
-    observation; on the way back the action is denormalised, then biased. Parts left out use their defaults, and options
-    left out the gripper's (by name, or the path of its description). A ``model`` fitted to measurements, or its file,
-    brings its base parameters and effects, drawn anew for every grasp.
+    Readings come first (noise, then rounding), then what is computed from readings (contact, error), then memory, then
+    the stacked observation; on the way back the action is denormalised, then biased. Parts left out use their defaults,
+    and options left out the gripper's (by name, or the path of its description). A ``model`` fitted to measurements, or
+    its file, brings its base parameters and effects, drawn anew for every grasp.
 
     Raises:
       ConfigError: if an option is out of its range, the gripper reads no forces, or the model can't be read or is of
@@ -88,7 +88,7 @@ def build_env(
             out_keys=["sensed_position", "sensed_force"],
             std=[sensors.position_std_m, sensors.force_std_n],
             device=grasps.device,
-            step=rounding_steps((found.effect, found.values) for found in model.effects).tolist() if model else None,
+            step=rounding_steps((found.effect, found.values) for found in known.effects).tolist() if known else None,
         ),
         HadContact(sensors.contact_threshold_n, stall=gripper.stall),
         ForceError(),

@@ -93,7 +93,7 @@ class GraspEnv(EnvBase):
         self.action_spec = Composite(joint_delta=delta, shape=(n,), device=self.device)
         self.observation_spec = Composite(shape=(n,), device=self.device)
         for key, (size, _) in OBSERVATIONS.items():
-            self.observation_spec[key] = unbounded(sizes.get(size, size))
+            self.observation_spec[key] = unbounded(size if isinstance(size, int) else sizes[size])
         self.observation_spec["reward_terms"].shape = torch.Size([n])
         self.reward_spec = unbounded(1)
         flag = Categorical(2, shape=torch.Size([n, 1]), dtype=torch.bool, device=self.device)

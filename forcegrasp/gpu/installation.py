@@ -39,8 +39,9 @@ def check_gripper_for_warp(gripper: Gripper) -> None:
     plain = all(m.closed == 0 and m.open > 0 for m in gripper.motors) and all(f.force_sensor for f in gripper.fingers)
     if not (gripper.is_direct and plain and gripper.shape == "cylinder" and written <= WRITTEN):
         raise ConfigError(
-            f"physics.engine=warp: does not take gripper {gripper.name}; it takes two motors that slide a finger each from"
-            f" 0 up, a force sensor per finger, a cylinder, and drawn parameters that write {' or '.join(sorted(WRITTEN))}"
+            f"physics.engine=warp: does not take gripper {gripper.name}; it takes two motors that slide a finger each"
+            " from 0 up, a force sensor per finger, a cylinder, and drawn parameters that write"
+            f" {' or '.join(sorted(WRITTEN))}"
         )
 
 

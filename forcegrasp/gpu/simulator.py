@@ -29,8 +29,8 @@ class WarpGraspSimulator:
       gripper: what is simulated; the paper's by default.
 
     Raises:
-      ConfigError: if there is no such tier, MuJoCo Warp is not installed, there is no such device, or the engine does not
-        take the gripper.
+      ConfigError: if there is no such tier, MuJoCo Warp is not installed, there is no such device, or the engine does
+        not take the gripper.
     """
 
     def __init__(self, n: int, tier: str = "fast", device: str = "cpu", gripper: Gripper | None = None) -> None:

@@ -110,8 +110,8 @@ def _check_motor(gripper: Gripper, model: mujoco.MjModel, motor: Motor, index: i
 def _check_finger(gripper: Gripper, model: mujoco.MjModel, finger: Finger, names: Mapping[str, str]) -> None:
     if finger.force_sensor and not _reads_a_press(model, model.sensor(finger.force_sensor).id):
         raise ConfigError(
-            f"{gripper.path}: {names['sensor']}: {finger.force_sensor!r} must be a touch sensor, or a contact sensor with"
-            " data='force' and not reduce='netforce': its numbers are summed, and must be positive when the finger"
+            f"{gripper.path}: {names['sensor']}: {finger.force_sensor!r} must be a touch sensor, or a contact sensor"
+            " with data='force' and not reduce='netforce': its numbers are summed, and must be positive when the finger"
             " presses"
         )
 

@@ -111,7 +111,7 @@ class Plant:
         #: True fingertip forces (left, right): the interaction with the object times f_α, newtons, ``(n, 2)``.
         self.force = np.zeros((n, 2))
         self.transduced_force = np.zeros((n, self.channels))  #: what goes into the force readings, newtons
-        #: The same after effects and before noise and rounding: what the force readings say, newtons, ``(n, channels)``.
+        #: The same after effects, before noise and rounding: what the force readings say, newtons, ``(n, channels)``.
         self.measured_force = np.zeros((n, self.channels))
         self.measured_position = np.zeros((n, self.motors))  #: what the encoders say, m or rad
         #: What the encoders said when a real gripper was recorded, m or rad, ``(n, motors)``; None if only simulated.

@@ -19,9 +19,9 @@ def offset_limits_m(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Where an object of this radius may stand along the grasp axis: lowest and highest o_y, metres, each ``(n,)``.
 
-    Eq. 1 of the paper keeps the object inside the open gripper, \\|o_y\\| + r < q_max; eq. 2 lets both fingers reach it,
-    r − d_p > \\|o_y\\|. Both are strict, hence the last bit taken off. A finger that stands still reaches nothing: the
-    object has to be beside it, and the other finger brings it there.
+    Eq. 1 of the paper keeps the object inside the open gripper, \\|o_y\\| + r < q_max; eq. 2 lets both fingers reach
+    it, r − d_p > \\|o_y\\|. Both are strict, hence the last bit taken off. A finger that stands still reaches nothing:
+    the object has to be beside it, and the other finger brings it there.
     """
     radius, law = np.asarray(radius_m, float), gripper.opening
     left, right = law.faces_m
@@ -40,8 +40,8 @@ class GraspSampler:
       gripper: whose objects they are; the paper's by default.
 
     Raises:
-      ConfigError: if the smallest object could be squeezed flat (paper, eq. 3: d_p < r), the largest does not fit in, or
-        a servo gain is out of the description's bounds.
+      ConfigError: if the smallest object could be squeezed flat (paper, eq. 3: d_p < r), the largest does not fit in,
+        or a servo gain is out of the description's bounds.
     """
 
     def __init__(self, config: GraspConfig, gripper: Gripper | None = None) -> None:

@@ -18,8 +18,8 @@ def contact_bias(
     waits for the other; with both in contact ``max(floor, 1 − |Δf| / f_goal)``.
 
     Else, as with one motor for two fingers, all motors have the same φ: 1 until every reading has shown contact, and
-    then ``max(floor, 1 − |Δf| / f_goal)`` of the mean error. Between the first and the second finger's touch nothing can
-    wait: the motor closes on, and the finger that has touched pushes the object towards the other one.
+    then ``max(floor, 1 − |Δf| / f_goal)`` of the mean error. Between the first and the second finger's touch nothing
+    can wait: the motor closes on, and the finger that has touched pushes the object towards the other one.
 
     Args:
       had_contact: h, 0 or 1, ``(*B, channels)``.

@@ -70,7 +70,7 @@ def test_readings_are_rounded_after_the_noise(gripper):
 
 @pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
 def test_recording_and_environment_read_the_same(gripper, dtype):
-    """From one state and the same normal numbers, to the last bit: what record makes with numpy, and what policies see."""
+    """From one state and the same normal numbers, to the last bit: record, with numpy, and what policies see."""
     env = build(gripper, model=rounding_model(gripper))
     state = env.rollout(30, break_when_any_done=False).get("next").to(dtype)
     noise = next(t for t in env.transform if isinstance(t, ObservationNoise))

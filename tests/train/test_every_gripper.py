@@ -1,4 +1,4 @@
-"""Training with gripper=: every shipped one trains and resumes; what can't be trained is refused and nothing written."""
+"""Training with gripper=: every shipped one trains and resumes; what can't be trained is refused, nothing written."""
 
 from __future__ import annotations
 

@@ -66,8 +66,16 @@ CHANGED = [
 NEEDED = {(HadContact, "position_key"): {"stall": 0.2}}
 SIZES = {
     **dict.fromkeys(
-        ["joint_position", "sensed_position", "force", "sensed_force", "force_error", "last_action", "had_contact"]
-        + ["spare"],
+        [
+            "joint_position",
+            "sensed_position",
+            "force",
+            "sensed_force",
+            "force_error",
+            "last_action",
+            "had_contact",
+            "spare",
+        ],
         2,
     ),
     "goal_force": 1,
