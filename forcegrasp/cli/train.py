@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 from forcegrasp.assets import DEFAULT_GRIPPER
-from forcegrasp.cli.options import compose, compose_run, compose_sweep, help_text, parse_override
+from forcegrasp.cli.options import compose, compose_run, compose_sweep, help_text, parse_override, spell_sweep
 from forcegrasp.errors import ConfigError, ForcegraspError
 
 if TYPE_CHECKING:

@@ -65,19 +65,8 @@ CHANGED = [
 #: What else has to be given for an option to matter.
 NEEDED = {(HadContact, "position_key"): {"stall": 0.2}}
 SIZES = {
-    **dict.fromkeys(
-        [
-            "joint_position",
-            "sensed_position",
-            "force",
-            "sensed_force",
-            "force_error",
-            "last_action",
-            "had_contact",
-            "spare",
-        ],
-        2,
-    ),
+    **dict.fromkeys(["joint_position", "sensed_position", "force", "sensed_force", "force_error"], 2),
+    **dict.fromkeys(["last_action", "had_contact", "spare"], 2),
     "goal_force": 1,
 }
 
