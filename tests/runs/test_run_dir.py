@@ -26,9 +26,13 @@ from forcegrasp.runs.policy import load_policy
 from forcegrasp.runs.run_dir import RunDir, fingerprint
 
 
+def whole_config() -> TrainConfig:
+    return complete(TrainConfig(seed=7), default_gripper())
+
+
 @pytest.fixture
 def run(tmp_path) -> RunDir:
-    return RunDir.create(tmp_path / "run", TrainConfig(seed=7), ["seed=7"])
+    return RunDir.create(tmp_path / "run", whole_config(), ["seed=7"])
 
 
 def save(run: RunDir, *frames: int, keep: int = 99) -> list[Path]:
@@ -242,12 +246,12 @@ def test_creating_over_a_run_is_refused(run):
 def test_a_run_without_a_checkpoint_can_be_begun_again(run):
     run.model_path.write_text("of a file that may have changed since")
     command = json.loads((run.path / "run.json").read_text())["command"]
-    assert RunDir.create(run.path, TrainConfig(seed=7), ["seed=7", "log.keep=3"]).config() == TrainConfig(seed=7)
+    assert RunDir.create(run.path, whole_config(), ["seed=7", "log.keep=3"]).config() == whole_config()
     assert not run.model_path.exists()
     assert json.loads((run.path / "run.json").read_text())["command"] == [*command, "log.keep=3"]
     save(run, 1)
     with pytest.raises(CheckpointError, match=f"already holds a run; continue it with resume={run.path}"):
-        RunDir.create(run.path, TrainConfig(seed=7), [])
+        RunDir.create(run.path, whole_config(), [])
 
 
 def test_a_run_with_nothing_but_its_best_goes_on_from_that(run):
@@ -285,7 +289,7 @@ def test_provenance(run):
     facts = json.loads((run.path / "run.json").read_text())
     assert facts["command"] == ["forcegrasp", "train", "seed=7"]
     assert facts["seed"] == 7
-    assert facts["config"] == fingerprint(dataclasses.asdict(TrainConfig(seed=7)))
+    assert facts["config"] == fingerprint(dataclasses.asdict(whole_config()))
     assert facts["python"] == ".".join(map(str, sys.version_info[:3]))
     for package in ("torch", "torchrl", "mujoco", "numpy", "forcegrasp"):
         assert facts["versions"][package] == version(package)
