@@ -180,5 +180,5 @@ def test_a_model_may_be_given_as_its_file(root, kind):
 def test_a_model_of_another_gripper_is_refused(root):
     model = read_model(root / "forcegrasp" / "assets" / "virtual_robot.yaml")
     other = dataclasses.replace(model, gripper=dataclasses.replace(model.gripper, name="robotiq"))
-    with pytest.raises(ConfigError, match="model: is of gripper robotiq; the environment simulates tiago"):
+    with pytest.raises(ConfigError, match="model: is of gripper robotiq, and gripper=tiago is asked for"):
         build_env(1, model=other)

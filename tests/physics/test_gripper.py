@@ -346,8 +346,10 @@ def test_missing_description(tmp_path):
     assert "Is a directory" in _refusal(_folder(tmp_path / "folder.yaml"))
     with pytest.raises(ConfigError, match=r"gripper=tiaga: no such gripper; did you mean tiago\?; or give"):
         load_gripper("tiaga")
-    with pytest.raises(ConfigError, match=r"gripper=robotiq: no such gripper; known: tiago; or give"):
-        load_gripper("robotiq")  # models and objects lie beside the grippers and are none
+    for name in ("virtual_robot", "paper_objects"):  # models and objects lie beside the grippers and are none
+        known = "franka_hand, robotiq_2f85, so101_gripper, tiago"
+        with pytest.raises(ConfigError, match=rf"gripper={name}: no such gripper; known: {known}; or give"):
+            load_gripper(name)
 
 
 def _folder(path: Path) -> Path:
