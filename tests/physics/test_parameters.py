@@ -15,8 +15,10 @@ def test_softness_interpolates_between_hard_and_soft():
 
 
 def test_softness_of_a_force_scale_is_the_inverse_and_stays_a_softness():
-    np.testing.assert_allclose(default_gripper().training.kappa_of_force_scale(np.array([5, 3.875, 0.5])), [0, 0.25, 1], rtol=1e-15)
-    np.testing.assert_array_equal(default_gripper().training.kappa_of_force_scale(np.array([9.0, 0.1])), [0, 1])  # beyond the paper's interval
+    kappa = default_gripper().training.kappa_of_force_scale(np.array([5, 3.875, 0.5]))
+    np.testing.assert_allclose(kappa, [0, 0.25, 1], rtol=1e-15)
+    beyond = default_gripper().training.kappa_of_force_scale(np.array([9.0, 0.1]))  # the paper's interval
+    np.testing.assert_array_equal(beyond, [0, 1])
 
 
 def test_scalars_are_broadcast_and_nothing_is_shared():
