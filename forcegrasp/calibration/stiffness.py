@@ -54,7 +54,7 @@ def kappa_values(kappa: Values) -> dict[str, np.ndarray]:
     if not ((kappa >= 0) & (kappa <= 1)).all():
         raise ConfigError(f"kappa={kappa[~((kappa >= 0) & (kappa <= 1))][0]:g}: must lie in [0, 1]")
     training = default_gripper().training
-    return {"rho_m": training.at("rho_m", kappa), "force_scale": training.force_scale(kappa)}
+    return {"rho_m": np.asarray(training.at("rho_m", kappa)), "force_scale": np.asarray(training.force_scale(kappa))}
 
 
 def contact_slope(closing: Closing) -> np.ndarray:

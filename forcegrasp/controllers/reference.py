@@ -38,12 +38,12 @@ class InformedFeedForward(TensorDictModuleBase):
         super().__init__()
         gripper = gripper or default_gripper()
         self.in_keys, self.out_keys = ["had_contact", "goal_force", "grasp_parameters"], ["action"]
-        self.motors, self.training = len(gripper.motors), gripper.training
+        self.motors, self.reached = len(gripper.motors), gripper.training  # `training` is torch's own
 
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
         touched, goal, parameters = (tensordict.get(key) for key in self.in_keys)
         all_touched = touched.bool().all(-1, keepdim=True)
-        hold = -goal / (self.training.max_force_n * self.training.force_scale(parameters[..., :1]))
+        hold = -goal / (self.reached.max_force_n * self.reached.force_scale(parameters[..., :1]))
         waiting = (touched if touched.shape[-1] == self.motors else all_touched.to(goal.dtype)) - 1
         action = torch.where(all_touched, hold, waiting).clamp(-1, 1)
         return tensordict.set("action", action.expand(*action.shape[:-1], self.motors))

@@ -26,5 +26,5 @@ def _fill(config: Any, gripper: Gripper) -> None:
             _fill(value, gripper)
         elif name and is_left_out(value):
             source = gripper if hasattr(gripper, name) else gripper.training
-            own = getattr(source, name)
+            own: tuple[float, float] | float = getattr(source, name)
             setattr(config, entry.name, list(own) if isinstance(own, tuple) else own)

@@ -155,8 +155,8 @@ def _check_object(gripper: Gripper, model: mujoco.MjModel, data: mujoco.MjData) 
 
 
 def _check_write(where: str, model: mujoco.MjModel, write: FieldWrite) -> None:
-    field = getattr(model, write.field, None) if write.field in MODEL_FIELDS else None
-    if not isinstance(field, np.ndarray) or field.dtype.kind != "f":
+    field: np.ndarray | None = getattr(model, write.field, None) if write.field in MODEL_FIELDS else None
+    if field is None or not np.issubdtype(np.asarray(field).dtype, np.floating):
         known = [name for name in MODEL_FIELDS if name.startswith(("actuator_", "dof_", "geom_"))]
         raise ConfigError(f"{where} is no field of numbers in MuJoCo's model{closest(write.field, known)}")
     columns = field.shape[1] if field.ndim == 2 else None

@@ -33,7 +33,7 @@ def training_of_scene(gripper: Gripper, given: Mapping[str, Any]) -> Training:
         "offset_m": (-half, half),
         "start_offset_m": (0.0, 0.0),
         "max_force_n": force,
-        "softness": {},
+        "softness": dict[str, tuple[float, float]](),
         "servo_gain": "",
         "servo_gain_range": (0.0, 0.0),
         "position_std": _POSITION_NOISE * gripper.stroke,

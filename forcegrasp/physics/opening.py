@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import mujoco
@@ -35,7 +35,7 @@ class OpeningLaw:
         """Position of the motors at which the pads stand so far apart; the ends of the range beyond it."""
         if len(self.position) == 2:  # a straight line through 0, to the last bit
             return np.asarray(opening_m, float) * (self.position[1] / self.opening_m[1])
-        return np.interp(opening_m, self.opening_m, self.position)
+        return np.asarray(np.interp(opening_m, self.opening_m, self.position))
 
     @property
     def reach_m(self) -> tuple[float, float]:
@@ -45,7 +45,7 @@ class OpeningLaw:
 
     def opening_at(self, position: np.ndarray | float) -> np.ndarray:
         """Distance between the pads at a position of the motors, metres."""
-        return np.interp(position, self.position, self.opening_m)
+        return np.asarray(np.interp(position, self.position, self.opening_m))
 
 
 def straight_law(stroke_m: float) -> OpeningLaw:
@@ -84,12 +84,13 @@ def measure_opening(
     scale, zero = command_law(motors, model)
     actuators = [model.actuator(motor.actuator).id for motor in motors]
     joints = [model.joint(motor.joint).qposadr[0] for motor in motors]
-    rows, faces = [], []
+    rows: list[list[float]] = []
+    faces: list[float] = []
     for command in np.linspace(motors[0].stroke, 0.0, _POINTS):
         data.ctrl[actuators] = command * scale + zero
         mujoco.mj_step(model, data, round(_HOLD_S / model.opt.timestep))
         mujoco.mj_forward(model, data)
-        position = np.mean([(data.qpos[q] - m.closed) * m.sign for q, m in zip(joints, motors, strict=True)])
+        position = float(np.mean([(data.qpos[q] - m.closed) * m.sign for q, m in zip(joints, motors, strict=True)]))
         opening = _distance(model, data, *pads)
         faces = faces or [_distance(model, data, side, [model.geom(object_geom).id]) for side in pads]
         rows.append([position, opening, *(data.geom_xpos[geoms, axis].mean() for geoms in pads), *data.qpos])
@@ -104,7 +105,7 @@ def measure_opening(
     return OpeningLaw(position[first:], opening[first:], travel, (faces[0] + half, faces[1] + half), table[first:, 4:])
 
 
-def _distance(model: mujoco.MjModel, data: mujoco.MjData, some: Sequence[int], others: Sequence[int]) -> float:
+def _distance(model: mujoco.MjModel, data: mujoco.MjData, some: Iterable[int], others: Iterable[int]) -> float:
     return min(float(mujoco.mj_geomDistance(model, data, i, j, _FAR_M, None)) for i in some for j in others)
 
 
@@ -141,10 +142,10 @@ def command_law(motors: Sequence[Motor], model: mujoco.MjModel) -> tuple[np.ndar
         if of_joint and drive.gear[0] == 1 and math.isclose(gain, stiffness) and bias == 0:
             scale[index], zero[index] = motor.sign, motor.closed  # to the last bit
             continue
-        lengths = []
+        lengths: list[float] = []
         for value in (motor.closed, motor.open):
             _set_mechanism(model, data, motor.joint, value)
-            lengths.append(data.actuator_length[drive.id])
+            lengths.append(float(data.actuator_length[drive.id]))
         slope = (lengths[1] - lengths[0]) / motor.stroke
         scale[index] = stiffness / gain * slope
         zero[index] = (stiffness * lengths[0] - bias) / gain

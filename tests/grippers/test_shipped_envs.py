@@ -45,7 +45,7 @@ def test_specs_and_sizes(gripper):
 
 @pytest.mark.parametrize("name", ["force_pi", "informed"])
 def test_controllers_reach_the_object_and_stay_finite(gripper, name):
-    controller, env = make_controller(name, gripper), build(gripper, steps=120)
+    controller, env = make_controller(name, gripper).eval(), build(gripper, steps=120)
     if isinstance(controller, ForcePI):
         env.append_transform(controller.make_tensordict_primer())
     rollout = env.rollout(120, controller, break_when_any_done=False)
