@@ -1,4 +1,4 @@
-"""Forces that effects put on fingers and object move them, the right one and the right way."""
+"""Forces and shifts that effects put on fingers, pads and object reach the right one, and the right way."""
 
 from __future__ import annotations
 
@@ -51,3 +51,25 @@ def test_an_object_goes_where_it_is_pushed(gripper, newtons, side):
     fingers, thing = _moved(gripper, (0.0, 0.0, side * newtons), seconds=0.04)
     assert 3e-4 < side * thing < 0.01
     assert not fingers.any()
+
+
+class ShiftOfTheRightPad(Effect):
+    """The right pad stands 2 mm further out, which is towards opening."""
+
+    name, stage, parameters = "shift", "transmission", ()
+
+    def act(self) -> None:
+        self.plant.pad_shift_m[self.rows] += (0.0, 0.002)
+
+
+@pytest.mark.parametrize("gripper", ["tiago", SECOND], ids=["tiago", "second"])
+def test_each_pad_has_a_shift_of_its_own(gripper):
+    plant = Plant(load_gripper(gripper), 1, threads=1)
+    plant.attach([(ShiftOfTheRightPad(np.empty((1, 0)), plant.dt), np.array([0]))])
+    plant.reset(np.arange(1), np.zeros(1), np.full((1, 2), 0.04))
+    plant.advance(np.full((1, 2), 0.04))
+    moved = np.abs(plant.field("geom_pos")[0] - plant.model.geom_pos).max(axis=1)
+    left, right = (plant.model.geom_bodyid == plant.model.joint(name).bodyid[0] for name in plant.gripper.joints)
+    np.testing.assert_allclose(moved, np.where(right, 0.002, 0.0), atol=1e-12)
+    assert left.any()
+    assert right.any()
