@@ -102,9 +102,9 @@ def test_a_dropped_command_is_not_taken_up_while_it_is_held():
     plant = Plant(load_gripper("tiago"), 1, threads=1)
     plant.attach([(make("command_deadband", 0.0003), np.array([0]))])
     plant.reset(np.arange(1), np.zeros(1), np.full((1, 2), 0.044))
-    plant.advance(np.full((1, 2), 0.03), 60)
+    plant.advance(np.full((1, 2), 0.03), 30)
     assert (plant.position > 0.035).all()  # on the way
-    plant.advance(plant.position.copy(), 500)
+    plant.advance(plant.position.copy(), 1000)
     np.testing.assert_allclose(plant.position, 0.03, atol=1e-5)
 
 
