@@ -98,6 +98,11 @@ def test_command_deadband_decides_on_new_commands_only():
     assert np.all(sent == 0.01)
 
 
+@pytest.mark.parametrize(("name", "value"), [("actuator_lag", 0.05), ("rate_limit", 0.01), ("command_delay", 0.02)])
+def test_what_slows_a_command_starts_from_where_the_finger_stands(name, value):
+    np.testing.assert_allclose(send(make(name, value), np.full(30, 0.03), position=0.03), 0.03, rtol=1e-12)
+
+
 def test_a_dropped_command_is_not_taken_up_while_it_is_held():
     plant = Plant(load_gripper("tiago"), 1, threads=1)
     plant.attach([(make("command_deadband", 0.0003), np.array([0]))])
