@@ -43,7 +43,7 @@ def test_files_are_written_whatever_the_locale(tiny, tmp_path):
     assert (trained.returncode, trained.stderr) == (0, b"")
     done = run(["evaluate", *tiny["evaluate"], "policies=[run]", "out=out"], LOCALES["C"], tmp_path)
     assert (done.returncode, done.stderr) == (0, b"")
-    assert b"softness kappa" in done.stdout
+    assert b"2 sigma_f of it" in done.stdout
     assert "softness κ" in (tmp_path / "out" / "tables.md").read_text("utf-8")
 
 

@@ -9,7 +9,8 @@ import pytest
 from scipy.signal import lfilter
 
 from forcegrasp.effects import Effect, catalogue, get_effect
-from forcegrasp.physics.plant import write_base
+from forcegrasp.physics.gripper import load_gripper
+from forcegrasp.physics.plant import Plant, write_base
 
 from .rollouts import FORCE_SCALE, START_M, make_plant, path, play, rollout, start
 
@@ -95,6 +96,21 @@ def test_command_deadband_decides_on_new_commands_only():
     """A command that was dropped is not passed on later because the finger moved meanwhile."""
     sent = send(make("command_deadband", 0.001), np.full(20, 0.0105), np.linspace(0.01, 0.0, 20), every=100)
     assert np.all(sent == 0.01)
+
+
+@pytest.mark.parametrize(("name", "value"), [("actuator_lag", 0.05), ("rate_limit", 0.01), ("command_delay", 0.02)])
+def test_what_slows_a_command_starts_from_where_the_finger_stands(name, value):
+    np.testing.assert_allclose(send(make(name, value), np.full(30, 0.03), position=0.03), 0.03, rtol=1e-12)
+
+
+def test_a_dropped_command_is_not_taken_up_while_it_is_held():
+    plant = Plant(load_gripper("tiago"), 1, threads=1)
+    plant.attach([(make("command_deadband", 0.0003), np.array([0]))])
+    plant.reset(np.arange(1), np.zeros(1), np.full((1, 2), 0.044))
+    plant.advance(np.full((1, 2), 0.03), 30)
+    assert (plant.position > 0.035).all()  # on the way
+    plant.advance(plant.position.copy(), 1000)
+    np.testing.assert_allclose(plant.position, 0.03, atol=1e-5)
 
 
 def test_command_deadband_comes_before_a_delay():

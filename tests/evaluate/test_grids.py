@@ -46,8 +46,8 @@ def test_own_objects(tmp_path):
 BROKEN = {
     "other format": (GOOD.replace("objects/1", "objects/9"), "format: must be forcegrasp-objects/1"),
     "no objects": ("format: forcegrasp-objects/1\nobjects:\n", "must hold an object a line"),
-    "no diameter": (GOOD.replace("diameter_m: 0.06, ", ""), "diameter_m is missing"),
-    "unknown key": (GOOD.replace("kappa", "kapa"), "unknown key .*did you mean kappa"),
+    "no diameter": (GOOD.replace("diameter_m: 0.06, ", ""), "missing keys: diameter_m"),
+    "unknown key": (GOOD.replace("kappa", "kapa"), "unknown keys: .kapa. .did you mean kappa"),
     "millimetres": (GOOD.replace("0.06", "60"), "diameter_m: must lie between 0.024 and 0.09"),
     "squeezed flat": (GOOD.replace("0.06", "0.02"), "diameter_m: must lie between"),
     "kappa": (GOOD.replace("0.3", "1.3"), "kappa: must lie between"),

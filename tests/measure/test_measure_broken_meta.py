@@ -132,5 +132,5 @@ def test_positions_in_a_table_of_forces(folder):
 @pytest.mark.parametrize("key", ["first", "second", "third"])
 def test_every_key_that_must_be_there_is_asked_for(key):
     content = {name: "1" for name in ("first", "second", "third") if name != key}
-    with pytest.raises(MeasurementError, match=f"^here: {key} is missing; add it$"):
+    with pytest.raises(MeasurementError, match=f"^here: missing keys: {key}; add them$"):
         Reader(content, "here", ("first", "second", "third"))

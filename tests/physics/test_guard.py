@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from forcegrasp.errors import PhysicsError
-from forcegrasp.physics import GraspSimulator
+from forcegrasp.physics import GraspSimulator, guard
 
 
 @pytest.fixture
@@ -51,6 +51,13 @@ def test_bad_acceleration(simulator):
 def test_the_first_of_several_is_named(simulator):
     simulator.plant.batch.bind("qpos")[[1, 3], -1] = np.nan
     _expect(simulator, 1, "bad positions")
+
+
+def test_the_step_is_that_of_the_grasp(draw):
+    warnings = np.zeros((3, 8), int)
+    warnings[1, 0] = 1
+    with pytest.raises(PhysicsError, match="grasp 1 diverged at control step 7 "):
+        guard.check(warnings, draw(3), np.array([3, 7, 11]))
 
 
 def test_error_stands_until_the_grasp_is_reset(simulator, draw):
