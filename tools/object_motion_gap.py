@@ -107,7 +107,12 @@ def simulate(which: Sequence[Case]) -> tuple[np.ndarray, np.ndarray]:
     kappa, radius, offset = np.tile(GRASPS, (len(which), 1)).T
     mass, noise, touch = (np.repeat([getattr(c, f) for c in which], count) for f in ("mass_kg", "noise_n", "touch_n"))
     ids, scale = np.arange(n), default_gripper().training.force_scale(kappa)
-    base = {"rho_m": default_gripper().training.at("rho_m", kappa), "force_scale": scale, "radius_m": radius, "offset_m": offset}
+    base = {
+        "rho_m": default_gripper().training.at("rho_m", kappa),
+        "force_scale": scale,
+        "radius_m": radius,
+        "offset_m": offset,
+    }
     offsets = write_base(plant, ids, base)
     body = plant.model.geom(plant.gripper.object_geom).bodyid[0]
     for name in ("body_mass", "body_inertia"):

@@ -83,7 +83,13 @@ def fscale_var() -> Drawn:
     closing = vary_kappa(KAPPAS)
     figure = draw_presses(closing, [f"κ = {k:g}" for k in KAPPAS])
     figure.suptitle("Pressing at full action, by κ (paper: variation of κ)", fontsize=11)
-    numbers = zip(KAPPAS, default_gripper().training.force_scale(KAPPAS), contact_slope(closing), closing.final_force_n, strict=True)
+    numbers = zip(
+        KAPPAS,
+        default_gripper().training.force_scale(KAPPAS),
+        contact_slope(closing),
+        closing.final_force_n,
+        strict=True,
+    )
     return figure, table(
         "κ | f_α | ∂f/∂q at Δq = 3 mm [N/m] | f(T) [N]",
         [f"{k:g} | {a:g} | {s:.0f} | {f:.3f}" for k, a, s, f in numbers],
@@ -105,7 +111,9 @@ def stiffness() -> Drawn:
     ]
     for name, slope in PAPER_SLOPES_N_M.items():
         scale = float(match_force_scale(slope, unit))
-        rows.append(f"robot, {name} | {slope:.0f} | – | **{scale:.2f}** | **{float(default_gripper().training.kappa_of_force_scale(scale)):.2f}**")
+        rows.append(
+            f"robot, {name} | {slope:.0f} | – | **{scale:.2f}** | **{float(default_gripper().training.kappa_of_force_scale(scale)):.2f}**"
+        )
     return figure, table("object | slope of f(T) [N/m] | offset [mN] | f_α | κ", rows)
 
 

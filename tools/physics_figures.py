@@ -38,7 +38,11 @@ def impedance(depth_m: np.ndarray, rho_m: float) -> np.ndarray:
 def squeezes() -> tuple[np.ndarray, np.ndarray]:
     """How deep a pad sinks in at rest, metres, and what a finger reads with f_α = 1, newtons; each ``(κ, Δq)``."""
     n = len(DELTAS_M)
-    values = {"rho_m": np.repeat(default_gripper().training.at("rho_m", KAPPAS), n), "radius_m": RADIUS_M, "force_scale": 1.0}
+    values = {
+        "rho_m": np.repeat(default_gripper().training.at("rho_m", KAPPAS), n),
+        "radius_m": RADIUS_M,
+        "force_scale": 1.0,
+    }
     closing = close(np.tile(DELTAS_M, len(KAPPAS)), 6.0, values, start_m=RADIUS_M + 0.001)
     shape = (len(KAPPAS), n)
     return RADIUS_M - closing.final_position_m.reshape(shape), closing.final_force_n.reshape(shape)
@@ -121,8 +125,7 @@ def main() -> None:
     rho = default_gripper().training.at("rho_m", KAPPAS)
     slope = scale[:, None] * np.gradient(force, axis=1) / np.gradient(1e3 * depth, axis=1)
     rows = [
-        f"{k:g} | {1e3 * r:.2f} | {a:g} | {d[2]:.2f}, {d[-1]:.2f} | {s[2]:.2f}, {s[-1]:.1f}"
-        f" | {1e3 * z:.1f} | {c:.0f}"
+        f"{k:g} | {1e3 * r:.2f} | {a:g} | {d[2]:.2f}, {d[-1]:.2f} | {s[2]:.2f}, {s[-1]:.1f} | {1e3 * z:.1f} | {c:.0f}"
         for k, r, a, d, s, z, c in zip(KAPPAS, rho, scale, 1e3 * depth, slope, sunk, drag, strict=True)
     ]
     head = (

@@ -11,7 +11,6 @@ from forcegrasp.config import ActionConfig, ObservationConfig, TrainConfig
 from forcegrasp.controllers import CONTROLLERS, make_controller
 from forcegrasp.errors import ConfigError, closest
 from forcegrasp.physics import Gripper, default_gripper, load_gripper
-from forcegrasp.physics.completion import complete
 from forcegrasp.policies import shipped_policies
 from forcegrasp.runs.policy import load_policy
 from forcegrasp.runs.run_dir import RunDir
@@ -49,8 +48,8 @@ def load_contestants(names: list[str], gripper: Gripper | None = None) -> list[C
         if name not in known and not ("/" in name or path.exists()):
             raise ConfigError(f"no controller, policy or run directory named {name!r}{closest(name, known)}")
         if name in CONTROLLERS:
-            action = complete(ActionConfig(inductive_bias=False), gripper)
-            label, policy, config = name, make_controller(name, gripper), TrainConfig(action=action)
+            label, policy = name, make_controller(name, gripper)
+            config = TrainConfig(action=ActionConfig(inductive_bias=False))
         else:
             same = [other for other in set(paths.values()) if other.name == path.name]
             label = path.name if len(same) == 1 else f"{path.parent.name}_{path.name}"

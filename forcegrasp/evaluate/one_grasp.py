@@ -58,22 +58,31 @@ def _radius(config: RenderConfig, ranges: GraspConfig, gripper: Gripper) -> list
     low, high = ranges.radius_m if config.radius_m is None else [config.radius_m] * 2
     if config.offset_m is None:
         return [low, high]
-    away = config.offset_m
-    left, right = gripper.opening.faces_m
+    away, law = config.offset_m, gripper.opening
+    left, right = law.faces_m
     moves = [finger.motor >= 0 for finger in gripper.fingers]
-    sides = zip((1, -1), moves, gripper.opening.reach_m, strict=True)
-    reached = [ranges.deformation_m + side * away - beyond for side, moving, beyond in sides if moving]
     if config.radius_m is not None:
         lowest, highest = (float(end) for end in offset_limits_m(gripper, config.radius_m, ranges.deformation_m))
         if not lowest <= away <= highest:
             raise ConfigError(
                 f"offset_m={away:g}: an object of radius_m={config.radius_m:g} can be grasped"
-                f" from {lowest:.4f} to {highest:.4f} m off the middle (paper, eqs. 1 and 2)"
+                f" {_span('up to', lowest, highest)} m off the middle (paper, eqs. 1 and 2)"
             )
         return [low, high]
-    fitting = [max(low, *reached), min(high, right - away, left + away)]
+    sides = list(zip((1, -1), moves, law.reach_m, strict=True))
+    smallest = [ranges.deformation_m + side * away - beyond for side, moving, beyond in sides if moving]
+    fitting = [max(low, *smallest), min(high, right - away, left + away)]
     if fitting[0] >= fitting[1]:
+        by_left, by_right = ((beyond - ranges.deformation_m) for beyond in law.reach_m)
+        highest = (right + by_left) / 2 if moves[0] else right - low
+        lowest = -(left + by_right) / 2 if moves[1] else low - left
         raise ConfigError(
-            f"offset_m={away:g}: no object of radius {low:g} to {high:g} m can be grasped so far off the middle"
+            f"offset_m={away:g}: no object can be grasped {_span('beyond', lowest, highest)} m off the middle"
         )
     return fitting
+
+
+def _span(word: str, lowest: float, highest: float) -> str:
+    """Where offsets end, in words: alike on both sides, or not."""
+    alike = np.isclose(-lowest, highest, atol=1e-9)
+    return f"{word} ± {highest:.4f}" if alike else f"from {lowest:.4f} to {highest:.4f}"

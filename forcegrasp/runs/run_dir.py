@@ -29,6 +29,7 @@ from forcegrasp.effects.model_file import Model, write_model
 from forcegrasp.effects.variation import read_model_of
 from forcegrasp.errors import CheckpointError, ConfigError
 from forcegrasp.physics import load_gripper
+from forcegrasp.physics.completion import complete
 from forcegrasp.runs import checkpoint
 from forcegrasp.runs.lock import only_writer
 from forcegrasp.whole_file import write_whole
@@ -158,6 +159,7 @@ class RunDir:
             merged = OmegaConf.merge(OmegaConf.structured(TrainConfig), loaded)
             config = cast(TrainConfig, OmegaConf.to_object(merged))
             validate(config)
+            config = complete(config, load_gripper(config.gripper))
         except (OSError, OmegaConfBaseException, ConfigError, ValueError) as error:
             first_line = str(error).strip().splitlines()[0]
             raise CheckpointError(f"{self.config_path}: not a valid configuration ({first_line})") from error

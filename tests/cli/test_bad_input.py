@@ -161,7 +161,7 @@ MISTAKES = [
     (["render", "kapa=0.5"], "did you mean kappa"),
     (["render", "kappa=2"], "kappa=2.0: must lie in [0, 1]"),
     (["render", "kappa=soft"], "kappa"),
-    (["render", "radius_m=0.1"], "radius_m=0.1: must lie in"),
+    (["render", "radius_m=0.1"], "tiago opens so wide that it takes radii below 0.045 m"),
     (["render", "radius_m=nan"], "radius_m=nan: must lie in"),
     (["render", "radius_m=0.035", "offset_m=0.02"], "can be grasped up to ± 0.0100 m off the middle"),
     (["render", "offset_m=0.03"], "no object can be grasped beyond ± 0.0165 m"),

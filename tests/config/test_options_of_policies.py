@@ -305,11 +305,18 @@ def test_forces_that_the_reward_judges_differ_with_a_model(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "name", [n for n in EVALUATE_CASES if n not in ("out", "detail", "physics.threads", *ELSEWHERE)]
+    "name", [n for n in EVALUATE_CASES if n not in ("gripper", "out", "detail", "physics.threads", *ELSEWHERE)]
 )
 def test_option_of_evaluate(name, tmp_path, plain_evaluation, learned):
     different = evaluated(tmp_path, **learned | {name: EVALUATE_CASES[name]})
     assert different != plain_evaluation
+
+
+def test_gripper_of_evaluate_is_simulated_and_moves_no_policy_of_another(tmp_path, learned):
+    plain = evaluated(tmp_path / "one", policies=["close"])
+    assert evaluated(tmp_path / "two", policies=["close"], gripper=EVALUATE_CASES["gripper"]) != plain
+    with pytest.raises(ConfigError, match="was trained on gripper tiago, and can't move franka_hand"):
+        evaluated(tmp_path / "three", **learned | {"gripper": EVALUATE_CASES["gripper"]})
 
 
 @pytest.mark.parametrize("verb", ["train", "evaluate", "render"])
@@ -373,7 +380,7 @@ def rendered(folder: Path, **values: Any) -> tuple:
 
     shown, threads, said = [], [], io.StringIO()
 
-    def show(episodes, sensors):
+    def show(episodes, sensors, gripper):
         shown.extend(episode["next", "force"].tolist() for episode in episodes.values())
         return b"GIF"
 
@@ -399,6 +406,11 @@ def test_the_same_rendering_shows_the_same(tmp_path, plain_rendering, run_path):
     assert rendered(tmp_path, policies=[str(run_path)]) == plain_rendering
 
 
-@pytest.mark.parametrize("name", [name for name in RENDER_CASES if name not in ELSEWHERE])
+@pytest.mark.parametrize("name", [name for name in RENDER_CASES if name not in ("gripper", *ELSEWHERE)])
 def test_option_of_render(name, tmp_path, plain_rendering, run_path):
     assert rendered(tmp_path, **{"policies": [str(run_path)], name: RENDER_CASES[name]}) != plain_rendering
+
+
+def test_gripper_of_render_is_the_one_that_grasps(tmp_path):
+    plain, other = (rendered(tmp_path, policies="close", **more) for more in ({}, {"gripper": RENDER_CASES["gripper"]}))
+    assert plain[0] != other[0]

@@ -5,16 +5,20 @@ from __future__ import annotations
 import pytest
 
 from forcegrasp.config import TrainConfig
+from forcegrasp.physics import default_gripper
+from forcegrasp.physics.completion import complete
+
+TRAINING = complete(TrainConfig(), default_gripper())
 
 
 def test_what_is_drawn_for_a_grasp():
-    grasp = TrainConfig().grasp
+    grasp = TRAINING.grasp
     assert (grasp.kappa, grasp.b2) == ([0.0, 1.0], [-13.0, -6.0])
     assert (grasp.radius_m, grasp.offset_m) == ([0.015, 0.035], [-0.04, 0.04])
 
 
 def test_sensors_and_actions():
-    config = TrainConfig()
+    config = TRAINING
     assert (config.sensors.position_std_m, config.sensors.force_std_n) == (2.7e-5, 0.013)
     assert config.action.max_delta_m == 0.003
     assert (config.action.bias_one_contact, config.action.bias_floor) == (0.1, 0.9)
@@ -22,7 +26,7 @@ def test_sensors_and_actions():
 
 
 def test_curriculum():
-    config = TrainConfig()
+    config = TRAINING
     start, end = config.curriculum, config.reward
     assert start.end_fraction == pytest.approx(1 / 3)  # the authors' code; the paper does not say
     assert (start.object_weight, end.object_weight) == (0.0, 1.0)

@@ -13,6 +13,7 @@ from forcegrasp.evaluate import rollouts
 from forcegrasp.evaluate.grids import kappa_grid
 from forcegrasp.evaluate.rollouts import roll_out
 from forcegrasp.physics import default_gripper
+from forcegrasp.physics.completion import complete
 from forcegrasp.physics.sampling import offset_limits_m
 
 FAST = PhysicsConfig(tier="fast", threads=1)
@@ -33,7 +34,7 @@ def test_grid_of_softness(limits, kappas):
 
 
 def test_all_else_is_random_and_within_its_range():
-    config = GraspConfig(b2=[-12.0, -8.0], radius_m=[0.02, 0.03], offset_m=[-0.005, 0.006])
+    config = complete(GraspConfig(b2=[-12.0, -8.0], radius_m=[0.02, 0.03], offset_m=[-0.005, 0.006]), default_gripper())
     grasps = kappa_grid(config, 5, 200, seed=3).grasps
     assert len(np.unique(grasps.b2)) == len(np.unique(grasps.radius_m)) == 1000
     for name in ("b2", "radius_m", "offset_m"):
@@ -41,8 +42,12 @@ def test_all_else_is_random_and_within_its_range():
         values = getattr(grasps, name)
         assert low <= values.min() < low + 0.05 * (high - low)
         assert high - 0.05 * (high - low) < values.max() <= high
-    assert (np.abs(grasps.offset_m) < offset_limits_m(default_gripper(), grasps.radius_m, config.deformation_m)[1]).all()
-    assert (grasps.goal_force_n <= 0.95 * 0.30 * grasps.force_scale * (1 + 1e-12)).all()
+    assert (
+        np.abs(grasps.offset_m) < offset_limits_m(default_gripper(), grasps.radius_m, config.deformation_m)[1]
+    ).all()
+    assert (
+        grasps.goal_force_n <= 0.95 * 0.30 * default_gripper().training.force_scale(grasps.kappa) * (1 + 1e-12)
+    ).all()
 
 
 def test_grid_depends_on_the_seed_alone():

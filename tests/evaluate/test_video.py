@@ -26,9 +26,13 @@ from forcegrasp.evaluate.grasp_layout import (
     WIDTH,
 )
 from forcegrasp.evaluate.video import grasp_video
+from forcegrasp.physics import default_gripper
+from forcegrasp.physics.completion import complete
 from forcegrasp.physics.scene_renderer import NoRendererError
 from forcegrasp.runs.run_dir import RunDir
 from forcegrasp.train.loop import train
+
+SENSORS = complete(SensorConfig(), default_gripper())
 
 
 @pytest.fixture(scope="module")
@@ -41,7 +45,7 @@ def episode() -> TensorDict:
 def test_video_or_a_reason(episode, monkeypatch):
     monkeypatch.delenv("MUJOCO_GL", raising=False)
     try:
-        data = grasp_video({"close": episode, "again": episode}, SensorConfig(), every=6)
+        data = grasp_video({"close": episode, "again": episode}, SENSORS, every=6)
     except NoRendererError:
         return
     pictures = []
@@ -72,17 +76,17 @@ def test_scene_is_where_the_grasp_was(episode):
 
 
 def test_phases_are_marked_when_they_happened(episode):
-    figure = draw_grasp(episode, "close", SensorConfig(), "#0072b2")
+    figure = draw_grasp(episode, "close", SENSORS, "#0072b2")
     forces, moved = figure.axes
-    seconds = summarise(episode[None], SensorConfig())
+    seconds = summarise(episode[None], SENSORS)
     assert float(seconds["both_contact_s"]) < 31 * 0.04
     for axes in (forces, moved):
         marks = {line.get_xdata()[0] for line in axes.lines if line.get_linestyle() == ":"}
         assert marks == {float(seconds["first_contact_s"][0]), float(seconds["both_contact_s"][0])}
     goal = float(episode["goal_force"][0])
     (band,) = forces.patches
-    assert band.get_y() == pytest.approx(goal - 2 * SensorConfig().force_std_n)
-    assert band.get_height() == pytest.approx(4 * SensorConfig().force_std_n)
+    assert band.get_y() == pytest.approx(goal - 2 * SENSORS.force_std_n)
+    assert band.get_height() == pytest.approx(4 * SENSORS.force_std_n)
     drawn = next(line for line in forces.lines if line.get_label() == "right")
     np.testing.assert_array_equal(drawn.get_ydata()[1:], episode["next", "force"][:, 1])
     moves = (episode["next", "object_position"][:, 0] - episode["object_position"][0, 0]) * 1e3
@@ -93,8 +97,8 @@ def test_pictures_of_several_policies_have_the_same_scales(episode):
     env = build_env(1, grasp=GraspConfig(steps=31, radius_m=[0.033, 0.033]), seed=3)
     with torch.no_grad():
         other = env.rollout(31, make_controller("nothing"))[0]
-    one, two = draw_grasps({"close": episode, "nothing": other}, SensorConfig())
-    alone = draw_grasp(episode, "close", SensorConfig(), "#0072b2")
+    one, two = draw_grasps({"close": episode, "nothing": other}, SENSORS)
+    alone = draw_grasp(episode, "close", SENSORS, "#0072b2")
     for axes, same, own in zip(one.axes, two.axes, alone.axes, strict=True):
         assert axes.get_ylim() == same.get_ylim()
         assert axes.get_ylim()[1] >= own.get_ylim()[1]
@@ -110,7 +114,7 @@ def test_no_renderer(asked, told, episode, monkeypatch):
     if asked:
         monkeypatch.setenv("MUJOCO_GL", asked)
     with pytest.raises(NoRendererError, match=told) as caught:
-        grasp_video({"close": episode}, SensorConfig())
+        grasp_video({"close": episode}, SENSORS)
     assert "\n" not in str(caught.value)
     assert ("install" in str(caught.value)) == (asked is None)
 

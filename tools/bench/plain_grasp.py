@@ -84,4 +84,6 @@ class PlainGrasp(gymnasium.Env[np.ndarray, np.ndarray]):
         position = self.simulator.joint_position[0] + sensors.position_std_m * noise[0]
         force = self.simulator.force[0] + sensors.force_std_n * noise[1]
         touched = np.maximum(self.had_contact, force > sensors.contact_threshold_n) * (self.simulator.steps[0] > 0)
-        return np.concatenate([position * 2 / default_gripper().stroke - 1, force, self.goal - force, self.last_action, touched])
+        return np.concatenate(
+            [position * 2 / default_gripper().stroke - 1, force, self.goal - force, self.last_action, touched]
+        )
