@@ -19,6 +19,7 @@ import yaml
 
 from forcegrasp.cli.main import VERBS
 from forcegrasp.cli.options import SCHEMAS, groups
+from forcegrasp.config import is_left_out
 
 #: Upper bounds from here on only keep out what can be no number of anything.
 MANY = 100_000
@@ -82,7 +83,7 @@ def differing(schema: type) -> str:
         f"`{name}.{inner.name}={shown(value)}`"
         for name, part in parts(schema)
         for inner in dataclasses.fields(part)
-        if (value := getattr(getattr(schema(), name), inner.name)) != getattr(part(), inner.name)
+        if shown(value := getattr(getattr(schema(), name), inner.name)) != shown(getattr(part(), inner.name))
     ]
     return f"; here {', '.join(found)}." if found else "."
 
@@ -97,8 +98,9 @@ def table(entries: Iterable[dataclasses.Field], prefix: str = "") -> str:
     """A row for each option."""
     rows = ["| option | default | unit | may be | meaning | source |", "|---|---|---|---|---|---|"]
     for entry in entries:
-        meta, start = entry.metadata, shown(default(entry))
-        cells = (f"`{prefix}{entry.name}`", f"`{start}`", meta["unit"], allowed(entry), meta["doc"], meta["source"])
+        meta, start = entry.metadata, default(entry)
+        text = "the gripper's" if meta["of_gripper"] and is_left_out(start) else f"`{shown(start)}`"
+        cells = (f"`{prefix}{entry.name}`", text, meta["unit"], allowed(entry), meta["doc"], meta["source"])
         rows.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
     return "\n".join(rows) + "\n"
 

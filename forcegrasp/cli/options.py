@@ -20,6 +20,7 @@ from forcegrasp.config import (
     RecordConfig,
     RenderConfig,
     TrainConfig,
+    is_left_out,
     validate,
 )
 from forcegrasp.errors import ConfigError, closest
@@ -257,7 +258,7 @@ def _every_option(verb: str) -> Iterator[str]:
         )
         if not all(choice in detail for choice in meta["choices"]):
             detail += f": {' or '.join(meta['choices'])}"
-        yield f"  {_with_default(name, default)}\n{'':<6}{detail}"
+        yield f"  {_with_default(name, entry, default)}\n{'':<6}{detail}"
 
 
 def _common_options(verb: str) -> Iterator[str]:
@@ -266,12 +267,14 @@ def _common_options(verb: str) -> Iterator[str]:
     yield from ("", "common options")
     for name, entry, default in shown:
         unit = f" [{entry.metadata['unit']}]" if entry.metadata["unit"] else ""
-        head, text = _with_default(name, default), entry.metadata["doc"] + unit
+        head, text = _with_default(name, entry, default), entry.metadata["doc"] + unit
         first, *more = textwrap.wrap(f"  {head:<27} {text}", HELP_WIDTH, subsequent_indent=" " * 30)
         yield "\n".join([first, *more])
     sections = sorted({name.partition(".")[0] for name, _, _ in options if "." in name})
     yield f"\n{len(options) - len(shown)} more of {', '.join(sections)}:\n  forcegrasp {verb} --help --all"
 
 
-def _with_default(name: str, default: Any) -> str:
+def _with_default(name: str, entry: dataclasses.Field, default: Any) -> str:
+    if entry.metadata["of_gripper"] and is_left_out(default):
+        return f"{name}=(of gripper)"
     return f"{name}={str(default).replace(chr(39), '').replace(' ', '')}"

@@ -16,7 +16,7 @@ from forcegrasp.api import AddResult, CompareResult, DiagnoseResult, FitResult, 
 from forcegrasp.measure import read_set
 from forcegrasp.measure.plans import make_plan
 from forcegrasp.measure.record import Recorded
-from forcegrasp.physics import GraspParameters
+from forcegrasp.physics import GraspParameters, default_gripper
 from forcegrasp.short_repr import LONGEST, ShortRepr, cut, some
 
 
@@ -35,7 +35,7 @@ def results(made_up, table) -> SimpleNamespace:
         table=fg.compare(table),
         recorded=Recorded(data.measured, {"radius_m": np.zeros(8)}),
         parameters=GraspParameters.from_array(np.ones((1000, 5))),
-        plan=make_plan("rich", np.array([0.02]), 2, 0.045, np.random.default_rng(0)),
+        plan=make_plan("rich", np.array([0.02]), 2, default_gripper(), np.random.default_rng(0)),
         final_forces=read_set(table),
     )
 

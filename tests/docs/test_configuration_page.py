@@ -32,7 +32,7 @@ def test_every_option_and_preset_of_every_verb_is_there(text):
 @pytest.mark.parametrize(
     "row",
     [
-        "| `grasp.radius_m` | `[0.015,0.035]` | m | 0.0121 to 0.04 |",
+        "| `grasp.radius_m` | the gripper's | m | 0.0001 to 1 |",
         "| `physics.tier` | `reference` |  | `reference` `fast` |",
         "| `ppo.total_frames` | `4500000` |  | 1 or more |",
         "| `experiment=no_rand` | `experiment=no_ib`, `'grasp.kappa=[0.5,0.5]'`, `'grasp.b2=[-9,-9]'` |",

@@ -13,6 +13,7 @@ import numpy as np
 
 from forcegrasp.config import TrainConfig
 from forcegrasp.physics import GraspSampler, GraspSimulator, default_gripper
+from forcegrasp.physics.completion import complete
 
 if TYPE_CHECKING:  # it would bring torch
     from forcegrasp.curriculum.schedule import CurriculumValues
@@ -30,7 +31,7 @@ class PlainGrasp(gymnasium.Env[np.ndarray, np.ndarray]):
     """
 
     def __init__(self, config: TrainConfig, seed: int = 0) -> None:
-        self.config = config
+        config = self.config = complete(config, default_gripper())
         self.simulator = GraspSimulator(1, config.physics.tier, threads=1)
         self.sampler = GraspSampler(config.grasp)
         self.rng = np.random.default_rng(seed)
