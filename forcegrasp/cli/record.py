@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from pathlib import Path
 
 from forcegrasp.cli.options import compose, help_text
@@ -57,9 +56,6 @@ def main(arguments: list[str]) -> int:
         force_std_n=config.force_std_n,
         seed=config.seed,
     )
-    measured = recorded.measured
-    if not gripper.is_shipped:
-        measured = dataclasses.replace(measured, gripper=str(gripper.path.resolve()))
-    write_set(measured, out, config.samples)
+    write_set(recorded.measured, out, config.samples)
     print(f"wrote {out}. See where the model fails: forcegrasp compare data={out}")
     return 0

@@ -13,7 +13,7 @@ from forcegrasp.effects.for_gripper import effect_of
 from forcegrasp.errors import ConfigError, closest
 from forcegrasp.measure.plans import PERIOD_S, SAMPLES, make_plan
 from forcegrasp.measure.replay import EffectOn, Replay
-from forcegrasp.measure.schema import MeasuredGrasp, MeasurementSet, fingerprint_of_set
+from forcegrasp.measure.schema import MeasuredGrasp, MeasurementSet, columns_of, fingerprint_of_set
 from forcegrasp.physics.gripper import Gripper
 from forcegrasp.physics.gripper_parts import BaseParameter
 from forcegrasp.physics.sensors import is_rounding, with_noise
@@ -56,7 +56,7 @@ def record(
       effects: each with its variant and its parameters.
       known: base parameters of the gripper that are not drawn.
       off_nominal: largest share by which the other ones differ from nominal.
-      position_std_m: noise of the positions.
+      position_std_m: noise of the positions, m or rad.
       force_std_n: noise of the forces.
       seed: of everything random.
     """
@@ -79,7 +79,7 @@ def record(
     bare = [
         MeasuredGrasp(
             f"g{index:03}", f"object_{p.object + 1}", "simulated", float(radii[p.object]), p.offset_m, None,
-            time, p.command_m, rest, unloaded, None,
+            time, p.command_m, rest, unloaded, None, columns=columns_of(gripper),
         )
         for index, p in enumerate(planned)
     ]  # fmt: skip
