@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from forcegrasp.errors import MeasurementError
-from forcegrasp.measure import MeasurementSet, check_set, read_set, write_set
+from forcegrasp.measure import MeasuredGrasp, MeasurementSet, check_set, read_set, write_set
 from forcegrasp.measure.record import record
-from forcegrasp.measure.schema import TWO_FINGERS, columns_of
+from forcegrasp.measure.schema import TWO_FINGERS, columns_of, fingerprint_of_set
 from forcegrasp.physics.gripper import Gripper
 from forcegrasp.physics.gripper_file import load_gripper, shipped_grippers
 
@@ -65,6 +65,15 @@ def test_what_was_recorded_is_read(name, samples, tmp_path):
 def test_columns_of_two_fingers_are_the_default():
     assert columns_of(load_gripper("tiago")) == TWO_FINGERS
     assert TWO_FINGERS.signals == ("t_s", "qdes_l_m", "qdes_r_m", "q_l_m", "q_r_m", "f_l_n", "f_r_n")
+
+
+def test_fingerprints_stay():
+    """As it was before there were other grippers."""
+    time = np.arange(12) / 8
+    two = np.stack([time, 2 * time], axis=1)
+    grasp = MeasuredGrasp("g", "cup", "monday", 0.02, None, "fit", time, two, two + 0.5, two - 0.25, time - 1)
+    golden = "026b99d4679392f7521d41cbe8b6547be6021845499fd53ae25193f78f7c5755"
+    assert fingerprint_of_set("tiago", 0.25, None, [grasp]) == golden
 
 
 def test_columns_of_another_gripper_are_refused(tmp_path):
