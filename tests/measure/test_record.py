@@ -17,7 +17,7 @@ from forcegrasp.measure.record import Recorded, parse_effect, record
 from forcegrasp.measure.replay import EffectOn, Replay
 from forcegrasp.physics.gripper import Gripper
 from forcegrasp.physics.gripper_file import load_gripper
-from forcegrasp.physics.sensors import is_rounding, with_noise
+from forcegrasp.physics.sensors import rounding_steps, with_noise
 
 TIAGO = load_gripper("tiago")
 SECOND = load_gripper(str(Path(__file__).parents[1] / "grippers" / "second.yaml"))
@@ -53,7 +53,7 @@ def replay_truth(made: Recorded, gripper: Gripper, effects: tuple[Use, ...]) -> 
     base = {name: values for name, values in made.base.items() if name != "force_scale"}
     motion = simulator.simulate(rows, base, [e for e in on if not e.effect.reads_only(e.variant)])
     readings = simulator.read(motion, rows, made.base["force_scale"], [e for e in on if e.effect.reads()])
-    steps = next((values for effect, _, values in effects if is_rounding(effect)), np.zeros(2))
+    steps = rounding_steps((effect, values) for effect, _, values in effects)
     pairs = zip((readings.position, readings.force), steps, strict=True)
     return np.concatenate([with_noise(values, 0.0, 0.0, step) for values, step in pairs], axis=-1)
 
