@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
-from pathlib import Path
-
 from forcegrasp.cli.options import compose, help_text
 from forcegrasp.cli.results import default_out
 from forcegrasp.errors import ConfigError
@@ -24,7 +21,7 @@ def main(arguments: list[str]) -> int:
         return 0
     config = compose("record", arguments)
 
-    from forcegrasp.effects.model_file import read_model
+    from forcegrasp.effects.variation import read_model_of, with_noise_of
     from forcegrasp.measure import write_set
     from forcegrasp.measure.record import parse_effect, record
     from forcegrasp.physics.completion import complete
@@ -32,12 +29,10 @@ def main(arguments: list[str]) -> int:
 
     out = default_out("record", config.out)
     gripper = load_gripper(config.gripper)
-    config = complete(config, gripper)
+    model = read_model_of(gripper, config.model) if config.model else None
+    config = complete(config, with_noise_of(gripper, model))
     effects, known = [parse_effect(text, gripper) for text in config.effects], {}
-    if config.model:
-        model = read_model(Path(config.model))
-        if model.gripper.name != gripper.name:
-            raise ConfigError(f"model={config.model}: is of gripper {model.gripper.name}, not {gripper.name}")
+    if model:
         known = {name: fitted.value for name, fitted in model.base.items()}
         effects = [*((e.effect, e.variant, e.values) for e in model.effects), *effects]
     names = [effect.name for effect, _, _ in effects]
@@ -57,9 +52,6 @@ def main(arguments: list[str]) -> int:
         force_std_n=config.force_std_n,
         seed=config.seed,
     )
-    measured = recorded.measured
-    if not gripper.is_shipped:
-        measured = dataclasses.replace(measured, gripper=str(gripper.path.resolve()))
-    write_set(measured, out, config.samples)
+    write_set(recorded.measured, out, config.samples)
     print(f"wrote {out}. See where the model fails: forcegrasp compare data={out}")
     return 0

@@ -63,7 +63,8 @@ def load(path: str | Path) -> Loaded[MeasurementSet] | Loaded[FinalForceTable]:
     gripper = load_gripper(measured.gripper, measured.path)
     if isinstance(measured, FinalForceTable):
         return Loaded(measured, gripper, check_table(measured, gripper.stroke))
-    return Loaded(measured, gripper, check_set(measured, gripper.stroke) + check_given_noise(measured))
+    odd = check_set(measured, gripper.stroke, half_opening_m=float(gripper.opening.opening_m[-1]) / 2)
+    return Loaded(measured, gripper, odd + check_given_noise(measured))
 
 
 def fit_model(loaded: Loaded[MeasurementSet], seed: int, progress: Progress) -> tuple[Target, Simulators, BaseFit]:

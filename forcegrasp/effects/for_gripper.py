@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from forcegrasp.effects.base import Effect, Parameter
+from forcegrasp.effects.none import NoEffect
 from forcegrasp.effects.registry import catalogue
 from forcegrasp.errors import ConfigError, closest
 from forcegrasp.physics.gripper import Gripper
@@ -45,7 +46,7 @@ def effect_of(name: str, gripper: Gripper) -> type[Effect]:
     Raises:
       ConfigError: if there is none of that name, or it can't show on this gripper.
     """
-    known = effects_of(gripper)
+    known = effects_of(gripper) | {NoEffect.name: NoEffect}
     if name in known:
         return known[name]
     if name in catalogue():

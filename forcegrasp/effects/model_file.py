@@ -16,7 +16,8 @@ import numpy as np
 import yaml
 
 from forcegrasp import plain_yaml
-from forcegrasp.effects import Effect, get_effect
+from forcegrasp.effects import Effect
+from forcegrasp.effects.for_gripper import effect_of
 from forcegrasp.errors import ConfigError, closest
 from forcegrasp.physics.gripper import Gripper
 from forcegrasp.physics.gripper_file import load_gripper
@@ -26,6 +27,8 @@ from forcegrasp.whole_file import write_whole
 FORMAT = "forcegrasp-model/1"
 #: Name of the model that comes with the package.
 SHIPPED = "virtual_robot"
+#: Entries of its noise.
+NOISE = ("position_std", "force_std_n")
 # Of a key in a message.
 _LONGEST_KEY = 80
 
@@ -69,6 +72,8 @@ class Model(ShortRepr):
     effects: tuple[FoundEffect, ...] = ()
     data: dict[str, str] = field(default_factory=dict)  #: set and fingerprint
     warnings: tuple[str, ...] = ()
+    #: Standard deviations of the readings: positions, m or rad; forces, newtons. None if it does not say.
+    noise: tuple[float, float] | None = None
 
     def summary(self) -> str:
         effects = some(e.effect.name for e in self.effects) or "none"
@@ -90,6 +95,8 @@ def write_model(model: Model, path: str | Path) -> None:
         "base": {name: _dump(v) for name, v in model.base.items()},
         "objects": {o: {name: _dump(v) for name, v in vs.items()} for o, vs in model.objects.items()},
     }
+    if model.noise is not None:
+        content["noise"] = _Numbers(zip(NOISE, map(float, model.noise), strict=True))
     if model.grasps:
         content["grasps"] = {g: {name: _dump(v) for name, v in vs.items()} for g, vs in model.grasps.items()}
     content["effects"] = {
@@ -125,7 +132,7 @@ def read_model(path: str | Path) -> Model:
     except (OSError, plain_yaml.PlainYamlError) as error:
         why = getattr(error, "strerror", None) or str(error)
         raise _refuse(path, "", f"could not read the model: {why}") from error
-    keys = ("format", "gripper", "mujoco", "data", "base", "objects", "grasps", "effects", "warnings")
+    keys = ("format", "gripper", "mujoco", "data", "base", "objects", "grasps", "effects", "warnings", "noise")
     if not isinstance(raw, dict) or raw.get("format") != FORMAT:
         raise _refuse(path, "format", f"must be {FORMAT}; write a model with `forcegrasp fit`")
     for key in raw:
@@ -142,18 +149,33 @@ def read_model(path: str | Path) -> Model:
         str(o): _read_all(path, f"objects.{o}", v, gripper, "object") for o, v in _map(path, "objects", raw).items()
     }
     grasps = {str(g): _read_all(path, f"grasps.{g}", v, gripper, "grasp") for g, v in _map(path, "grasps", raw).items()}
-    effects = tuple(_read_effect(path, name, entry) for name, entry in _map(path, "effects", raw).items())
+    effects = tuple(_read_effect(path, name, entry, gripper) for name, entry in _map(path, "effects", raw).items())
     data = {str(key): _text(path, f"data.{key}", value) for key, value in _map(path, "data", raw).items()}
     lines = [] if raw.get("warnings") is None else raw["warnings"]
     if not isinstance(lines, list):
         raise _refuse(path, "warnings", "must be a list")
     warnings = tuple(_text(path, f"warnings.{index}", line) for index, line in enumerate(lines))
-    return Model(gripper, base, objects, grasps, effects, data, warnings)
+    return Model(gripper, base, objects, grasps, effects, data, warnings, _read_noise(path, raw))
 
 
-def _read_effect(path: Path, name: Any, entry: Any) -> FoundEffect:
+def _read_noise(path: Path, raw: Mapping[str, Any]) -> tuple[float, float] | None:
+    entries = _map(path, "noise", raw)
+    for key in entries:
+        if key not in NOISE:
+            raise _refuse(path, f"noise.{key}", f"unknown{closest(str(key), NOISE)}")
+    if not entries:
+        return None
+    for key in NOISE:
+        if key not in entries:
+            raise _refuse(path, f"noise.{key}", "missing")
+        if not 0 < _number(path, f"noise.{key}", entries[key]) < math.inf:
+            raise _refuse(path, f"noise.{key}", "must be positive; leave noise out if it is not known")
+    return float(entries["position_std"]), float(entries["force_std_n"])
+
+
+def _read_effect(path: Path, name: Any, entry: Any, gripper: Gripper) -> FoundEffect:
     where = f"effects.{name}"
-    effect = _renamed(path, "effects", lambda: get_effect(str(name)))
+    effect = _renamed(path, "effects", lambda: effect_of(str(name), gripper))
     if not isinstance(entry, dict):
         raise _refuse(path, where, "must be a mapping of its parameters")
     known = {p.name: p for p in effect.parameters}

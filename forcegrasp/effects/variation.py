@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +25,15 @@ def read_model_of(gripper: Gripper, source: Model | str | Path) -> Model:
         name = "model" if isinstance(source, Model) else f"model={source}"
         raise ConfigError(f"{name}: is of gripper {model.gripper.name}, and gripper={gripper.name} is asked for")
     return model
+
+
+def with_noise_of(gripper: Gripper, model: Model | None) -> Gripper:
+    """The gripper, with readings as noisy as a model of it says, if there is one that says it."""
+    if model is None or model.noise is None:
+        return gripper
+    position_std, force_std = model.noise
+    training = dataclasses.replace(gripper.training, position_std=position_std, force_std_n=force_std)
+    return dataclasses.replace(gripper, training=training)
 
 
 class ModelVariation:

@@ -20,7 +20,7 @@ from forcegrasp.config import (
     validate,
 )
 from forcegrasp.effects.model_file import Model
-from forcegrasp.effects.variation import read_model_of
+from forcegrasp.effects.variation import read_model_of, with_noise_of
 from forcegrasp.env.grasp_env import GraspEnv
 from forcegrasp.errors import ConfigError
 from forcegrasp.physics import GraspParameters, Gripper, load_gripper
@@ -66,7 +66,7 @@ def build_env(
     Readings come first (noise, then rounding), then what is computed from readings (contact, error), then memory, then
     the stacked observation; on the way back the action is denormalised, then biased. Parts left out use their defaults,
     and options left out the gripper's (by name, or the path of its description). A ``model`` fitted to measurements, or
-    its file, brings its base parameters and effects, drawn anew for every grasp.
+    its file, brings its base parameters and effects, drawn anew for every grasp, and the noise of its readings.
 
     Raises:
       ConfigError: if an option is out of its range, the gripper reads no forces, or the model can't be read or is of
@@ -76,11 +76,12 @@ def build_env(
         gripper = load_gripper(gripper)
     if not gripper.forces:
         raise ConfigError(f"gripper={gripper.name}: {NO_FORCES}")
-    sensors, observation = complete(sensors or SensorConfig(), gripper), observation or ObservationConfig()
+    known = None if model is None else read_model_of(gripper, model)
+    sensors = complete(sensors or SensorConfig(), with_noise_of(gripper, known))
+    observation = observation or ObservationConfig()
     action, reward = complete(action or ActionConfig(), gripper), reward or RewardConfig()
     for name, part in (("sensors", sensors), ("observation", observation), ("action", action)):
         validate(part, f"{name}.")
-    known = None if model is None else read_model_of(gripper, model)
     grasps = GraspEnv(n, physics, grasp, reward, sampler, model=known, gripper=gripper)
     transforms: list[Transform] = [
         ObservationNoise(

@@ -14,7 +14,7 @@ from rich.progress import track
 from tensordict import TensorDictBase
 
 from forcegrasp.config import EvaluateConfig, RewardConfig
-from forcegrasp.effects.variation import read_model_of
+from forcegrasp.effects.variation import read_model_of, with_noise_of
 from forcegrasp.env.episodes import FIGURES, summarise
 from forcegrasp.evaluate.colours import policy_colours
 from forcegrasp.evaluate.contestants import gripper_of, load_contestants
@@ -46,8 +46,8 @@ def evaluate(config: EvaluateConfig, out: str | Path, console: Console | None = 
     torch.set_num_threads(1)
     check_engine(config.physics)
     gripper = gripper_of(config.policies, config.gripper)
-    config = complete(config, gripper)
     model = read_model_of(gripper, config.model) if config.model else None
+    config = complete(config, with_noise_of(gripper, model))
     contestants = load_contestants(config.policies, gripper)
     baseline = config.baseline if config.baseline in {c.name for c in contestants} else ""
     grid, colours = _grid(config, gripper), policy_colours(c.name for c in contestants)

@@ -7,7 +7,7 @@ from pathlib import Path
 import torch
 
 from forcegrasp.config import GraspConfig, RenderConfig
-from forcegrasp.effects.variation import read_model_of
+from forcegrasp.effects.variation import read_model_of, with_noise_of
 from forcegrasp.env.episodes import summarise
 from forcegrasp.evaluate.contestants import gripper_of, load_contestants
 from forcegrasp.evaluate.grasp_figure import describe
@@ -27,9 +27,9 @@ def render(config: RenderConfig, out: str | Path) -> dict[str, dict[str, float]]
     out = Path(out)
     torch.set_num_threads(1)
     gripper = gripper_of(config.policies, config.gripper)
-    config = complete(config, gripper)
-    grasp = draw_one_grasp(config, gripper)
     model = read_model_of(gripper, config.model) if config.model else None
+    config = complete(config, with_noise_of(gripper, model))
+    grasp = draw_one_grasp(config, gripper)
     episodes = {
         contestant.name: roll_out(
             contestant.policy,

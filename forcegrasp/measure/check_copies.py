@@ -10,7 +10,7 @@ import numpy as np
 from forcegrasp.errors import MeasurementError
 from forcegrasp.measure.folder import show
 from forcegrasp.measure.samples import place, samples_file
-from forcegrasp.measure.schema import FORCE, POSITION, MeasuredGrasp, MeasurementSet
+from forcegrasp.measure.schema import MeasuredGrasp, MeasurementSet
 
 # The third difference of white noise turns its sign in 77 % of all steps, that of a smooth signal seldom.
 _NOISY = 0.6
@@ -30,8 +30,9 @@ def check_copies(measured: MeasurementSet) -> list[str]:
       MeasurementError: if two sensors have the same noise, which no measurement gives.
     """
     where, warnings = samples_file(measured.path), []
-    columns = {name: [grasp.signals()[name] for grasp in measured.grasps] for name in (*POSITION, *FORCE)}
-    for (one, values), (other, others) in combinations(columns.items(), 2):
+    names = (*measured.columns.position, *measured.columns.force)
+    readings = {name: [grasp.signals()[name] for grasp in measured.grasps] for name in names}
+    for (one, values), (other, others) in combinations(readings.items(), 2):
         if not all(np.array_equal(a, b) for a, b in zip(values, others, strict=True)):
             continue
         distinct = len(np.unique(np.concatenate(values)))

@@ -6,7 +6,7 @@ import numpy as np
 
 from forcegrasp.errors import MeasurementError
 from forcegrasp.measure.samples import place, samples_file
-from forcegrasp.measure.schema import FINGERS, FORCE, POSITION, MeasurementSet
+from forcegrasp.measure.schema import MeasurementSet, side_of
 
 #: Means of blocks of the force must vary this many times as much as noise would make them to be contact.
 _CONTACT = 2.5
@@ -18,36 +18,47 @@ def check_liveness(measured: MeasurementSet, reach: float) -> list[str]:
 
     Args:
       measured: the set.
-      reach: how far a finger moves, metres.
+      reach: how far a motor moves, m or rad.
     """
     where = samples_file(measured.path)
-    grasps = measured.grasps
+    grasps, columns = measured.grasps, measured.columns
     warnings = []
     if not any(np.ptp(grasp.command_m, axis=0).any() for grasp in grasps):
         if not _steps_only(measured, reach):
             raise MeasurementError(f"{where}: columns qdes_*: no command ever changes; record what was commanded")
         warnings.append(f"{where}: columns qdes_*: no command changes within a grasp; record some that do")
-    for finger, name in enumerate(FINGERS):
-        moved = [np.ptp(grasp.position_m[:, finger]) for grasp in grasps]
-        asked = [np.ptp(grasp.command_m[:, finger]) for grasp in grasps]
+    for motor, column in enumerate(columns.position):
+        moved = [np.ptp(grasp.position_m[:, motor]) for grasp in grasps]
+        asked = [np.ptp(grasp.command_m[:, motor]) for grasp in grasps]
         if max(asked) > 0.1 * reach and max(moved) < 0.01 * reach:
             raise MeasurementError(
-                f"{where}: column {POSITION[finger]}: never moves, though commanded by {max(asked):g} m; encoder stuck?"
+                f"{where}: column {column}: never moves, though commanded by {max(asked):g} {columns.unit};"
+                " encoder stuck?"
             )
-        force = np.concatenate([grasp.force_n[:, finger] for grasp in grasps])
+    return warnings + (_check_forces(measured, where) if columns.force else [])
+
+
+def _check_forces(measured: MeasurementSet, where: str) -> list[str]:
+    """Raises MeasurementError if a force channel is stuck, or none feels anything; returns warnings."""
+    grasps, columns = measured.grasps, measured.columns.force
+    for channel, column in enumerate(columns):
+        force = np.concatenate([grasp.force_n[:, channel] for grasp in grasps])
         if force.any() and not np.ptp(force):
-            raise MeasurementError(
-                f"{where}: column {FORCE[finger]}: {force[0]:g} N in every sample; is the {name} sensor stuck?"
-            )
+            which = f"{side_of(column)} sensor".strip()
+            raise MeasurementError(f"{where}: column {column}: {force[0]:g} N in every sample; is the {which} stuck?")
+    names, one = ", ".join(columns), len(columns) == 1
+    named = f"{where}: column{'' if one else 's'} {names}"
     if not any(grasp.force_n.any() for grasp in grasps):
-        raise MeasurementError(f"{where}: columns f_l_n, f_r_n: all forces are zero; are the sensors connected?")
+        raise MeasurementError(
+            f"{named}: all forces are zero; {'is the sensor' if one else 'are the sensors'} connected?"
+        )
     felt = np.array([feels(grasp.force_n) for grasp in grasps])
     if not felt.any() and len(grasps) > 1:  # a single grasp may well be too light to be felt
-        raise MeasurementError(f"{where}: columns f_l_n, f_r_n: no contact in any grasp; record grasps of an object")
-    warnings += [
-        f"{where}: column {FORCE[finger]}: the {name} finger feels nothing in any grasp"
-        for finger, name in enumerate(FINGERS)
-        if not felt[:, finger].any()
+        raise MeasurementError(f"{named}: no contact in any grasp; record grasps of an object")
+    warnings = [
+        f"{where}: column {column}: the {f'{side_of(column)} finger'.strip()} feels nothing in any grasp"
+        for channel, column in enumerate(columns)
+        if not felt[:, channel].any()
     ]
     return warnings + [
         f"{place(measured.path, grasp)}: no contact"
@@ -57,7 +68,7 @@ def check_liveness(measured: MeasurementSet, reach: float) -> list[str]:
 
 
 def _steps_only(measured: MeasurementSet, reach: float) -> bool:
-    """Whether the fingers go to commands that were given before the first sample, in most grasps."""
+    """Whether the motors go to commands that were given before the first sample, in most grasps."""
     gaps = [np.abs(g.position_m[[0, -1]] - g.command_m[[0, -1]]).max(axis=1) for g in measured.grasps]
     return float(np.mean([start > 0.05 * reach and end < 0.7 * start for start, end in gaps])) > 0.5
 
@@ -78,7 +89,7 @@ def without_trend(values: np.ndarray, time: np.ndarray) -> np.ndarray:
 
 
 def feels(force: np.ndarray) -> list[bool]:
-    """Per finger, whether the force ``(T, 2)`` does more than drift and jitter, whatever its noise is said to be.
+    """Per channel, whether the force ``(T, channels)`` does more than drift and jitter, whatever noise is given.
 
     Noise vanishes in the means of blocks, so that these show a light touch.
     """

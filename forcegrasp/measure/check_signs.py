@@ -9,7 +9,7 @@ import numpy as np
 from forcegrasp.errors import MeasurementError
 from forcegrasp.measure.check_liveness import feels, force_noise, without_trend
 from forcegrasp.measure.samples import place
-from forcegrasp.measure.schema import COMMAND, FINGERS, FORCE, POSITION, MeasuredGrasp, MeasurementSet
+from forcegrasp.measure.schema import MeasuredGrasp, MeasurementSet, side_of
 
 #: Positions may lag behind commands by any of these, in seconds.
 _LAGS = (0.0, 0.05, 0.1, 0.2, 0.4, 0.8)
@@ -18,19 +18,23 @@ _LAGS = (0.0, 0.05, 0.1, 0.2, 0.4, 0.8)
 def check_signs(measured: MeasurementSet, open_m: float, closed_m: float) -> None:
     """Raises MeasurementError if a closing direction, the sign of a force, or the fingers are the wrong way round."""
     reach = open_m - closed_m
-    for finger in range(2):
-        _check_follows(measured, finger, abs(reach))
-        _check_presses(measured, finger, closed_m, reach)
-    _check_fingers(measured, abs(reach))
-    for grasp in measured.grasps:
-        _check_free_air(measured, grasp, abs(reach))
+    for motor in range(len(measured.columns.position)):
+        _check_follows(measured, motor, abs(reach))
+    if measured.columns.read_effort:
+        _check_effort(measured)
+    for channel in range(0 if measured.columns.read_effort else len(measured.columns.force)):
+        _check_presses(measured, channel, closed_m, reach)
+    if measured.columns.are_pads:  # else positions do not tell where each pad is
+        _check_fingers(measured, abs(reach))
+        for grasp in measured.grasps:
+            _check_free_air(measured, grasp, abs(reach))
 
 
-def _check_follows(measured: MeasurementSet, finger: int, reach: float) -> None:
+def _check_follows(measured: MeasurementSet, motor: int, reach: float) -> None:
     """Positions must not run against commands that cover a good part of the range, whatever the delay."""
     against = []
     for grasp in measured.grasps:
-        command, position = grasp.command_m[:, finger], grasp.position_m[:, finger]
+        command, position = grasp.command_m[:, motor], grasp.position_m[:, motor]
         if np.ptp(command) < 0.2 * reach or np.ptp(position) < 0.2 * np.ptp(command):
             continue
         found = [_correlation(position, _held(grasp.time_s, command, grasp.time_s - lag)) for lag in _LAGS]
@@ -38,36 +42,52 @@ def _check_follows(measured: MeasurementSet, finger: int, reach: float) -> None:
             against.append((min(found), grasp))
     if against and (min(lowest for lowest, _ in against) < -0.9 or len(against) > 1):
         raise MeasurementError(
-            f"{place(measured.path, against[0][1], 0, POSITION[finger])}: runs against {COMMAND[finger]}; both must be"
-            " 0 when closed and grow when opening"
+            f"{place(measured.path, against[0][1], 0, measured.columns.position[motor])}: runs against"
+            f" {measured.columns.command[motor]}; both must be 0 when closed and grow when opening"
         )
 
 
-def _check_presses(measured: MeasurementSet, finger: int, closed_m: float, reach: float) -> None:
-    """Forces must grow as commands close; asked session by session, of grasps in which this finger feels much."""
-    largest = max((_span(grasp.force_n[:, k])[2] for grasp in measured.grasps for k in range(2)), default=0.0)
+def _check_effort(measured: MeasurementSet) -> None:
+    """A motor's effort must close while it is commanded to close further than it is, moving or not."""
+    behind = np.concatenate([(g.position_m - g.command_m)[:, 0] for g in measured.grasps])
+    if _correlation(np.concatenate([g.force_n[:, 0] for g in measured.grasps]), behind) < -0.5:
+        where = place(measured.path, measured.grasps[0], 0, measured.columns.force[0])
+        raise MeasurementError(
+            f"{where}: opens while the command is to close; f ≥ 0 presses, multiply them by -1; or q = 0 must be closed"
+        )
+
+
+def _check_presses(measured: MeasurementSet, channel: int, closed_m: float, reach: float) -> None:
+    """Forces must grow as commands close; asked session by session, of grasps in which this channel feels much."""
+    columns = measured.columns
+    largest = max(
+        (_span(grasp.force_n[:, k])[2] for grasp in measured.grasps for k in range(len(columns.force))), default=0.0
+    )
     sessions: dict[str, list[MeasuredGrasp]] = defaultdict(list)
     for grasp in measured.grasps:
-        force = grasp.force_n[:, finger]
+        force = grasp.force_n[:, channel]
         least = max(0.2 * largest, 8 * force_noise(force, measured.force_std_n))
-        if _span(force)[2] > least and feels(grasp.force_n)[finger]:
+        if _span(force)[2] > least and feels(grasp.force_n)[channel]:
             sessions[grasp.session].append(grasp)
     for grasps in sessions.values():
         first = grasps[0]
-        if _wrong_way([_answer(g, g.force_n[:, finger], g.command_m.mean(axis=1) / reach) for g in grasps]):
-            low, high, _ = _span(first.force_n[:, finger])
+        if _wrong_way([_answer(g, g.force_n[:, channel], g.command_m.mean(axis=1) / reach) for g in grasps]):
+            low, high, _ = _span(first.force_n[:, channel])
             if -low > high:
                 what, todo = "pressing gives negative forces", "multiply them by -1: f ≥ 0 presses"
             else:
                 what, todo = "grows while the fingers open", "the closing direction is wrong: q = 0 must be closed"
-            raise MeasurementError(f"{place(measured.path, first, 0, FORCE[finger])}: {what}; {todo}")
+            raise MeasurementError(f"{place(measured.path, first, 0, columns.force[channel])}: {what}; {todo}")
+        if not columns.are_pads:
+            continue
         # One finger the wrong way round leaves the mean of both commands as it is; but then it starts closed.
-        starts = [(g.position_m[0, [finger, 1 - finger]] - closed_m) / reach for g in grasps]
+        starts = [(g.position_m[0, [channel, 1 - channel]] - closed_m) / reach for g in grasps]
         if all(own < 0.25 and other > 0.6 for own, other in starts) and _wrong_way(
-            [_answer(g, g.force_n[:, finger], g.command_m[:, finger] / reach) for g in grasps]
+            [_answer(g, g.force_n[:, channel], g.command_m[:, channel] / reach) for g in grasps]
         ):
             raise MeasurementError(
-                f"{place(measured.path, first, 0, POSITION[finger])}: the {FINGERS[finger]} finger presses more"
+                f"{place(measured.path, first, 0, columns.position[channel])}:"
+                f" the {side_of(columns.force[channel])} finger presses more"
                 " the further it opens; the closing direction is wrong: q = 0 must be closed"
             )
 
@@ -121,8 +141,9 @@ def _check_fingers(measured: MeasurementSet, reach: float) -> None:
             wrong.append(grasp)
     if len(wrong) > 1 and len(wrong) >= 0.8 * len(wrong + right):
         raise MeasurementError(
-            f"{place(measured.path, wrong[0], 0, FORCE[0])}: the wrong finger touches first in {len(wrong)} of"
-            f" {len(wrong + right)} off-centre grasps; are left and right swapped? or correct object_offset_m"
+            f"{place(measured.path, wrong[0], 0, measured.columns.force[0])}: the wrong finger touches"
+            f" first in {len(wrong)} of {len(wrong + right)} off-centre grasps; are left and"
+            " right swapped? or correct object_offset_m"
         )
 
 
@@ -143,8 +164,9 @@ def _check_free_air(measured: MeasurementSet, grasp: MeasuredGrasp, reach: float
         if np.std(rest) > max(15 * noise, 0.2 * largest) and crossings > 3:
             index = int(np.abs(rest).argmax())
             raise MeasurementError(
-                f"{place(measured.path, grasp, index, FORCE[finger])}: {force[index]:.3g} N in free air, where forces"
-                f" fluctuate by {np.std(rest):.2g} N; cut it out, or correct object_radius_m or object_offset_m"
+                f"{place(measured.path, grasp, index, grasp.columns.force[finger])}: {force[index]:.3g} N in free"
+                f" air, where forces fluctuate by {np.std(rest):.2g} N; cut it out, or correct object_radius_m or"
+                " object_offset_m"
             )
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from forcegrasp.errors import MeasurementError
@@ -17,7 +19,9 @@ from forcegrasp.measure.schema import FinalForceTable, MeasurementSet
 _GAP = 5
 
 
-def check_set(measured: MeasurementSet, open_m: float, closed_m: float = 0.0) -> list[str]:
+def check_set(
+    measured: MeasurementSet, open_m: float, closed_m: float = 0.0, half_opening_m: float | None = None
+) -> list[str]:
     """Checks a set against the gripper it is said to come from.
 
     Bias, drift, delays, dead zones, saturation, crosstalk, adhesion and the like are legitimate: they are for the
@@ -25,8 +29,9 @@ def check_set(measured: MeasurementSet, open_m: float, closed_m: float = 0.0) ->
 
     Args:
       measured: the set.
-      open_m: position of a finger that is fully open.
-      closed_m: position of a finger that is fully closed.
+      open_m: position of a motor that is fully open, m or rad.
+      closed_m: position of a motor that is fully closed.
+      half_opening_m: half of what fits between the pads; left out, a sliding motor's reach; of one that turns, any.
 
     Returns:
       Warnings, one line each.
@@ -43,7 +48,9 @@ def check_set(measured: MeasurementSet, open_m: float, closed_m: float = 0.0) ->
                 f"{place(measured.path, grasp)}: {len(grasp.time_s)} samples are too few, {MIN_SAMPLES} are needed;"
                 " is a sample here called a grasp? else remove it"
             )
-    warnings = check_units(measured, open_m, closed_m)
+    if half_opening_m is None:
+        half_opening_m = abs(open_m - closed_m) if measured.columns.unit == "m" else math.inf
+    warnings = check_units(measured, open_m, closed_m, half_opening_m)
     warnings += check_liveness(measured, abs(open_m - closed_m))
     check_signs(measured, open_m, closed_m)
     if len(measured.grasps) == 1:

@@ -11,7 +11,7 @@ import polars as pl
 
 from forcegrasp.errors import MeasurementError
 from forcegrasp.measure.folder import MAX_ROWS, show
-from forcegrasp.measure.table import Columns, Table
+from forcegrasp.measure.table import FileColumns, Table
 
 _CHUNK = 1 << 24
 _MAX_LINE = 10_000
@@ -19,7 +19,7 @@ _QUOTED = re.compile(r'("([^"]|"")*"|[^",]*)(,("([^"]|"")*"|[^",]*))*')
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?|[-+]?(nan|inf|infinity)", re.ASCII | re.IGNORECASE)
 
 
-def read_csv(path: Path, columns: Columns) -> Table:
+def read_csv(path: Path, columns: FileColumns) -> Table:
     """Returns the table in a CSV file: UTF-8, commas, decimal points, a header, one row per line.
 
     Raises:
@@ -84,7 +84,7 @@ def _count_rows(path: Path) -> int:
     return lines
 
 
-def _header(path: Path, columns: Columns) -> tuple[list[str], list[str]]:
+def _header(path: Path, columns: FileColumns) -> tuple[list[str], list[str]]:
     """Returns the columns, and those of them that are to be skipped."""
     with open(path, encoding="utf-8-sig", newline="\n") as file:
         line = file.readline().removesuffix("\n").removesuffix("\r")
@@ -105,7 +105,7 @@ def _cells(path: Path, row: int, line: str) -> list[str]:
         raise MeasurementError(f"{show(path)}: row {row}: not a row of cells ({error}); correct it") from error
 
 
-def _inspect(path: Path, header: list[str], columns: Columns) -> None:
+def _inspect(path: Path, header: list[str], columns: FileColumns) -> None:
     """Raises MeasurementError about the first line that is no row, or the first cell that is no number."""
     blank = 0
     with open(path, encoding="utf-8-sig", newline="\n") as file:

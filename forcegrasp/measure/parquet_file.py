@@ -12,12 +12,12 @@ import polars as pl
 from forcegrasp.errors import MeasurementError
 from forcegrasp.measure.folder import MAX_BYTES, MAX_ROWS, show
 from forcegrasp.measure.parquet_footer import read_footer
-from forcegrasp.measure.table import Columns, Table
+from forcegrasp.measure.table import FileColumns, Table
 
 _TEXT = (pl.String, pl.Categorical, pl.Enum)
 
 
-def read_parquet(path: Path, columns: Columns) -> Table:
+def read_parquet(path: Path, columns: FileColumns) -> Table:
     """Returns the table in a Parquet file: text (or whole numbers) for names, floats or whole numbers for the rest.
 
     Raises:
@@ -62,7 +62,7 @@ def _without_stderr() -> Iterator[None]:
         os.close(nowhere)
 
 
-def _check_types(path: Path, schema: Mapping[str, pl.DataType], columns: Columns) -> None:
+def _check_types(path: Path, schema: Mapping[str, pl.DataType], columns: FileColumns) -> None:
     for name, kind in schema.items():
         if name in columns.text:
             fits, wanted = kind in _TEXT or kind.is_integer(), "text"

@@ -3,32 +3,31 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import polars as pl
 
-from forcegrasp.errors import MeasurementError, closest
+from forcegrasp.errors import ConfigError, MeasurementError, closest
 from forcegrasp.measure.csv_file import read_csv
 from forcegrasp.measure.folder import MAX_NAME, find_file, open_folder, show
 from forcegrasp.measure.parquet_file import read_parquet
 from forcegrasp.measure.samples import check_samples
 from forcegrasp.measure.schema import (
-    COMMAND,
-    FORCE,
     FORMAT,
     OBJECT,
-    POSITION,
-    SIGNALS,
     SPLITS,
+    Columns,
     FinalForceTable,
     MeasuredGrasp,
     MeasurementSet,
+    columns_of,
     fingerprint_of_set,
     fingerprint_of_table,
 )
-from forcegrasp.measure.table import Columns, Table
+from forcegrasp.measure.table import FileColumns, Table
 from forcegrasp.measure.yaml_file import Reader, load_yaml
 
 META = ("format", "kind", "gripper")
@@ -36,14 +35,13 @@ ABOUT = ("source", "license")
 NOISE = ("position_std_m", "force_std_n")
 MAX_TEXT = 10_000
 
-_GRASPS = Columns(
+_GRASPS = FileColumns(
     text=("grasp", "object", "session", "split"),
     numbers=("object_radius_m", "object_offset_m"),
     optional=("object_offset_m", "split"),
     blank=("object_radius_m", "object_offset_m", "split"),
 )
-_SAMPLES = Columns(text=("grasp",), numbers=(*SIGNALS, OBJECT), optional=(OBJECT,), blank=(OBJECT,))
-_FINAL = Columns(text=("object",), numbers=("delta_q_m", "final_force_n"))
+_FINAL = FileColumns(text=("object",), numbers=("delta_q_m", "final_force_n"))
 
 
 def read_set(path: str | Path) -> MeasurementSet | FinalForceTable:
@@ -86,16 +84,18 @@ def _read_table(folder: Path, meta: Reader, facts: dict[str, Any]) -> FinalForce
 
 def _read_grasps(folder: Path, meta: Reader, facts: dict[str, Any]) -> MeasurementSet:
     _refuse_files(folder, "grasps", ("table.csv",))
+    columns = gripper_columns(meta, folder)
+    in_samples = FileColumns(("grasp",), (*columns.signals, OBJECT), optional=(OBJECT,), blank=(OBJECT,))
     table = read_csv(find_file(folder, "grasps.csv"), _GRASPS)
     _check_grasps(table)
     both = [name for name in ("samples.csv", "samples.parquet") if os.path.lexists(folder / name)]
     if len(both) == 2:
         raise MeasurementError(f"{show(folder)}: has samples.csv and samples.parquet; remove one")
     if both == ["samples.parquet"]:
-        samples = read_parquet(find_file(folder, "samples.parquet"), _SAMPLES)
+        samples = read_parquet(find_file(folder, "samples.parquet"), in_samples)
     else:
-        samples = read_csv(find_file(folder, "samples.csv"), _SAMPLES)
-    grasps = _grasps(folder, table, samples)
+        samples = read_csv(find_file(folder, "samples.csv"), in_samples)
+    grasps = _grasps(folder, table, samples, columns)
     position_std = meta.positive("position_std_m")
     return MeasurementSet(
         **facts,
@@ -104,6 +104,26 @@ def _read_grasps(folder: Path, meta: Reader, facts: dict[str, Any]) -> Measureme
         fingerprint=fingerprint_of_set(facts["gripper"], position_std, facts["force_std_n"], grasps),
         notes=table.notes() + samples.notes(),
     )
+
+
+def gripper_columns(meta: Reader, folder: Path) -> Columns:
+    """What samples of the gripper hold that a file names; ``folder`` is where the path of its description starts.
+
+    Raises:
+      MeasurementError: if there is no such gripper, or its description can't be right.
+    """
+    from forcegrasp.physics.gripper_file import load_gripper  # brings MuJoCo, which nothing else here needs
+
+    try:
+        return columns_of(load_gripper(meta.text("gripper", MAX_NAME), folder))
+    except ConfigError as error:
+        raise meta.refuse("gripper", str(error).removeprefix("gripper=")) from error
+
+
+def side_by_side(samples: Mapping[str, np.ndarray] | pl.DataFrame, names: Sequence[str]) -> np.ndarray:
+    """Some columns of samples as an array, ``(T, len(names))``, which may be none."""
+    values = [np.asarray(samples[name], float) for name in names]
+    return np.stack(values, axis=1) if values else np.empty((len(samples["t_s"]), 0))
 
 
 def _refuse_files(folder: Path, kind: str, names: tuple[str, ...]) -> None:
@@ -134,7 +154,7 @@ def _check_grasps(table: Table) -> None:
                 )
 
 
-def _grasps(folder: Path, table: Table, samples: Table) -> tuple[MeasuredGrasp, ...]:
+def _grasps(folder: Path, table: Table, samples: Table, columns: Columns) -> tuple[MeasuredGrasp, ...]:
     """Joins the rows of grasps.csv with their samples, which may be interleaved."""
     names = table.frame["grasp"].to_list()
     numbered = samples.frame.with_row_index("row", offset=samples.first_row)
@@ -146,16 +166,14 @@ def _grasps(folder: Path, table: Table, samples: Table) -> tuple[MeasuredGrasp, 
     for index, name in enumerate(names):
         if name not in parts:
             raise table.refuse(index, "grasp", f"{show(name)} has no samples in {samples.path.name}; remove the row")
-    grasps = tuple(_grasp(samples, facts, parts[facts["grasp"]]) for facts in table.frame.iter_rows(named=True))
+    rows = table.frame.iter_rows(named=True)
+    grasps = tuple(_grasp(samples, facts, parts[facts["grasp"]], columns) for facts in rows)
     for grasp in grasps:
         check_samples(folder, grasp)
     return grasps
 
 
-def _grasp(samples: Table, facts: dict[str, Any], part: pl.DataFrame) -> MeasuredGrasp:
-    def columns(names: tuple[str, ...]) -> np.ndarray:
-        return np.stack([part[name].to_numpy() for name in names], axis=1)
-
+def _grasp(samples: Table, facts: dict[str, Any], part: pl.DataFrame, columns: Columns) -> MeasuredGrasp:
     seen = None
     if OBJECT in part.columns and part[OBJECT].null_count() < part.height:
         empty = part[OBJECT].is_null()
@@ -171,9 +189,10 @@ def _grasp(samples: Table, facts: dict[str, Any], part: pl.DataFrame) -> Measure
         offset_m=facts.get("object_offset_m"),
         split=facts.get("split") or None,
         time_s=np.array(part["t_s"].to_numpy()),
-        command_m=columns(COMMAND),
-        position_m=columns(POSITION),
-        force_n=columns(FORCE),
+        command_m=side_by_side(part, columns.command),
+        position_m=side_by_side(part, columns.position),
+        force_n=side_by_side(part, columns.force),
         object_m=seen,
         rows=part["row"].to_numpy().astype(np.int64),
+        columns=columns,
     )

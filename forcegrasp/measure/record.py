@@ -13,10 +13,10 @@ from forcegrasp.effects.for_gripper import effect_of
 from forcegrasp.errors import ConfigError, closest
 from forcegrasp.measure.plans import PERIOD_S, SAMPLES, make_plan
 from forcegrasp.measure.replay import EffectOn, Replay
-from forcegrasp.measure.schema import MeasuredGrasp, MeasurementSet, fingerprint_of_set
+from forcegrasp.measure.schema import MeasuredGrasp, MeasurementSet, columns_of, fingerprint_of_set
 from forcegrasp.physics.gripper import Gripper
 from forcegrasp.physics.gripper_parts import BaseParameter
-from forcegrasp.physics.sensors import is_rounding, with_noise
+from forcegrasp.physics.sensors import rounding_steps, with_noise
 from forcegrasp.short_repr import ShortRepr
 
 # Objects' radii, as shares of half the opening: both fingers reach them, and they fit in.
@@ -56,7 +56,7 @@ def record(
       effects: each with its variant and its parameters.
       known: base parameters of the gripper that are not drawn.
       off_nominal: largest share by which the other ones differ from nominal.
-      position_std_m: noise of the positions.
+      position_std_m: noise of the positions, m or rad.
       force_std_n: noise of the forces.
       seed: of everything random.
     """
@@ -79,7 +79,7 @@ def record(
     bare = [
         MeasuredGrasp(
             f"g{index:03}", f"object_{p.object + 1}", "simulated", float(radii[p.object]), p.offset_m, None,
-            time, p.command_m, rest, unloaded, None,
+            time, p.command_m, rest, unloaded, None, columns=columns_of(gripper),
         )
         for index, p in enumerate(planned)
     ]  # fmt: skip
@@ -94,7 +94,7 @@ def record(
         [e for e in on if not e.effect.reads_only(e.variant)],
     )
     readings = replay.read(motion, rows, base["force_scale"], [e for e in on if e.effect.reads()])
-    steps = next((values for effect, _, values in effects if is_rounding(effect)), np.zeros(2))
+    steps = rounding_steps((effect, values) for effect, _, values in effects)
     position = with_noise(readings.position, position_std_m, rng.standard_normal(readings.position.shape), steps[0])
     force = with_noise(readings.force, force_std_n, rng.standard_normal(readings.force.shape), steps[1])
     full = tuple(dataclasses.replace(g, position_m=position[i], force_n=force[i]) for i, g in enumerate(bare))

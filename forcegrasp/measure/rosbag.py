@@ -29,15 +29,12 @@ import numpy as np
 
 from forcegrasp.errors import MeasurementError, closest
 from forcegrasp.measure.folder import MAX_NAME, MAX_ROWS, show
-from forcegrasp.measure.read import MAX_TEXT, NOISE
+from forcegrasp.measure.read import MAX_TEXT, NOISE, gripper_columns, side_by_side
 from forcegrasp.measure.samples import check_samples
 from forcegrasp.measure.schema import (
-    COMMAND,
-    FORCE,
     OBJECT,
-    POSITION,
-    SIGNALS,
     SPLITS,
+    Columns,
     MeasuredGrasp,
     MeasurementSet,
     fingerprint_of_set,
@@ -84,8 +81,8 @@ def convert_bag(mapping_file: str | Path) -> MeasurementSet:
     place = show(path)
     required = ("bag", "gripper", "source", "license", "clock", "signals", "grasps")
     top = Reader(load_yaml(path), place, required, NOISE)
-    known = top.get("signals")
-    mapping = Reader(known, f"{place}: signals", SIGNALS[1:], (OBJECT,))
+    columns, known = gripper_columns(top, path.parent), top.get("signals")
+    mapping = Reader(known, f"{place}: signals", columns.signals[1:], (OBJECT,))
     signals = {name: _signal(mapping.get(name), f"{place}: signals: {name}") for name in known}
     clock = top.text("clock", MAX_NAME)
     if clock not in signals:
@@ -94,7 +91,7 @@ def convert_bag(mapping_file: str | Path) -> MeasurementSet:
         raise top.refuse("grasps", "must be a list with one entry per grasp")
     readings = _read_bag(path.parent / top.text("bag", MAX_TEXT), signals)
     grasps = tuple(
-        _cut(entry, f"{place}: grasps, entry {number}", clock, readings)
+        _cut(entry, f"{place}: grasps, entry {number}", clock, readings, columns)
         for number, entry in enumerate(top.get("grasps"), 1)
     )
     for number, grasp in enumerate(grasps, 1):
@@ -182,7 +179,7 @@ def _value(path: Path, name: str, signal: _Signal, message: Any, kind: str) -> f
         ) from error
 
 
-def _cut(entry: Any, place: str, clock: str, readings: dict[str, np.ndarray]) -> MeasuredGrasp:
+def _cut(entry: Any, place: str, clock: str, readings: dict[str, np.ndarray], columns: Columns) -> MeasuredGrasp:
     """One grasp: a sample at each message of the clock, with the newest reading of all other signals."""
     required = ("grasp", "object", "session", "start_s", "end_s")
     reader = Reader(entry, place, required, ("object_radius_m", "object_offset_m", "split"))
@@ -197,12 +194,12 @@ def _cut(entry: Any, place: str, clock: str, readings: dict[str, np.ndarray]) ->
     if not len(time):
         ends = readings[clock][[0, -1], 0]
         raise reader.refuse("start_s", f"no message of {clock} until end_s; the bag has some from {ends[0]:g} s")
-    columns = {}
+    cut = {"t_s": time}
     for name, values in readings.items():
         newest = np.searchsorted(values[:, 0], time, side="right") - 1
         if newest[0] < 0:
             raise reader.refuse("start_s", f"{name} has no reading before {values[0, 0]:g} s; start later")
-        columns[name] = values[newest, 1]
+        cut[name] = values[newest, 1]
     return MeasuredGrasp(
         name=reader.text("grasp", MAX_NAME),
         object=reader.text("object", MAX_NAME),
@@ -211,8 +208,9 @@ def _cut(entry: Any, place: str, clock: str, readings: dict[str, np.ndarray]) ->
         offset_m=reader.number("object_offset_m"),
         split=split,
         time_s=time,
-        command_m=np.stack([columns[name] for name in COMMAND], axis=1),
-        position_m=np.stack([columns[name] for name in POSITION], axis=1),
-        force_n=np.stack([columns[name] for name in FORCE], axis=1),
-        object_m=columns.get(OBJECT),
+        command_m=side_by_side(cut, columns.command),
+        position_m=side_by_side(cut, columns.position),
+        force_n=side_by_side(cut, columns.force),
+        object_m=cut.get(OBJECT),
+        columns=columns,
     )

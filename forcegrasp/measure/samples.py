@@ -30,9 +30,12 @@ def place(path: Path, grasp: MeasuredGrasp, index: int | None = None, column: st
 def check_samples(path: Path, grasp: MeasuredGrasp) -> None:
     """Raises MeasurementError if shapes differ, a number is not finite, or time does not run forward."""
     count = len(grasp.time_s)
-    pairs = (grasp.command_m, grasp.position_m, grasp.force_n)
+    columns = grasp.columns
+    widths = [(grasp.command_m, columns.command), (grasp.position_m, columns.position), (grasp.force_n, columns.force)]
     others = [grasp.object_m] if grasp.object_m is not None else []
-    if any(np.shape(pair) != (count, 2) for pair in pairs) or any(np.shape(other) != (count,) for other in others):
+    if any(np.shape(values) != (count, len(names)) for values, names in widths) or any(
+        np.shape(other) != (count,) for other in others
+    ):
         raise MeasurementError(f"{place(path, grasp)}: its signals must have one row per time stamp")
     if not count:
         raise MeasurementError(f"{place(path, grasp)}: has no samples; add them or remove the grasp")

@@ -7,25 +7,68 @@ import json
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from forcegrasp.short_repr import ShortRepr, counted, cut
 
+if TYPE_CHECKING:
+    from forcegrasp.physics.gripper import Gripper
+
 FORMAT = "forcegrasp-measurements/1"
 SPLITS = ("fit", "check")
-FINGERS = ("left", "right")
-COMMAND = ("qdes_l_m", "qdes_r_m")
-POSITION = ("q_l_m", "q_r_m")
-FORCE = ("f_l_n", "f_r_n")
-#: Every number of a sample that must be there, in the order of the file.
-SIGNALS = ("t_s", *COMMAND, *POSITION, *FORCE)
 OBJECT = "o_y_m"
+_SIDES = {"l": "left", "r": "right"}
+
+
+@dataclass(frozen=True)
+class Columns:
+    """Names of what a gripper's samples hold: a command and a position per motor, and its force channels."""
+
+    command: tuple[str, ...]
+    position: tuple[str, ...]
+    force: tuple[str, ...]
+
+    @property
+    def signals(self) -> tuple[str, ...]:
+        """Every number of a sample that must be there, in the order of the file."""
+        return ("t_s", *self.command, *self.position, *self.force)
+
+    @property
+    def unit(self) -> str:
+        """Unit of commands and positions: "m" or "rad"."""
+        return self.position[0].rpartition("_")[2]
+
+    @property
+    def are_pads(self) -> bool:
+        """Whether positions and forces are those of a left and a right pad, each with a motor of its own."""
+        return self == TWO_FINGERS
+
+    @property
+    def read_effort(self) -> bool:
+        """Whether the only force is the effort of the only motor; sensors are those of a left or a right finger."""
+        return len(self.position) == 1 and self.force == ("f_n",)
+
+
+#: Of a gripper whose two fingers have a sliding motor and a force sensor each.
+TWO_FINGERS = Columns(("qdes_l_m", "qdes_r_m"), ("q_l_m", "q_r_m"), ("f_l_n", "f_r_n"))
+
+
+def columns_of(gripper: Gripper) -> Columns:
+    """The columns of a gripper's samples."""
+    named = (tuple(c.column for c in channels) for channels in (gripper.commands, gripper.positions, gripper.forces))
+    return Columns(*named)
+
+
+def side_of(column: str) -> str:
+    """Which finger or motor a column belongs to: "left" or "right"; "" if it is the only one."""
+    return _SIDES.get(column.split("_")[1], "")
 
 
 @dataclass(frozen=True, repr=False)
 class MeasuredGrasp(ShortRepr):
-    """One recorded grasp of T samples. Columns of two are left and right finger; 0 m is closed, forces press if ≥ 0."""
+    """One recorded grasp of T samples. A position of 0 is closed, forces press if ≥ 0; ``columns`` tells the order."""
 
     name: str
     object: str
@@ -34,19 +77,20 @@ class MeasuredGrasp(ShortRepr):
     offset_m: float | None  #: object position along the grasp axis, towards the right finger; None if not given
     split: str | None  #: "fit", "check" or None
     time_s: np.ndarray  #: ``(T,)``
-    command_m: np.ndarray  #: ``(T, 2)``, commanded at ``time_s`` and held until the next sample
-    position_m: np.ndarray  #: ``(T, 2)``, read before that command acts
-    force_n: np.ndarray  #: ``(T, 2)``, read before that command acts
+    command_m: np.ndarray  #: m or rad, ``(T, motors)``, commanded at ``time_s`` and held until the next sample
+    position_m: np.ndarray  #: m or rad, ``(T, motors)``, read before that command acts
+    force_n: np.ndarray  #: ``(T, channels)``, read before that command acts
     object_m: np.ndarray | None  #: ``(T,)``, object position along the grasp axis; None if not measured
     rows: np.ndarray | None = field(default=None, compare=False)  #: ``(T,)``, where the samples stand in their file
+    columns: Columns = TWO_FINGERS
 
     def summary(self) -> str:
         return f"{cut(self.name)} on {cut(self.object)}, {counted(len(self.time_s), 'sample')}"
 
     def signals(self) -> dict[str, np.ndarray]:
         """Every measured signal by its column name, each ``(T,)``."""
-        columns = [self.time_s, *self.command_m.T, *self.position_m.T, *self.force_n.T]
-        named: dict[str, np.ndarray] = dict(zip(SIGNALS, columns, strict=True))
+        values = [self.time_s, *self.command_m.T, *self.position_m.T, *self.force_n.T]
+        named: dict[str, np.ndarray] = dict(zip(self.columns.signals, values, strict=True))
         return named if self.object_m is None else named | {OBJECT: self.object_m}
 
 
@@ -59,11 +103,16 @@ class MeasurementSet(ShortRepr):
     gripper: str
     source: str
     license: str
-    position_std_m: float | None  #: noise of the positions, if known
+    position_std_m: float | None  #: noise of the positions, m or rad, if known
     force_std_n: float | None  #: noise of the forces, if known
     grasps: tuple[MeasuredGrasp, ...]
     fingerprint: str  #: sha256 of all that a result can depend on; see ``fingerprint_of_set``
     notes: tuple[str, ...] = field(default=(), compare=False)  #: what was odd when it was read, one line each
+
+    @property
+    def columns(self) -> Columns:
+        """What its samples hold, which is the same in all grasps."""
+        return self.grasps[0].columns if self.grasps else TWO_FINGERS
 
     def summary(self) -> str:
         objects = counted(len({grasp.object for grasp in self.grasps}), "object")

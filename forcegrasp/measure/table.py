@@ -15,7 +15,7 @@ from forcegrasp.measure.names import misfits
 
 
 @dataclass(frozen=True)
-class Columns:
+class FileColumns:
     """The columns that a file may have."""
 
     text: tuple[str, ...]
@@ -41,7 +41,7 @@ class Columns:
 
 @dataclass(frozen=True)
 class Table:
-    """Columns of a file: text as pl.String and numbers as pl.Float64."""
+    """FileColumns of a file: text as pl.String and numbers as pl.Float64."""
 
     path: Path
     frame: pl.DataFrame
@@ -57,7 +57,7 @@ class Table:
         """The error to raise about one cell; ``index`` counts rows from 0."""
         return MeasurementError(f"{show(self.path)}: row {self.first_row + index}, column {column}: {problem}")
 
-    def check_cells(self, columns: Columns) -> None:
+    def check_cells(self, columns: FileColumns) -> None:
         """Raises MeasurementError about the first cell that is empty, not finite, or no proper name."""
         if not self.frame.height:
             raise MeasurementError(f"{show(self.path)}: holds no rows; fill it or remove the set")

@@ -12,7 +12,7 @@ import yaml
 from forcegrasp.errors import MeasurementError
 from forcegrasp.measure.folder import show
 from forcegrasp.measure.samples import check_samples
-from forcegrasp.measure.schema import FORMAT, OBJECT, SIGNALS, FinalForceTable, MeasurementSet
+from forcegrasp.measure.schema import FORMAT, FinalForceTable, MeasurementSet
 
 
 def write_set(measured: MeasurementSet, folder: str | Path, samples: str = "csv") -> Path:
@@ -60,9 +60,8 @@ def write_table(table: FinalForceTable, folder: str | Path) -> Path:
 
 
 def _frame(name: str, signals: dict[str, np.ndarray]) -> pl.DataFrame:
-    order = [column for column in (*SIGNALS, OBJECT) if column in signals]
     names = pl.Series("grasp", [name], dtype=pl.String).new_from_index(0, len(signals["t_s"]))
-    return pl.DataFrame([names, *(pl.Series(column, np.asarray(signals[column], float)) for column in order)])
+    return pl.DataFrame([names, *(pl.Series(column, np.asarray(signals[column], float)) for column in signals)])
 
 
 def _meta(measured: MeasurementSet | FinalForceTable, kind: str) -> dict[str, str | float | None]:

@@ -15,6 +15,7 @@ from forcegrasp.config import TrainConfig
 from forcegrasp.controllers.policy import make_policy
 from forcegrasp.curriculum import CurriculumValues, LinearSchedule
 from forcegrasp.effects.model_file import Model
+from forcegrasp.effects.variation import with_noise_of
 from forcegrasp.env.episodes import summarise
 from forcegrasp.errors import CheckpointError
 from forcegrasp.physics import load_gripper
@@ -43,7 +44,7 @@ class Trainer:
         torch.set_num_threads(1)  # the physics needs the cores
         torch.manual_seed(config.seed)
         self.gripper = load_gripper(config.gripper)
-        config = self.config = complete(config, self.gripper)
+        config = self.config = complete(config, with_noise_of(self.gripper, model))
         self.env: TransformedEnv = training_env(config, model)
         self.schedule = LinearSchedule(config.curriculum, config.grasp, config.reward, config.ppo.total_frames)
         device = self.env.device

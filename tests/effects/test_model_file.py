@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from forcegrasp.effects import catalogue, get_effect
+from forcegrasp.effects.for_gripper import effect_of
 from forcegrasp.effects.model_file import Fitted, FoundEffect, Model, read_model, write_model
 from forcegrasp.errors import ConfigError
 from forcegrasp.physics.gripper_file import load_gripper
@@ -269,3 +270,50 @@ def test_file_that_cannot_be_written(tmp_path):
     for path in (tmp_path, tmp_path / "model.yaml" / "inside.yaml", Path(os.devnull) / "model.yaml"):
         with pytest.raises(ConfigError, match="could not write the model"):
             write_model(model, path)
+
+
+# --- noise, and effects of other grippers --------------------------------------------------------------------------
+
+NOISE = "noise: {position_std: 3.0e-05, force_std_n: 0.02}\n"
+
+
+def test_noise_is_read_and_written(tmp_path):
+    model = read_model(put(tmp_path, GOOD + NOISE))
+    assert model.noise == (3e-5, 0.02)
+    write_model(model, tmp_path / "again.yaml")
+    assert read_model(tmp_path / "again.yaml").noise == (3e-5, 0.02)
+    assert "noise: {position_std: 3.0e-05, force_std_n: 0.02}" in (tmp_path / "again.yaml").read_text()
+    old = read_model(put(tmp_path, GOOD))  # files of before have none
+    assert old.noise is None
+    write_model(old, tmp_path / "again.yaml")
+    assert "noise" not in (tmp_path / "again.yaml").read_text()
+
+
+@pytest.mark.parametrize(
+    ("noise", "key", "told"),
+    [
+        ("{position_std: 0, force_std_n: 0.02}", "noise.position_std", "must be positive"),
+        ("{position_std: 3.0e-5, force_std_n: -0.02}", "noise.force_std_n", "must be positive"),
+        ("{position_std: 3.0e-5, force_std_n: .inf}", "noise.force_std_n", "must be positive"),
+        ("{position_std: 3.0e-5}", "noise.force_std_n", "missing"),
+        ("{position_std: 3.0e-5, force_std: 0.02}", "noise.force_std", "did you mean force_std_n"),
+        ("{position_std: wide, force_std_n: 0.02}", "noise.position_std", "must be a number"),
+        ("[1, 2]", "noise", "must be a mapping"),
+    ],
+)
+def test_wrong_noise(tmp_path, noise, key, told):
+    refuse(put(tmp_path, f"{GOOD}noise: {noise}\n"), key, told)
+
+
+def test_effects_are_those_of_the_gripper(tmp_path):
+    gripper = load_gripper("so101_gripper")
+    base = {n: Fitted(p.nominal, p.low, p.high, p.unit) for n, p in gripper.parameters.items() if p.scope == "gripper"}
+    backlash = effect_of("backlash", gripper)
+    gap = {"gap_rad": Fitted(0.01, 0.009, 0.011, "rad")}
+    write_model(Model(gripper, base, effects=(FoundEffect(backlash, "play", gap),)), tmp_path / "model.yaml")
+    text = (tmp_path / "model.yaml").read_text()
+    assert "gap_rad: {value: 0.01, low: 0.009, high: 0.011, unit: rad}" in text
+    found = read_model(tmp_path / "model.yaml").effects[0]
+    assert (found.effect, found.parameters) == (backlash, gap)
+    refuse(put(tmp_path, text.replace("gap_rad", "gap_m")), "effects.backlash.gap_m", "did you mean gap_rad")
+    refuse(put(tmp_path, text.replace("backlash:", "force_crosstalk:")), "force_crosstalk", "needs 2 force readings")

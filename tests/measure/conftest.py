@@ -8,6 +8,7 @@ import pytest
 from measured_rig import make_set, standard_grasps
 
 from forcegrasp.measure import MeasuredGrasp, MeasurementSet, write_set
+from forcegrasp.physics.gripper_file import default_gripper
 
 
 @pytest.fixture(scope="session")
@@ -39,3 +40,10 @@ def folder(valid_files, tmp_path) -> Path:
     for name in ("meta.yaml", "grasps.csv", "samples.csv"):
         (path / name).write_bytes(valid_files[name])
     return path
+
+
+@pytest.fixture
+def any_gripper(monkeypatch):
+    """Every name is that of a gripper like the paper's."""
+    gripper = default_gripper()
+    monkeypatch.setattr("forcegrasp.physics.gripper_file.load_gripper", lambda name, folder: gripper)

@@ -8,7 +8,7 @@ import pytest
 from measured_rig import edit, refuse
 
 from forcegrasp.measure import read_set
-from forcegrasp.measure.schema import OBJECT, SIGNALS
+from forcegrasp.measure.schema import OBJECT, TWO_FINGERS
 
 BAD_NUMBERS = {
     "a word": "abc",
@@ -34,14 +34,14 @@ BAD_NUMBERS = {
 }
 
 
-@pytest.mark.parametrize("column", [*SIGNALS, OBJECT])
+@pytest.mark.parametrize("column", [*TWO_FINGERS.signals, OBJECT])
 @pytest.mark.parametrize("case", BAD_NUMBERS)
 def test_number(folder, column, case):
     edit(folder / "samples.csv", 42, column, BAD_NUMBERS[case])
     refuse(folder, "samples.csv", "row 42", f"column {column}")
 
 
-@pytest.mark.parametrize("column", SIGNALS)
+@pytest.mark.parametrize("column", TWO_FINGERS.signals)
 def test_empty_number(folder, column):
     edit(folder / "samples.csv", 601, column, "")
     refuse(folder, "samples.csv", "row 601", f"column {column}", "empty")

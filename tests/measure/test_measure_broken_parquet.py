@@ -12,7 +12,7 @@ from measured_rig import refuse
 from forcegrasp.errors import MeasurementError
 from forcegrasp.measure import read_set
 from forcegrasp.measure.parquet_footer import Footer, read_footer
-from forcegrasp.measure.schema import OBJECT, SIGNALS
+from forcegrasp.measure.schema import OBJECT, TWO_FINGERS
 
 
 @pytest.fixture
@@ -96,7 +96,7 @@ def test_claims_to_be_huge(parquet, rows, size, word):
 
 def test_zeros_that_unpack_to_5_gb(parquet):
     file = parquet / "samples.parquet"
-    pl.DataFrame({name: np.zeros(1000) for name in SIGNALS}).write_parquet(file)
+    pl.DataFrame({name: np.zeros(1000) for name in TWO_FINGERS.signals}).write_parquet(file)
     assert read_footer(file).rows == 1000
     assert 0 < read_footer(file).bytes < 100_000
     pl.DataFrame({"t_s": pl.Series([0.0]).new_from_index(0, 21_000_000)}).write_parquet(file)
@@ -111,7 +111,7 @@ def test_footer_agrees_with_polars(parquet, row_group):
     assert len(read_set(parquet).grasps) == 6
 
 
-@pytest.mark.parametrize("column", [*SIGNALS, OBJECT])
+@pytest.mark.parametrize("column", [*TWO_FINGERS.signals, OBJECT])
 @pytest.mark.parametrize("value", [None, float("nan"), float("inf"), float("-inf")])
 def test_number(parquet, column, value):
     if column == OBJECT and value is None:
@@ -171,7 +171,7 @@ def test_name(parquet, value):
 
 def test_columns(parquet):
     whole = pl.read_parquet(parquet / "samples.parquet")
-    for name in ("grasp", *SIGNALS):
+    for name in ("grasp", *TWO_FINGERS.signals):
         whole.drop(name).write_parquet(parquet / "samples.parquet")
         refuse(parquet, f"missing columns: {name};")
         whole.rename({name: f"{name}_"}).write_parquet(parquet / "samples.parquet")

@@ -11,7 +11,7 @@ from measured_rig import OPEN_M
 
 from forcegrasp.errors import MeasurementError
 from forcegrasp.measure import check_set, convert_bag, read_set, write_set
-from forcegrasp.measure.schema import SIGNALS
+from forcegrasp.measure.schema import TWO_FINGERS
 
 rosbags = pytest.importorskip("rosbags")
 from rosbags import rosbag1, rosbag2  # noqa: E402
@@ -229,4 +229,4 @@ def test_no_mapping(tmp_path):
 
 
 def test_all_signals_are_asked_for():
-    assert all(f"  {name}: " in MAPPING for name in SIGNALS[1:])
+    assert all(f"  {name}: " in MAPPING for name in TWO_FINGERS.signals[1:])

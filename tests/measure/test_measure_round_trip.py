@@ -15,7 +15,7 @@ from measured_rig import change, edit, make_set
 
 from forcegrasp.errors import ForcegraspError, MeasurementError
 from forcegrasp.measure import FinalForceTable, MeasurementSet, read_set, write_set, write_table
-from forcegrasp.measure.schema import OBJECT, SIGNALS, fingerprint_of_table
+from forcegrasp.measure.schema import OBJECT, TWO_FINGERS, fingerprint_of_table
 
 
 def _same(a: MeasurementSet, b: MeasurementSet) -> None:
@@ -84,7 +84,7 @@ def test_what_is_not_given(grasps, tmp_path, samples, changes):
     ],
     ids=str,
 )
-def test_meta(grasps, tmp_path, changes):
+def test_meta(grasps, tmp_path, changes, any_gripper):
     _same(make_set(grasps, **changes), read_set(write_set(make_set(grasps, **changes), tmp_path / "set")))
 
 
@@ -127,9 +127,9 @@ def test_fingerprint_of_every_format(folder, measured, valid_files):
         assert read_set(folder).fingerprint == measured.fingerprint
 
 
-def test_fingerprint_follows_every_number(measured, folder):
+def test_fingerprint_follows_every_number(measured, folder, any_gripper):
     seen = {measured.fingerprint}
-    edits = [("samples.csv", 44, name, "0.01234") for name in (*SIGNALS[1:], OBJECT)]
+    edits = [("samples.csv", 44, name, "0.01234") for name in (*TWO_FINGERS.signals[1:], OBJECT)]
     edits += [("samples.csv", 44, "t_s", "1.6801")]
     edits += [("grasps.csv", 3, name, "0.0111") for name in ("object_radius_m", "object_offset_m")]
     edits += [("grasps.csv", 3, name, "another") for name in ("object", "session")]

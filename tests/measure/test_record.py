@@ -17,6 +17,7 @@ from forcegrasp.measure.record import Recorded, parse_effect, record
 from forcegrasp.measure.replay import EffectOn, Replay
 from forcegrasp.physics.gripper import Gripper
 from forcegrasp.physics.gripper_file import load_gripper
+from forcegrasp.physics.sensors import rounding_steps, with_noise
 
 TIAGO = load_gripper("tiago")
 SECOND = load_gripper(str(Path(__file__).parents[1] / "grippers" / "second.yaml"))
@@ -52,7 +53,9 @@ def replay_truth(made: Recorded, gripper: Gripper, effects: tuple[Use, ...]) -> 
     base = {name: values for name, values in made.base.items() if name != "force_scale"}
     motion = simulator.simulate(rows, base, [e for e in on if not e.effect.reads_only(e.variant)])
     readings = simulator.read(motion, rows, made.base["force_scale"], [e for e in on if e.effect.reads()])
-    return np.concatenate([readings.position, readings.force], axis=-1)
+    steps = rounding_steps((effect, values) for effect, _, values in effects)
+    pairs = zip((readings.position, readings.force), steps, strict=True)
+    return np.concatenate([with_noise(values, 0.0, 0.0, step) for values, step in pairs], axis=-1)
 
 
 @pytest.mark.parametrize("gripper", [TIAGO, SECOND], ids=["tiago", "second"])
@@ -152,7 +155,7 @@ def test_recorded_sets_are_sets_like_any_other(plan, gripper, samples, tmp_path)
     write_set(named, tmp_path / "set", samples=samples)
     read = read_set(tmp_path / "set")
     assert read.fingerprint == made.measured.fingerprint
-    assert check_set(read, load_gripper(read.gripper, read.path).open_m) == []
+    assert check_set(read, load_gripper(read.gripper, read.path).stroke) == []
     for one, other in zip(read.grasps, made.measured.grasps, strict=True):
         assert all(np.array_equal(values, other.signals()[name]) for name, values in one.signals().items())
 
@@ -180,13 +183,13 @@ def test_effects_by_word():
         ("force_bias left_n=0 right_n=0", bias, "", [0.0, 0.0]),
         ("none", get_effect("none"), "", []),
     ):
-        parsed = parse_effect(text)
+        parsed = parse_effect(text, TIAGO)
         assert parsed[:2] == (effect, variant)
         assert parsed[2].tolist() == values
     infinite = [(e, p) for e in catalogue().values() for p in e.parameters if np.isinf(p.null)]
     assert infinite
     for effect, p in infinite:  # null values lie beyond the bounds, and may be given all the same
-        assert np.isinf(parse_effect(f"{effect.name} {p.name}=inf")[2]).any()
+        assert np.isinf(parse_effect(f"{effect.name} {p.name}=inf", TIAGO)[2]).any()
 
 
 @pytest.mark.parametrize(
@@ -209,7 +212,7 @@ def test_effects_by_word():
 )
 def test_wrong_words_are_one_clear_error(text, told):
     with pytest.raises(ConfigError) as caught:
-        parse_effect(text)
+        parse_effect(text, TIAGO)
     message = str(caught.value)
     assert told in message
     assert "\n" not in message
@@ -219,4 +222,4 @@ def test_a_set_without_noise_gives_none_and_can_be_read(tmp_path):
     write_set(plain().measured, tmp_path / "set")
     measured = read_set(tmp_path / "set")
     assert (measured.position_std_m, measured.force_std_n) == (None, None)
-    assert check_set(measured, TIAGO.open_m) == []
+    assert check_set(measured, TIAGO.stroke) == []
