@@ -53,7 +53,7 @@ def fit_base(
         progress(f"base model, start {number + 1} of {STARTS}: {rms_error(ends[-1], small.target):.2f} × noise")
     best = min(ends, key=lambda f: f.cost)
     errors = tuple(rms_error(f, small.target) for f in ends)
-    count = small.target.mask.sum() * 4
+    count = small.target.readings
     tolerance = max(_SAME_SHARE * best.cost, _SAME_COST * count)
     if ends[0].cost - best.cost > tolerance:  # another start found a better place
         first = fit_once(target, problem, simulators, small.enlarge(best))
@@ -78,7 +78,7 @@ def check_gradient(fit: Fit, target: Target, errors: tuple[float, ...] = ()) -> 
 
 def rms_error(fit: Fit, target: Target) -> float:
     """Root mean square of a fit's residuals ÷ noise."""
-    return float(np.sqrt(fit.cost / (target.mask.sum() * 4)))
+    return float(np.sqrt(fit.cost / target.readings))
 
 
 def _elsewhere(problem: Problem, felt: np.ndarray, rng: np.random.Generator) -> np.ndarray:
