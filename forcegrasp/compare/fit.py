@@ -26,12 +26,16 @@ class Simulators:
 
     Slopes come from the cheap one, and values too, corrected by the difference of the two at a nearby point; so few
     evaluations of the model itself are needed, and what is fitted in the end is the model itself.
+
+    Args:
+      problem: whose grasps are simulated.
+      exact: never use the cheap one.
     """
 
-    def __init__(self, problem: Problem) -> None:
+    def __init__(self, problem: Problem, exact: bool = False) -> None:
         gripper, grasps = problem.gripper, problem.grasps
         self.exact = Replay(gripper, grasps)
-        self.cheap = self.exact if gripper.fast == "none" else Replay(gripper, grasps, tier="fitting")
+        self.cheap = self.exact if exact or gripper.fast == "none" else Replay(gripper, grasps, tier="fitting")
 
 
 @dataclass(frozen=True, repr=False)
