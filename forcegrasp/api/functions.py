@@ -21,7 +21,6 @@ from forcegrasp.compare.advice import advise
 from forcegrasp.compare.final_force import analyse_table
 from forcegrasp.compare.workflow import Loaded, Progress
 from forcegrasp.config import CompareConfig, DiagnoseConfig, FitConfig, validate
-from forcegrasp.effects import catalogue
 from forcegrasp.effects.model_file import Model, read_model, write_model
 from forcegrasp.errors import ConfigError
 from forcegrasp.measure import FinalForceTable, MeasurementSet
@@ -120,10 +119,11 @@ def diagnose(
     """
     validate(DiagnoseConfig(seed=seed))
     only = (effects,) if isinstance(effects, str) else tuple(effects)
-    tried = measuring.check_effects("effects", only) or list(catalogue().values())
+    measuring.check_effects("effects", only)
     loaded, tell = _open(data, progress)
     if measuring.is_table(loaded):
         return _analyse(loaded, "diagnosis", model=model, effects=only)
+    tried = workflow.chosen_effects(loaded.gripper, only)
     given, loaded = (None, loaded) if model is None else _beside(model, loaded, tell)
     diagnosis, _ = workflow.diagnose_set(loaded, given, [effect.name for effect in tried], seed, tell)
     return DiagnoseResult(loaded, diagnosis, advise(diagnosis), tuple(tried), only, given is None)
@@ -151,11 +151,12 @@ def add(
       ConfigError: if the effect is unknown, in the model already, or does not help; if the model is of another gripper,
         the set is a table of final forces, or the file can't be written.
     """
-    (chosen,) = measuring.check_effects("effect", [effect])
+    measuring.check_effects("effect", [effect])
     path = _file(out)
     loaded, tell = _open(data, progress)
     grasps = measuring.refuse_table(loaded, "add")
     measuring.refuse_one_grasp(grasps)
+    (chosen,) = workflow.chosen_effects(grasps.gripper, [effect])
     given, grasps = _beside(model, grasps, tell)
     added = workflow.add_effect(grasps, given, chosen, tell)
     measuring.refuse_useless(added, chosen, "forcegrasp.diagnose")

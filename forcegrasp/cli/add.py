@@ -39,11 +39,12 @@ def main(arguments: list[str]) -> int:
     from forcegrasp.compare import fit_output, workflow
     from forcegrasp.effects.model_file import write_model
 
-    (effect,) = check_effects("effect", [config.effect])
+    check_effects("effect", [config.effect])
     folder = check_folder(default_out("add", ""))
     path = check_file(folder / "model.yaml" if not config.out else need(config.out, "out", "better.yaml"))
     loaded = refuse_table(workflow.load(data), "add")
     refuse_one_grasp(loaded)
+    (effect,) = workflow.chosen_effects(loaded.gripper, [config.effect])
     model, loaded = take_model(old, loaded)
     tell_warnings(loaded)
     added = workflow.add_effect(loaded, model, effect, narrator())

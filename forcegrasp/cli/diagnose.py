@@ -43,15 +43,15 @@ def main(arguments: list[str]) -> int:
     )
     from forcegrasp.compare import diagnose_output, workflow
     from forcegrasp.compare.advice import advise
-    from forcegrasp.effects import catalogue
     from forcegrasp.effects.model_file import write_model
 
-    tried = check_effects("effects", config.effects) or list(catalogue().values())
+    check_effects("effects", config.effects)
     out = check_folder(default_out("diagnose", config.out))
     loaded = workflow.load(data)
     if is_table(loaded):
         report_table(loaded, "diagnosis", out, model=config.model, effects=config.effects)
         return 0
+    tried = workflow.chosen_effects(loaded.gripper, config.effects)
     model, loaded = take_model(Path(config.model), loaded) if config.model else (None, loaded)
     tell_warnings(loaded)
     diagnosis, _ = workflow.diagnose_set(loaded, model, [e.name for e in tried], config.seed, narrator())

@@ -192,16 +192,11 @@ def refuse_useless(added: Added, effect: type[Effect], way: str) -> None:
         )
 
 
-def check_effects(option: str, names: Sequence[str]) -> list[type[Effect]]:
-    """Effects of the catalogue by name.
-
-    Raises:
-      ConfigError: names the option, and the closest known ones.
-    """
+def check_effects(option: str, names: Sequence[str]) -> None:
+    """Raises ConfigError about a name that no effect of the catalogue has, before anything is read."""
     from forcegrasp.effects import catalogue
 
     known = catalogue()
     for name in names:
         if name not in known:
             raise ConfigError(f"{option}={name}: no such effect{closest(name, known)}")
-    return [known[name] for name in names]

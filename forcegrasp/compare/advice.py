@@ -11,6 +11,7 @@ from forcegrasp.compare.predict import Case, predict
 from forcegrasp.measure.plans import MENU, OFF_CENTRE, PERIOD_S, SAMPLES, make_command
 from forcegrasp.measure.replay import Replay
 from forcegrasp.measure.schema import MeasuredGrasp
+from forcegrasp.physics.sampling import offset_limits_m
 from forcegrasp.short_repr import ShortRepr
 
 
@@ -23,8 +24,8 @@ class Advice(ShortRepr):
     differences: dict[str, float]  #: grasp on the menu → rms difference of the rivals' predictions ÷ noise
     object: str  #: the set's object that it was worked out for
     time_s: np.ndarray  #: ``(T,)``
-    command_m: np.ndarray  #: ``(T, 2)``
-    predicted: np.ndarray  #: of the two rivals, ``(2, T, 4)``
+    command_m: np.ndarray  #: ``(T, motors)``
+    predicted: np.ndarray  #: of the two rivals, ``(2, T, C)``
 
     def sentence(self) -> str:
         """The advice in words."""
@@ -42,20 +43,23 @@ def advise(diagnosis: Diagnosis) -> Advice | None:
         return None
     target, problem = diagnosis.target, rivals[0].fit.problem
     # the object that gives the largest forces shows most
-    strengths = [target.signals[i, target.mask[i], 2:].mean() for i in range(len(target.grasps))]
+    forces = target.signals[..., target.forces]
+    strengths = [forces[i, target.mask[i]].mean() if forces.size else 0.0 for i in range(len(target.grasps))]
     model_grasp = int(np.argmax(strengths))
     cases = [r.fit.problem.case(r.fit.vector) for r in rivals]
     radius = float(cases[0].base["radius_m"][model_grasp])
     gripper = problem.gripper
     kinds = [kind for kind in (*MENU, OFF_CENTRE) if kind != "close and hold"]
     time = np.arange(SAMPLES) * PERIOD_S
-    room = 0.5 * min(gripper.stroke - radius, radius / 3, gripper.stroke / 8)
+    widest, contact = float(gripper.opening.opening_m[-1]) / 2, float(gripper.contact_position(radius))
+    room = 0.5 * min(widest - radius, radius / 3, widest / 8)
     grasps, offsets = [], np.array([room if kind == OFF_CENTRE else 0.0 for kind in kinds])
+    offsets = np.clip(offsets, *offset_limits_m(gripper, radius, 0.0))
     for kind, offset in zip(kinds, offsets, strict=True):
-        command = make_command(kind, radius, gripper.stroke, gripper.stroke / 15)
-        rest = np.full((SAMPLES, 2), gripper.stroke)
+        command = make_command(kind, contact, gripper.stroke, gripper.stroke / 15, motors=len(gripper.motors))
+        rest, unloaded = np.full(command.shape, gripper.stroke), np.zeros((SAMPLES, len(gripper.forces)))
         name = target.grasps[model_grasp].object
-        grasps.append(MeasuredGrasp(kind, name, "", radius, offset, None, time, command, rest, 0 * rest, None))
+        grasps.append(MeasuredGrasp(kind, name, "", radius, offset, None, time, command, rest, unloaded, None))
     moved = []
     for case in cases:
         base = {key: np.full(len(kinds), value[model_grasp]) for key, value in case.base.items()}

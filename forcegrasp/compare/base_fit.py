@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,8 +13,8 @@ from forcegrasp.compare.problem import Problem
 from forcegrasp.compare.target import Target
 from forcegrasp.short_repr import ShortRepr
 
-#: Number of starts.
-STARTS = 3
+#: Number of starts; and of those at most, where fewer than two of them end in the best place found.
+STARTS, MOST_STARTS = 3, 6
 # The further starts see this many grasps of each object: enough to tell whether there is another optimum.
 _GRASPS_PER_OBJECT = 2
 # Starts end in the same place if their costs agree to this share, or to this much per residual.
@@ -48,24 +48,37 @@ def fit_base(
     few = _few_grasps(target)
     small = _Subset(target, problem, few, first)
     ends = [small.fit(small.known)]
-    for number in range(1, STARTS):
+    while len(ends) < STARTS or (len(ends) < MOST_STARTS and not _agree(ends, small.target)):
         ends.append(small.fit(_elsewhere(small.problem, guess(small.target, small.problem), rng)))
-        progress(f"base model, start {number + 1} of {STARTS}: {rms_error(ends[-1], small.target):.2f} × noise")
+        most = STARTS if len(ends) <= STARTS else MOST_STARTS
+        progress(f"base model, start {len(ends)} of {most}: {rms_error(ends[-1], small.target):.2f} × noise")
     best = min(ends, key=lambda f: f.cost)
     errors = tuple(rms_error(f, small.target) for f in ends)
-    count = small.target.mask.sum() * 4
-    tolerance = max(_SAME_SHARE * best.cost, _SAME_COST * count)
-    if ends[0].cost - best.cost > tolerance:  # another start found a better place
+    if ends[0].cost - best.cost > _same(best, small.target):  # another start found a better place
         first = fit_once(target, problem, simulators, small.enlarge(best))
-    if sum(f.cost - best.cost <= max(tolerance, _SAME_BEYOND * (best.cost - count)) for f in ends) < 2:
+    if not _agree(ends, small.target):
         spread = ", ".join(f"{error:.2f}" for error in errors)
         return BaseFit(first, errors, False, f"the starts end in different places (errors of {spread} × noise)")
     checked = check_gradient(first, target, errors)
     if checked.converged:
         return checked
     # the cheap model's slopes may lead no further where the model itself still falls
-    further = fit_exactly(target, problem, simulators, first.vector)
-    return check_gradient(further, target, errors)
+    further = check_gradient(fit_exactly(target, problem, simulators, first.vector), target, errors)
+    if further.converged or simulators.cheap is simulators.exact:
+        return further
+    return check_gradient(fit_exactly(target, problem, Simulators(problem, exact=True), first.vector), target, errors)
+
+
+def _same(best: Fit, target: Target) -> float:
+    """Difference of two costs that mean the same place."""
+    return max(_SAME_SHARE * best.cost, _SAME_COST * target.readings)
+
+
+def _agree(ends: Sequence[Fit], target: Target) -> bool:
+    """Whether two fits at least ended in the best place."""
+    best = min(ends, key=lambda f: f.cost)
+    tolerance = max(_same(best, target), _SAME_BEYOND * (best.cost - target.readings))
+    return sum(f.cost - best.cost <= tolerance for f in ends) >= 2
 
 
 def check_gradient(fit: Fit, target: Target, errors: tuple[float, ...] = ()) -> BaseFit:
@@ -78,7 +91,7 @@ def check_gradient(fit: Fit, target: Target, errors: tuple[float, ...] = ()) -> 
 
 def rms_error(fit: Fit, target: Target) -> float:
     """Root mean square of a fit's residuals ÷ noise."""
-    return float(np.sqrt(fit.cost / (target.mask.sum() * 4)))
+    return float(np.sqrt(fit.cost / target.readings))
 
 
 def _elsewhere(problem: Problem, felt: np.ndarray, rng: np.random.Generator) -> np.ndarray:

@@ -12,7 +12,7 @@ from rich.text import Text as Plain
 from forcegrasp.compare import figures
 from forcegrasp.compare.comparison import Cell, Comparison
 from forcegrasp.compare.heldout import rms
-from forcegrasp.compare.target import PHASES, SIGNALS, UNITS, Target
+from forcegrasp.compare.target import PHASES, Target
 from forcegrasp.reports.html import Picture, Section, Table, Text
 
 # Error ÷ floor up to which a model is as good as the data can tell.
@@ -27,8 +27,8 @@ _WORTH_TELLING = 0.05
 
 
 def amount(value: float, unit: str) -> str:
-    """A small length or force with its unit."""
-    shown, factor = {"m": ("µm", 1e6), "N": ("mN", 1e3)}.get(unit, (unit, 1.0))
+    """A small length, angle or force with its unit."""
+    shown, factor = {"m": ("µm", 1e6), "rad": ("mrad", 1e3), "N": ("mN", 1e3)}.get(unit, (unit, 1.0))
     return f"{factor * value:.3g} {shown}" if abs(factor * value) < 1000 else f"{factor * value:.0f} {shown}"
 
 
@@ -44,9 +44,10 @@ def words(name: str) -> str:
 
 def noise_sentence(target: Target) -> str:
     """The sensor noise that errors are divided by, and where it is from."""
-    sigma, quantum = target.sensor_sigma, target.quantum
-    noise = f"sensor noise: positions {amount(sigma[0], 'm')}, forces {amount(sigma[2], 'N')}"
-    steps = [f"{kind} {amount(quantum[k], UNITS[k])}" for kind, k in (("positions", 0), ("forces", 2)) if quantum[k]]
+    first = {f"{kind}s": part.start for kind, part in target.kinds.items()}
+    sigma, quantum, units = target.sensor_sigma, target.quantum, target.units
+    noise = f"sensor noise: {', '.join(f'{kind} {amount(float(sigma[k]), units[k])}' for kind, k in first.items())}"
+    steps = [f"{kind} {amount(float(quantum[k]), units[k])}" for kind, k in first.items() if quantum[k]]
     if steps:
         noise += f" (and readings come in steps: {', '.join(steps)}; that adds to the noise)"
     if target.sigma_known:
@@ -61,13 +62,13 @@ def compare_json(comparison: Comparison, name: str, model: str, notes: list[str]
     """All figures in plain types."""
     cells, target = comparison.cells(), comparison.target
     held = {}
-    for k, (signal, unit) in enumerate(zip(SIGNALS, UNITS, strict=True)):
-        ratio = rms(comparison.heldout, target, np.arange(4) == k)
+    for k, (signal, unit) in enumerate(zip(target.names, target.units, strict=True)):
+        ratio = rms(comparison.heldout, target, np.arange(len(target.names)) == k)
         held[signal] = {f"rms_{unit.lower()}": ratio * target.sigma[k], "ratio": ratio}
     return {
         "set": name,
         "model": model,
-        "signals": {signal: _signal_json(comparison, k) for k, signal in enumerate(SIGNALS)},
+        "signals": {signal: _signal_json(comparison, k) for k, signal in enumerate(target.names)},
         "phases": {
             phase: {cell.signal: _cell_json(cell) for cell in cells if cell.phase == phase}
             for phase in PHASES
@@ -87,7 +88,7 @@ def compare_json(comparison: Comparison, name: str, model: str, notes: list[str]
 
 
 def _signal_json(comparison: Comparison, k: int) -> dict[str, Any]:
-    target, unit = comparison.target, UNITS[k].lower()
+    target, unit = comparison.target, comparison.target.units[k].lower()
     inside, sigma = comparison.residual[..., k][target.mask], float(target.sigma[k])
     ratio = float(np.sqrt(np.mean(inside**2)))
     return {
@@ -136,18 +137,19 @@ def answer(comparison: Comparison) -> str:
 def printed(comparison: Comparison) -> Printed:
     """Error per phase and signal, for the terminal."""
     table = Printed("phase", box=box.SIMPLE_HEAD, padding=(0, 1))
-    for signal in SIGNALS:
+    names, units = comparison.target.names, comparison.target.units
+    for signal in names:
         table.add_column(words(signal), no_wrap=True)
     cells = {(cell.phase, cell.signal): cell for cell in comparison.cells()}
     for phase in PHASES:
-        row = [cells.get((phase, signal)) for signal in SIGNALS]
+        row = [cells.get((phase, signal)) for signal in names]
         if any(row):
             table.add_row(words(phase), *(_printed_cell(cell) for cell in row))
-    totals = [_signal_json(comparison, k) for k in range(4)]
+    totals = [_signal_json(comparison, k) for k in range(len(names))]
     table.add_section()
     table.add_row(
         "all",
-        *(f"{amount(t[f'rms_{u.lower()}'], u)} {t['ratio']:.1f}×" for t, u in zip(totals, UNITS, strict=True)),
+        *(f"{amount(t[f'rms_{u.lower()}'], u)} {t['ratio']:.1f}×" for t, u in zip(totals, units, strict=True)),
     )
     return table
 
@@ -207,10 +209,10 @@ def sections(comparison: Comparison, notes: list[str]) -> list[Section]:
 
 
 def _by_signal_and_phase(comparison: Comparison) -> Section:
-    cells = comparison.cells()
-    grid = np.full((len(PHASES), 4), np.nan)
+    cells, names = comparison.cells(), comparison.target.names
+    grid = np.full((len(PHASES), len(names)), np.nan)
     for cell in cells:
-        grid[PHASES.index(cell.phase), SIGNALS.index(cell.signal)] = cell.ratio
+        grid[PHASES.index(cell.phase), names.index(cell.signal)] = cell.ratio
     rows = [
         (
             words(c.signal),
@@ -229,7 +231,7 @@ def _by_signal_and_phase(comparison: Comparison) -> Section:
         "Error by signal and phase",
         [
             Picture(
-                figures.heat_map(grid[shown], phases, [words(s) for s in SIGNALS]),
+                figures.heat_map(grid[shown], phases, [words(s) for s in names]),
                 "Error ÷ sensor noise. Free: no finger touches; first contact: one finger, or both for less than 0.2 s;"
                 " both: both press; hold: both press and the command rests; release: opening, until 0.2 s after.",
             ),
@@ -261,12 +263,11 @@ def _worst(comparison: Comparison) -> Section:
 def dependence_section(comparison: Comparison, title: str = "What the error goes with") -> Section:
     """Residuals against what they may depend on."""
     values = {name: value for name, value in comparison.covariates().items() if name in _DRAWN}
-    values["force_n"] = comparison.predicted[..., 2:]  # what was measured shares its noise with the residual
     shares = [(n, kind, share) for n, kind, share in comparison.explanations() if share >= 0.01][:8]
     rows = [(covariate_words(name), kind, f"{share:.0%}") for name, kind, share in shares]
     blocks: list = [
         Picture(
-            figures.dependence(values, comparison.residual, comparison.target.mask),
+            figures.dependence(values, comparison.residual, comparison.target),
             "Measured − model ÷ noise, of both fingers: single samples (grey), and the median and the middle 80 % of"
             " equally filled bins (green). Grey band: ± 1. A model that lacks nothing lies flat on 0.",
         )

@@ -104,7 +104,7 @@ class Diagnosis(ShortRepr):
     folds: tuple[np.ndarray, ...]
     error_before: float
     error_after: float
-    numerical: tuple[np.ndarray, ...] = field(default=())  #: of the final fit, each ``(G, S, 4)``
+    numerical: tuple[np.ndarray, ...] = field(default=())  #: of the final fit, each ``(G, S, C)``
     floor: float = 1.0  #: error that sensor noise and the model's own numerical error leave
     left: str = ""  #: where there is more than that, in words; empty if nowhere
     noise: Noise | None = None  #: what the noise is, if the residuals show that it is not what was said
@@ -125,7 +125,7 @@ class Diagnosis(ShortRepr):
         return f"{self.verdict}: {some(self.effects)}; {told}"
 
     def heldout(self) -> np.ndarray:
-        """Residuals of held-out grasps under the final fit, ``(G, S, 4)``."""
+        """Residuals of held-out grasps under the final fit, ``(G, S, C)``."""
         return heldout_residual(self.fit, self.target, self.folds)
 
 
@@ -157,7 +157,7 @@ def diagnose(
     numerical = beyond_fit(fit, of_base)
     floor = numerical_floor(numerical, target)
     steps: list[Step] = []
-    if target.quantum.any():
+    if any(target.rounding):
         error = rms(heldout_residual(fit, target, folds), target)
         progress("found quantisation: readings are multiples of one step")
         steps.append(Step("effect", (Quantisation.name,), (), (), error_before, error))
@@ -242,7 +242,7 @@ def _bar(groups: Sequence[Sequence[Score]], null: np.ndarray, fit: Fit, target: 
     """What a signature must gain for its effect to be worth a fit."""
     if not groups:
         return np.inf
-    beyond = float(np.sum(fit.residual**2) - target.mask.sum() * 4)
+    beyond = float(np.sum(fit.residual**2) - target.readings)
     best = max(group[0].gain for group in groups)
     return max(float(np.quantile(null, 1 - ALARM)), _HOPELESS * best, _UNSEEN * LEAST_SHARE * beyond)
 
@@ -256,7 +256,7 @@ class _Round:
     simulators: Simulators
     background: Background
     folds: Sequence[np.ndarray]
-    held: np.ndarray  #: residuals of held-out grasps, ``(G, S, 4)``
+    held: np.ndarray  #: residuals of held-out grasps, ``(G, S, C)``
 
     def refit(self, scores: Sequence[Score], null: np.ndarray, progress: Callable[[str], None]) -> list[Candidate]:
         """Rough fits with one more effect, from where the best signatures put them."""

@@ -31,7 +31,8 @@ from forcegrasp.compare.fit import Fit
 from forcegrasp.compare.fit_output import ADVICE, steps_picture, symptom_picture
 from forcegrasp.compare.intervals import listed, reached_bound
 from forcegrasp.compare.target import PHASES
-from forcegrasp.effects import Effect, get_effect
+from forcegrasp.effects import Effect
+from forcegrasp.effects.for_gripper import effect_of
 from forcegrasp.reports.html import Picture, Section, Table, Text
 
 _PRINTED = 5
@@ -148,7 +149,7 @@ def lines(diagnosis: Diagnosis, advice: Advice | None) -> list[str]:
     """What stands below the table: symptoms, rivals, what is left, and what to record next."""
     told = []
     for step, _ in found_steps(diagnosis):
-        effect = get_effect(step.effects[0])
+        effect = effect_of(step.effects[0], diagnosis.target.gripper)
         told.append(f"{effect.name}: {effect.symptom}")
         told += [f"  {text}" for text in _final_texts(diagnosis, effect)]
         told += [f"  it could also be: {listed(step.effects[1:], 'or')}"] if len(step.effects) > 1 else []
@@ -178,7 +179,7 @@ def sections(diagnosis: Diagnosis, advice: Advice | None, tried: Sequence[type[E
 
 
 def _step_section(number: int, step: Step, before: Fit, diagnosis: Diagnosis) -> Section:
-    effect = get_effect(step.effects[0])
+    effect = effect_of(step.effects[0], diagnosis.target.gripper)
     if step.candidates:
         seen = symptom_picture(diagnosis.target, before, step.candidates[0].fit, effect)
     else:
@@ -223,9 +224,7 @@ def _advice_section(diagnosis: Diagnosis, advice: Advice) -> Section:
         [
             Text(f"{advice.sentence()[0].upper()}{advice.sentence()[1:]}.", strong=True),
             Picture(
-                figures.rivals(
-                    advice.time_s, advice.command_m, advice.predicted, diagnosis.target.sigma, advice.rivals
-                ),
+                figures.rivals(diagnosis.target, advice.time_s, advice.command_m, advice.predicted, advice.rivals),
                 f"What {one} and {other} predict of the grasp “{advice.grasp}” on {advice.object}.",
             ),
             Table(
@@ -242,7 +241,7 @@ def _tried_section(diagnosis: Diagnosis, tried: Sequence[type[Effect]]) -> Secti
     for row in ranking(diagnosis):
         gain, p, after = (row[key] for key in ("heldout_gain", "p_family", "floor_ratio_after"))
         texts = ("not refitted", "", "") if gain is None else (f"{gain:+.0f}", f"{p:.2g}", f"{after:.2f}")
-        rows.append((row["effect"], get_effect(row["effect"]).stage, *texts))
+        rows.append((row["effect"], effect_of(row["effect"], diagnosis.target.gripper).stage, *texts))
     silent = no_trace(diagnosis, tried)
     blocks: list = [
         Table(("effect", "acts on", "held-out gain", "p (family-wise)", "error ÷ noise with it"), rows),

@@ -6,7 +6,6 @@ from forcegrasp.compare.compare_output import covariate_words, words
 from forcegrasp.compare.diagnose import Diagnosis, Step
 from forcegrasp.compare.findings import found_steps, where
 from forcegrasp.compare.intervals import listed
-from forcegrasp.compare.target import SIGNALS
 from forcegrasp.compare.verdict import EXPLAINED_FAR, MUCH
 
 
@@ -70,13 +69,14 @@ def noise_words(diagnosis: Diagnosis) -> str:
     noise, said = diagnosis.noise, "given" if diagnosis.target.sigma_known else "estimated"
     if noise is None:
         return ""
-    told = []
-    for pair, kind in (((0, 1), "positions"), ((2, 3), "forces")):
-        times = noise.times[list(pair)]
-        if all(noise.unlike[list(pair)]) and max(times) < 1.15 * min(times):
-            told.append(_scatter(kind, float((times**2).mean() ** 0.5), any(noise.heavy_tails[list(pair)])))
-        else:
-            told += [_scatter(words(SIGNALS[k]), noise.times[k], noise.heavy_tails[k]) for k in pair if noise.unlike[k]]
+    told, names = [], diagnosis.target.names
+    for kind, part in diagnosis.target.kinds.items():
+        times = noise.times[part]
+        if all(noise.unlike[part]) and max(times) < 1.15 * min(times):
+            told.append(_scatter(f"{kind}s", float((times**2).mean() ** 0.5), any(noise.heavy_tails[part])))
+            continue
+        signals = range(part.start, part.stop)
+        told += [_scatter(words(names[k]), noise.times[k], noise.heavy_tails[k]) for k in signals if noise.unlike[k]]
     sizes = f"{', '.join(told)} the noise that was {said}"
     again = "give position_std_m and force_std_n as they are in meta.yaml, and diagnose again: a small effect may show"
     if not noise.stronger:

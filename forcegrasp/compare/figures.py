@@ -8,17 +8,18 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from forcegrasp.compare.target import SIGNALS, UNITS, Target
+from forcegrasp.compare.comparison import of_width
+from forcegrasp.compare.target import Target
 
 #: Okabe and Ito's colours, told apart by the colour-blind.
 LEFT, RIGHT, WITHOUT, WITH, MEASURED = "#0072b2", "#d55e00", "#d55e00", "#0072b2", "#444444"
 SECOND = "#009e73"
 #: Shown unit of a signal's unit, and its factor.
-SHOWN = {"m": ("mm", 1e3), "N": ("N", 1.0)}
-NAMES: dict[str, str] = dict(
-    zip(SIGNALS, ("position left", "position right", "force left", "force right"), strict=True)
-)
-#: Covariate → its axis' words and the factor from SI.
+SHOWN = {"m": ("mm", 1e3), "rad": ("mrad", 1e3), "N": ("N", 1.0)}
+NAMES = {
+    "position_l": "position left", "position_r": "position right", "force_l": "force left", "force_r": "force right",
+}  # fmt: skip
+#: Covariate → its axis' words and the factor from SI, where motors slide; where they turn, mm are mrad.
 AXES = {
     "time_since_contact_s": ("time since contact [s]", 1.0),
     "velocity_m_s": ("finger velocity [mm/s]", 1e3),
@@ -68,23 +69,25 @@ def heat_map(grid: np.ndarray, rows: Sequence[str], columns: Sequence[str]) -> F
 
 
 def overlay(target: Target, index: int, predicted: np.ndarray) -> Figure:
-    """One grasp: measured and predicted positions and forces, residuals ÷ noise below. ``predicted``: ``(S, 4)``."""
+    """One grasp: measured and predicted positions and forces, residuals ÷ noise below. ``predicted``: ``(S, C)``."""
     grasp = target.grasps[index]
     time, keep = grasp.time_s - grasp.time_s[0], _thin(len(grasp.time_s))
     measured = target.signals[index][keep]
     residual = (measured - predicted[keep]) / target.sigma
     figure = Figure(figsize=(9.5, 4.6), layout="constrained")
-    grid = figure.subplots(2, 2, sharex=True, height_ratios=(2.2, 1))
-    for column, first in enumerate((0, 2)):
-        unit, factor = SHOWN[UNITS[first]]
+    grid = figure.subplots(2, len(target.kinds), sharex=True, height_ratios=(2.2, 1), squeeze=False)
+    for column, (kind, part) in enumerate(target.kinds.items()):
+        unit, factor = SHOWN[target.units[part.start]]
         above, below = grid[:, column]
-        for side, colour, name in ((0, LEFT, "left"), (1, RIGHT, "right")):
-            if column == 0:
-                above.step(time[keep], factor * grasp.command_m[keep, side], where="post", color=colour, lw=0.6, ls=":")
-            above.plot(time[keep], factor * measured[:, first + side], ".", color=colour, ms=3, alpha=0.55)
-            above.plot(time[keep], factor * predicted[keep, first + side], color=colour, lw=1.2, label=name)
-            below.plot(time[keep], residual[:, first + side], color=colour, lw=0.9)
-        _finish(above, f"{'position' if column == 0 else 'force'} [{unit}]")
+        for signal, colour in zip(range(part.start, part.stop), (LEFT, RIGHT), strict=False):
+            if kind == "position":
+                command = factor * grasp.command_m[keep, signal]
+                above.step(time[keep], command, where="post", color=colour, lw=0.6, ls=":")
+            above.plot(time[keep], factor * measured[:, signal], ".", color=colour, ms=3, alpha=0.55)
+            name = _words(target, signal).removeprefix(kind).strip()
+            above.plot(time[keep], factor * predicted[keep, signal], color=colour, lw=1.2, label=name)
+            below.plot(time[keep], residual[:, signal], color=colour, lw=0.9)
+        _finish(above, f"{kind} [{unit}]")
         _residual_axes(below)
     above = grid[0, 0]
     above.plot([], [], ".", color=MEASURED, ms=4, label="measured")
@@ -94,22 +97,24 @@ def overlay(target: Target, index: int, predicted: np.ndarray) -> Figure:
     return figure
 
 
-def dependence(values: dict[str, np.ndarray], residual: np.ndarray, mask: np.ndarray) -> Figure:
+def dependence(values: dict[str, np.ndarray], residual: np.ndarray, target: Target) -> Figure:
     """Residuals ÷ noise of positions and forces against what they may depend on.
 
     Args:
-      values: covariate → ``(G, S, 2)``; NaN where there is none.
-      residual: ``(G, S, 4)``.
-      mask: which samples there are, ``(G, S)``.
+      values: covariate → ``(G, S, motors or channels)``; NaN where there is none.
+      residual: ``(G, S, C)``.
+      target: the measurements.
     """
+    mask, kinds = target.mask, target.kinds
     figure = Figure(figsize=(2.3 * len(values), 4.4), layout="constrained")
-    grid = figure.subplots(2, len(values), sharey="row", squeeze=False)
+    grid = figure.subplots(len(kinds), len(values), sharey="row", squeeze=False)
     for column, (name, value) in enumerate(values.items()):
         label, factor = AXES[name]
-        for row, first in enumerate((0, 2)):
-            axes = grid[row, column]
-            chosen = mask[..., None] & np.isfinite(value) & np.isfinite(residual[..., first : first + 2])
-            x, y = factor * value[chosen], residual[..., first : first + 2][chosen]
+        for row, (kind, part) in enumerate(kinds.items()):
+            axes, errors = grid[row, column], residual[..., part]
+            against = of_width(value, errors.shape[-1])
+            chosen = mask[..., None] & np.isfinite(against) & np.isfinite(errors)
+            x, y = factor * against[chosen], errors[chosen]
             if name == "direction":
                 _by_direction(axes, x, y)
             else:
@@ -120,10 +125,10 @@ def dependence(values: dict[str, np.ndarray], residual: np.ndarray, mask: np.nda
                     axes.set_xticks([], minor=True)
             axes.axhspan(-1, 1, color="0.92", zorder=0)
             axes.axhline(0, color="0.5", lw=0.6)
-            _finish(axes, ("position", "force")[row] + " residual ÷ noise" if column == 0 else "")
-        grid[1, column].set_xlabel(label)
-    for row, first in enumerate((0, 2)):  # a few wild points must not flatten the rest
-        sizes = np.abs(residual[..., first : first + 2][mask])
+            _finish(axes, f"{kind} residual ÷ noise" if column == 0 else "")
+        grid[-1, column].set_xlabel(label.replace("mm", SHOWN[target.units[0]][0]))
+    for row, part in enumerate(kinds.values()):  # a few wild points must not flatten the rest
+        sizes = np.abs(residual[..., part][mask])
         sizes = sizes[np.isfinite(sizes)]
         span = max(3.0, 1.2 * np.quantile(sizes, 0.99)) if len(sizes) else 3.0
         grid[row, 0].set_ylim(-span, span)
@@ -137,17 +142,18 @@ def symptom(target: Target, index: int, signal: int, without: np.ndarray, having
       target: the measurements.
       index: of the grasp.
       signal: of the signal.
-      without: predicted without the effect, ``(S, 4)``.
-      having: predicted with it, ``(S, 4)``.
+      without: predicted without the effect, ``(S, C)``.
+      having: predicted with it, ``(S, C)``.
       effect: its name.
     """
     grasp = target.grasps[index]
     time, keep = grasp.time_s - grasp.time_s[0], _thin(len(grasp.time_s))
-    unit, factor = SHOWN[UNITS[signal]]
+    _, factor = SHOWN[target.units[signal]]
     measured = target.signals[index][keep, signal]
     figure = Figure(figsize=(8.5, 4.8), layout="constrained")
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2.2, 1))
-    if signal < 2:
+    moves = signal < target.positions.stop
+    if moves:
         command = factor * grasp.command_m[keep, signal]
         above.step(time[keep], command, where="post", color="0.6", lw=0.8, ls=":", label="command")
     above.plot(time[keep], factor * measured, ".", color=MEASURED, ms=4, alpha=0.7, label="measured")
@@ -155,40 +161,41 @@ def symptom(target: Target, index: int, signal: int, without: np.ndarray, having
         above.plot(time[keep], factor * predicted[keep, signal], style, color=colour, lw=1.4, label=f"{word} {effect}")
         residual = (measured - predicted[keep, signal]) / target.sigma[signal]
         below.plot(time[keep], residual, style, color=colour, lw=1)
-    _finish(above, f"{NAMES[SIGNALS[signal]]} [{unit}]")
+    _finish(above, _axis(target, signal))
     above.legend(frameon=False, fontsize=9)
     _residual_axes(below)
-    if signal < 2:  # against the whole way of a finger nothing would be seen
+    if moves:  # against the whole way of a finger nothing would be seen
         _zoom(above, time, factor * without[: len(time), signal], factor * having[: len(time), signal])
     return figure
 
 
 def rivals(
-    time_s: np.ndarray, command_m: np.ndarray, predicted: np.ndarray, sigma: np.ndarray, names: Sequence[str]
+    target: Target, time_s: np.ndarray, command_m: np.ndarray, predicted: np.ndarray, names: Sequence[str]
 ) -> Figure:
-    """What two effects predict of one grasp, position and force of the finger on which they differ most.
+    """What two effects predict of one grasp, position and force of the side on which they differ most.
 
     Args:
+      target: whose signals they are.
       time_s: ``(T,)``.
-      command_m: ``(T, 2)``.
-      predicted: of the two, ``(2, T, 4)``.
-      sigma: sensor noise, ``(4,)``.
+      command_m: ``(T, motors)``.
+      predicted: of the two, ``(2, T, C)``.
       names: of the two.
     """
-    apart = (predicted[0] - predicted[1]) / sigma
-    side = int(np.argmax(np.sum(apart[:, :2] ** 2, axis=0) + np.sum(apart[:, 2:] ** 2, axis=0)))
+    apart = (predicted[0] - predicted[1]) / target.sigma
+    side = max(target.sides, key=lambda side: float(np.sum(apart[:, side] ** 2)))
     figure = Figure(figsize=(9.5, 4.4), layout="constrained")
-    grid = figure.subplots(2, 2, sharex=True, height_ratios=(2.2, 1))
-    for column, first in enumerate((0, 2)):
-        signal = first + side
-        unit, factor = SHOWN[UNITS[signal]]
+    grid = figure.subplots(2, len(side), sharex=True, height_ratios=(2.2, 1), squeeze=False)
+    for column, signal in enumerate(side):
+        _, factor = SHOWN[target.units[signal]]
         above, below = grid[:, column]
         if column == 0:
-            above.step(time_s, factor * command_m[:, side], where="post", color="0.6", lw=0.8, ls=":", label="command")
+            above.step(
+                time_s, factor * command_m[:, signal], where="post", color="0.6", lw=0.8, ls=":", label="command"
+            )
         for signals, colour, style, name in zip(predicted, (LEFT, RIGHT), ("-", "--"), names, strict=True):
             above.plot(time_s, factor * signals[:, signal], style, color=colour, lw=1.4, label=f"if {name}")
         below.plot(time_s, apart[:, signal], color=SECOND, lw=1)
-        _finish(above, f"{NAMES[SIGNALS[signal]]} [{unit}]")
+        _finish(above, _axis(target, signal))
         _residual_axes(below, "difference ÷ noise")
     grid[0, 0].legend(frameon=False, fontsize=8)
     return figure
@@ -197,7 +204,7 @@ def rivals(
 def steps(target: Target, index: int, signal: int) -> Figure:
     """Readings of one signal of one grasp around its fastest change, with lines at the multiples of their step."""
     grasp, quantum = target.grasps[index], target.quantum[signal]
-    unit, factor = SHOWN[UNITS[signal]]
+    _, factor = SHOWN[target.units[signal]]
     values, time = target.signals[index, : len(grasp.time_s), signal], grasp.time_s - grasp.time_s[0]
     middle = int(np.argmax(np.abs(np.gradient(values)))) if len(values) > 1 else 0
     shown = slice(max(0, middle - 25), middle + 26)
@@ -209,7 +216,7 @@ def steps(target: Target, index: int, signal: int) -> Figure:
         axes.axhline(factor * quantum * multiple, color="0.88", lw=0.7, zorder=0)
     axes.plot(time[shown], factor * part, ".", color=MEASURED, ms=5)
     axes.set_xlabel("time in grasp [s]")
-    _finish(axes, f"{NAMES[SIGNALS[signal]]} [{unit}]")
+    _finish(axes, _axis(target, signal))
     return figure
 
 
@@ -246,6 +253,15 @@ def falls(rows: Sequence[tuple[str, float, float]]) -> Figure:
     _finish(axes, "")
     axes.legend(frameon=False, fontsize=9)
     return figure
+
+
+def _words(target: Target, signal: int) -> str:
+    name = target.names[signal]
+    return NAMES.get(name, name)
+
+
+def _axis(target: Target, signal: int) -> str:
+    return f"{_words(target, signal)} [{SHOWN[target.units[signal]][0]}]"
 
 
 def _thin(count: int) -> slice:

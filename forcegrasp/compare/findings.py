@@ -10,8 +10,8 @@ from forcegrasp.compare.comparison import Comparison
 from forcegrasp.compare.diagnose import Candidate, Diagnosis, Step
 from forcegrasp.compare.fit import Fit
 from forcegrasp.compare.intervals import intervals, standard_errors, warnings
-from forcegrasp.compare.target import SIGNALS
 from forcegrasp.effects import Effect
+from forcegrasp.effects.for_gripper import effect_of
 from forcegrasp.effects.quantisation import Quantisation
 
 
@@ -55,8 +55,9 @@ def found_parameters(diagnosis: Diagnosis) -> dict[str, dict[str, tuple[float, f
         if entry.effect >= 0:
             effect = fit.problem.effects[entry.effect][0].name
             found.setdefault(effect, {})[entry.parameter] = (*numbers, entry.unit)
-    if diagnosis.target.quantum.any():
-        steps = zip(Quantisation.parameters, map(float, diagnosis.target.quantum[[0, 2]]), strict=True)
+    if any(diagnosis.target.rounding):
+        rounding = effect_of(Quantisation.name, diagnosis.target.gripper)
+        steps = zip(rounding.parameters, diagnosis.target.rounding, strict=True)
         found[Quantisation.name] = {p.name: (step, step, step, p.unit) for p, step in steps}
     return found
 
@@ -93,7 +94,7 @@ def noise_json(diagnosis: Diagnosis) -> dict[str, Any] | None:
     return {
         signal: {"times_stated": float(times), "core": float(core), "heavy_tails": bool(heavy)}
         for signal, times, core, heavy, unlike in zip(
-            SIGNALS, noise.times, noise.core, noise.heavy_tails, noise.unlike, strict=True
+            diagnosis.target.names, noise.times, noise.core, noise.heavy_tails, noise.unlike, strict=True
         )
         if unlike
     }

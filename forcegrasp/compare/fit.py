@@ -26,24 +26,28 @@ class Simulators:
 
     Slopes come from the cheap one, and values too, corrected by the difference of the two at a nearby point; so few
     evaluations of the model itself are needed, and what is fitted in the end is the model itself.
+
+    Args:
+      problem: whose grasps are simulated.
+      exact: never use the cheap one.
     """
 
-    def __init__(self, problem: Problem) -> None:
+    def __init__(self, problem: Problem, exact: bool = False) -> None:
         gripper, grasps = problem.gripper, problem.grasps
         self.exact = Replay(gripper, grasps)
-        self.cheap = self.exact if gripper.fast == "none" else Replay(gripper, grasps, tier="fitting")
+        self.cheap = self.exact if exact or gripper.fast == "none" else Replay(gripper, grasps, tier="fitting")
 
 
 @dataclass(frozen=True, repr=False)
 class Fit(ShortRepr):
-    """Fitted parameters with all that an evidence needs. N residuals (G · S · 4), p entries."""
+    """Fitted parameters with all that an evidence needs. N residuals (G · S · C), p entries."""
 
     problem: Problem
     vector: np.ndarray  #: the problem's coordinates, ``(p,)``
-    predicted: np.ndarray  #: signals, ``(G, S, 4)``
-    residual: np.ndarray  #: (measured − predicted) ÷ noise, ``(G, S, 4)``
-    jacobian: np.ndarray  #: d predicted ÷ noise over coordinates, ``(G, S, 4, p)``
-    correction: np.ndarray  #: exact minus cheap prediction, ``(G, S, 4)``
+    predicted: np.ndarray  #: signals, ``(G, S, C)``
+    residual: np.ndarray  #: (measured − predicted) ÷ noise, ``(G, S, C)``
+    jacobian: np.ndarray  #: d predicted ÷ noise over coordinates, ``(G, S, C, p)``
+    correction: np.ndarray  #: exact minus cheap prediction, ``(G, S, C)``
     gradient: float  #: largest |slope| of the cost along one coordinate, in its own standard error; 0 at an optimum
     evaluations: int
 
@@ -86,7 +90,7 @@ def fit_once(
       correction: exact minus cheap prediction near the start; found there if not given.
       rounds: how often the correction is renewed; with 0 it stays as given, and the fit is a rough one.
       free: which coordinates may change, ``(p,)``; all by default.
-      known_slopes: of the first k coordinates from an earlier fit nearby, ``(G, S, 4, k)``; they are kept, which spares
+      known_slopes: of the first k coordinates from an earlier fit nearby, ``(G, S, C, k)``; they are kept, which spares
         most of the simulations.
     """
     local = _Local(target, problem, simulators.cheap, simulators.cheap, known_slopes)
@@ -174,7 +178,7 @@ class _Local:
       problem: what may be changed.
       values: simulates the values.
       slopes: simulates the slopes.
-      known: slopes of the first coordinates, which are not to be found again, ``(G, S, 4, k)``.
+      known: slopes of the first coordinates, which are not to be found again, ``(G, S, C, k)``.
     """
 
     def __init__(
@@ -187,13 +191,13 @@ class _Local:
         self._age = 0
 
     def value(self, x: np.ndarray) -> np.ndarray:
-        """Predicted signals, ``(G, S, 4)``."""
+        """Predicted signals, ``(G, S, C)``."""
         if self._value is None or not np.array_equal(self._value[0], x):
             self._value = (x.copy(), predict(self._values, [self.problem.case(x)])[0])
         return self._value[1]
 
     def slopes(self, x: np.ndarray, anew: bool = False) -> np.ndarray:
-        """Slopes of the signals ÷ noise over the coordinates, ``(G, S, 4, p)``."""
+        """Slopes of the signals ÷ noise over the coordinates, ``(G, S, C, p)``."""
         value = self.value(x)
         if self._slope is not None and np.array_equal(self._slope[0], x) and not (anew and self._age):
             return self._slope[2]

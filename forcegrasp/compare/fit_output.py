@@ -18,7 +18,7 @@ from forcegrasp.compare.compare_output import amount, noise_sentence, value_text
 from forcegrasp.compare.fit import Fit
 from forcegrasp.compare.heldout import heldout_residual, make_folds, rms
 from forcegrasp.compare.intervals import reached_bound
-from forcegrasp.compare.target import SIGNALS, UNITS, Target
+from forcegrasp.compare.target import Target
 from forcegrasp.compare.workflow import Added
 from forcegrasp.effects import Effect
 from forcegrasp.effects.model_file import Fitted, Model
@@ -112,7 +112,7 @@ def parameters_section(model: Model) -> Section:
 
 
 def held_out(fit: Fit, target: Target) -> np.ndarray:
-    """Residuals of held-out grasps, ``(G, S, 4)``."""
+    """Residuals of held-out grasps, ``(G, S, C)``."""
     return heldout_residual(fit, target, make_folds(target.grasps))
 
 
@@ -154,7 +154,9 @@ def fit_sections(base: BaseFit, target: Target, model: Model) -> list[Section]:
             f" {noise_sentence(target)[0].upper()}{noise_sentence(target)[1:]}."
         ),
     ]
-    errors = np.sqrt(np.sum(base.fit.residual**2, axis=(1, 2)) / (4 * target.mask.sum(axis=1)))
+    errors = np.sqrt(
+        np.sum(base.fit.residual**2, axis=(1, 2)) / (base.fit.residual.shape[-1] * target.mask.sum(axis=1))
+    )
     worst = int(np.argmax(errors))
     grasp = target.grasps[worst]
     picture = Picture(
@@ -174,7 +176,7 @@ def add_json(added: Added, effect: type[Effect], name: str, path: Path) -> dict[
         "set": name,
         "model": str(path),
         "effect": effect.name,
-        "variant": next((e.variant for e in added.model.effects if e.effect is effect), ""),
+        "variant": next((e.variant for e in added.model.effects if e.effect.name == effect.name), ""),
         "error_before": added.error_before,
         "error_after": added.error_after,
         "signals": {signal: {"before": before, "after": after} for signal, before, after in _by_signal(added, effect)},
@@ -188,10 +190,10 @@ def _by_signal(added: Added, effect: type[Effect]) -> list[tuple[str, float, flo
     """Held-out error ÷ noise of each signal, before and after."""
     target = added.target
     before, after = held_out(added.before, target), held_out(added.after, target)
-    if effect is Quantisation:  # what rounding adds to the noise is an error to a model that does not know it
+    if effect.name == Quantisation.name:  # what rounding adds to the noise is an error to a model that does not know it
         before = before * target.sigma / target.sensor_sigma
-    one = np.eye(4, dtype=bool)
-    return [(s, rms(before, target, one[k]), rms(after, target, one[k])) for k, s in enumerate(SIGNALS)]
+    one = np.eye(len(target.names), dtype=bool)
+    return [(s, rms(before, target, one[k]), rms(after, target, one[k])) for k, s in enumerate(target.names)]
 
 
 def add_answer(added: Added, effect: type[Effect]) -> str:
@@ -218,7 +220,7 @@ def add_sections(added: Added, effect: type[Effect]) -> list[Section]:
     rows = [(words(signal), before, after) for signal, before, after in _by_signal(added, effect)]
     rows.append(("all", added.error_before, added.error_after))
     fall = Picture(figures.falls(rows), "Errors on grasps held out of the fit, without and with the effect.")
-    if effect is Quantisation:
+    if effect.name == Quantisation.name:
         seen = steps_picture(added.target)
     else:
         seen = symptom_picture(added.target, added.before, added.after, effect)
@@ -237,19 +239,19 @@ def symptom_picture(target: Target, before: Fit, after: Fit, effect: type[Effect
     errors = [np.sqrt(np.sum(fit.residual[index, :, signal] ** 2) / count) for fit in (before, after)]
     return Picture(
         figures.symptom(target, index, signal, before.predicted[index], after.predicted[index], effect.name),
-        f"Where {effect.name} helps most: {words(SIGNALS[signal])} of grasp {grasp.name} on {grasp.object}; error"
+        f"Where {effect.name} helps most: {words(target.names[signal])} of grasp {grasp.name} on {grasp.object}; error"
         f" {errors[0]:.2f} × noise without it, {errors[1]:.2f} × with it. Below: measured − model ÷ noise, band ± 2.",
     )
 
 
 def steps_picture(target: Target) -> Picture:
     """Readings that come in steps."""
-    signal = 2 if target.quantum[2] else 0
+    signal = target.forces.start if target.rounding[1] else 0
     swing = np.ptp(np.where(target.mask, target.signals[..., signal], target.signals[:, :1, signal]), axis=1)
     index = int(np.argmax(swing))
     grasp = target.grasps[index]
     return Picture(
         figures.steps(target, index, signal),
-        f"Readings of {words(SIGNALS[signal])} in grasp {grasp.name}, where they change fastest: they are multiples of"
-        f" {amount(target.quantum[signal], UNITS[signal])} (grey lines).",
+        f"Readings of {words(target.names[signal])} in grasp {grasp.name}, where they change fastest: they are"
+        f" multiples of {amount(target.quantum[signal], target.units[signal])} (grey lines).",
     )

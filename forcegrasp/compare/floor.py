@@ -23,7 +23,7 @@ _LEAST_SAMPLES = 40
 def numerical_error(fit: Fit, target: Target) -> tuple[np.ndarray, ...]:
     """How far the prediction moves with half the physics step, and with the other collision code, ÷ noise.
 
-    Each ``(G, S, 4)``. The fit must be one of the model itself, no rough one.
+    Each ``(G, S, C)``. The fit must be one of the model itself, no rough one.
     """
     gripper, grasps, case = fit.problem.gripper, fit.problem.grasps, [fit.problem.case(fit.vector)]
     others = (Replay(gripper, grasps, step_factor=0.5), Replay(gripper, grasps, other_collisions=True))
@@ -33,7 +33,7 @@ def numerical_error(fit: Fit, target: Target) -> tuple[np.ndarray, ...]:
 
 
 def beyond_fit(fit: Fit, numerical: Sequence[np.ndarray]) -> tuple[np.ndarray, ...]:
-    """What of the numerical errors no fitted parameter makes up for, each ``(G, S, 4)``."""
+    """What of the numerical errors no fitted parameter makes up for, each ``(G, S, C)``."""
     slopes = fit.jacobian.reshape(-1, len(fit.problem))
     left = []
     for one in numerical:
@@ -46,9 +46,9 @@ def numerical_floor(numerical: Sequence[np.ndarray], target: Target, where: np.n
     """rms residual ÷ noise that sensor noise and the model's own numerical error leave.
 
     Args:
-      numerical: from :func:`beyond_fit`, each ``(G, S, 4)``.
+      numerical: from :func:`beyond_fit`, each ``(G, S, C)``.
       target: the measurements.
-      where: choice of samples and signals, ``(G, S, 4)``.
+      where: choice of samples and signals, ``(G, S, C)``.
     """
     half, other = (rms(n, target, where) for n in numerical)
     # Halving the step shows about half of what the step costs in all.
@@ -59,7 +59,7 @@ def excess(residual: np.ndarray, numerical: Sequence[np.ndarray], target: Target
     """Where residuals show more than sensor noise and numerical error; empty if nowhere.
 
     Args:
-      residual: in units of the noise, ``(G, S, 4)``.
+      residual: in units of the noise, ``(G, S, C)``.
       numerical: as for :func:`numerical_floor`.
       target: the measurements.
     """
@@ -71,17 +71,19 @@ def excess(residual: np.ndarray, numerical: Sequence[np.ndarray], target: Target
         if error > floor * _ROOM_IN_CELL:
             return f"{name}: {error:.2f} × noise, {floor:.2f} is the floor"
     far = np.abs(residual) > _OUTLIER + 3 * (2 * np.abs(numerical[0]) + np.abs(numerical[1]))
-    if far.sum() > max(_MISHAPS, 2e-4 * target.mask.sum() * 4):
+    if far.sum() > max(_MISHAPS, 2e-4 * target.readings):
         return f"{far.sum()} readings are more than {_OUTLIER:g} σ off"
     return ""
 
 
 def cells(target: Target) -> list[tuple[str, np.ndarray]]:
-    """Positions and forces in each phase that has samples enough: name and mask ``(G, S, 4)``."""
+    """Positions and forces in each phase that has samples enough: name and mask ``(G, S, C)``."""
     found = []
     for index, phase in enumerate(PHASES):
         inside = target.phase == index
         if inside.sum() >= _LEAST_SAMPLES:
-            for kind, signals in (("positions", (1, 1, 0, 0)), ("forces", (0, 0, 1, 1))):
-                found.append((f"{kind}, {phase.replace('_', ' ')}", inside[:, :, None] & np.array(signals, bool)))
+            for kind, part in target.kinds.items():
+                where = np.zeros(target.signals.shape, bool)
+                where[..., part] = inside[:, :, None]
+                found.append((f"{kind}s, {phase.replace('_', ' ')}", where))
     return found

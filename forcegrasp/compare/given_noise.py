@@ -21,24 +21,28 @@ _SLOW_S = 0.1
 _LEAST_WINDOWS = 60
 
 
-def check_given_noise(measured: MeasurementSet) -> list[str]:
+def check_given_noise(measured: MeasurementSet, unit: str = "m") -> list[str]:
     """Holds ``position_std_m`` and ``force_std_n`` against the readings; returns a warning for each that is odd.
+
+    Args:
+      measured: the set.
+      unit: of the positions.
 
     Raises:
       MeasurementError: if one is more than ten times the noise of the readings, or less than a tenth of it.
     """
     warnings = []
-    given = {"position_std_m": (measured.position_std_m, "m"), "force_std_n": (measured.force_std_n, "N")}
+    given = {"position_std_m": (measured.position_std_m, unit), "force_std_n": (measured.force_std_n, "N")}
     for key, (std, unit) in given.items():
-        if std is None:
+        readings = [g.force_n if unit == "N" else g.position_m for g in measured.grasps]
+        if std is None or not readings[0].shape[1]:
             continue
-        readings = [g.position_m if unit == "m" else g.force_n for g in measured.grasps]
         least, most = noise_range(measured.grasps, readings)
         shown = min(max(std, least), most)
         apart = max(std / shown, shown / std)
         where = f"{show(measured.path / 'meta.yaml')}: {key}"
         line = f"{where}: {std:.3g} {unit} is given, the readings show {shown:.2g} {unit}"
-        noisy = all(is_noisy([signals[:, finger] for signals in readings]) for finger in range(2))
+        noisy = all(is_noisy([signals[:, finger] for signals in readings]) for finger in range(readings[0].shape[1]))
         if apart > REFUSE and noisy:
             raise MeasurementError(f"{line}; correct it, in {unit}, or leave it out to have it estimated")
         if apart > TELL:
@@ -47,19 +51,19 @@ def check_given_noise(measured: MeasurementSet) -> list[str]:
 
 
 def noise_range(grasps: Sequence[MeasuredGrasp], readings: Sequence[np.ndarray]) -> tuple[float, float]:
-    """The least and the most noise that the readings of two sensors show; 0 and infinity where they can't tell.
+    """The least and the most noise that the readings of sensors of one kind show; 0 and infinity where they can't tell.
 
     The least is what jitters from sample to sample while the command is held; steps of a converter may be all of it.
     The most counts slower noise, too, and only readings that change: stops, dead zones and steps hide noise.
 
     Args:
       grasps: that were read.
-      readings: positions or forces of each grasp, ``(T, 2)``.
+      readings: positions or forces of each grasp, ``(T, sensors)``.
     """
     least, most = [], []
     fast = [third_differences(g, r) for g, r in zip(grasps, readings, strict=True)]
     slow = [third_differences(g, r, _stride(g)) for g, r in zip(grasps, readings, strict=True)]
-    for finger in range(2):
+    for finger in range(readings[0].shape[1]):
         least.append(_spread(np.concatenate([windows[held, finger] for windows, held in fast])) or 0.0)
         held = np.concatenate([windows[held, finger] for windows, held in slow])
         moving = np.concatenate([windows[:, finger] for windows, _ in slow])

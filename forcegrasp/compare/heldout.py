@@ -33,7 +33,7 @@ def make_folds(grasps: Sequence[MeasuredGrasp]) -> list[np.ndarray]:
 
 
 def heldout_residual(fit: Fit, target: Target, folds: Sequence[np.ndarray]) -> np.ndarray:
-    """Residuals of each grasp under the parameters that the other folds' grasps give, ``(G, S, 4)``; NaN if in no fold.
+    """Residuals of each grasp under the parameters that the other folds' grasps give, ``(G, S, C)``; NaN if in no fold.
 
     Exact where the model is linear in its parameters over their uncertainty.
     """
@@ -55,7 +55,7 @@ def log_likelihood(residual: np.ndarray) -> np.ndarray:
     """Log-likelihood of each grasp up to a constant, robust against heavy tails, ``(..., G)``.
 
     Args:
-      residual: in units of the noise, ``(..., G, S, 4)``.
+      residual: in units of the noise, ``(..., G, S, C)``.
     """
     size = np.abs(residual)
     loss = np.where(size <= _HEAVY, 0.5 * size**2, _HEAVY * (size - 0.5 * _HEAVY))
@@ -66,8 +66,8 @@ def rms(residual: np.ndarray, target: Target, where: np.ndarray | None = None) -
     """Root mean square of the residuals of existing samples; NaN if there are none.
 
     Args:
-      residual: in units of the noise, ``(G, S, 4)``; grasps of no fold are NaN and left out.
-      where: further choice of samples and signals, broadcast to ``(G, S, 4)``.
+      residual: in units of the noise, ``(G, S, C)``; grasps of no fold are NaN and left out.
+      where: further choice of samples and signals, broadcast to ``(G, S, C)``.
     """
     chosen = np.broadcast_to(target.mask[:, :, None] & np.isfinite(residual), residual.shape)
     if where is not None:

@@ -25,7 +25,7 @@ def standard_errors(fit: Fit, numerical: Sequence[np.ndarray] = ()) -> np.ndarra
 
     Args:
       fit: the fit.
-      numerical: from :func:`~forcegrasp.compare.floor.numerical_error`, each ``(G, S, 4)``.
+      numerical: from :func:`~forcegrasp.compare.floor.numerical_error`, each ``(G, S, C)``.
     """
     inverse = fit.covariance()
     slopes = np.einsum("gskp,gsk->gp", fit.jacobian, fit.residual, optimize=True)

@@ -10,7 +10,7 @@ from scipy.special import ndtr, ndtri
 
 from forcegrasp.compare.floor import excess, numerical_floor
 from forcegrasp.compare.heldout import rms
-from forcegrasp.compare.target import SIGNALS, Target
+from forcegrasp.compare.target import Target
 
 # Lags over which a missing effect would show, in samples.
 _LAGS = 5
@@ -33,13 +33,13 @@ _MEDIAN = float(ndtri(0.75))
 class Noise:
     """Noise that is not what was said. One figure per signal where not told otherwise."""
 
-    times: np.ndarray  #: rms of the residuals ÷ the noise that was said, ``(4,)``
-    core: np.ndarray  #: the same of the middle half of them, which tails don't reach, ``(4,)``
-    unlike: np.ndarray  #: which signals it concerns, ``(4,)``
+    times: np.ndarray  #: rms of the residuals ÷ the noise that was said, ``(C,)``
+    core: np.ndarray  #: the same of the middle half of them, which tails don't reach, ``(C,)``
+    unlike: np.ndarray  #: which signals it concerns, ``(C,)``
 
     @property
     def heavy_tails(self) -> np.ndarray:
-        """Which of these signals have more wild readings than a normal distribution, ``(4,)``."""
+        """Which of these signals have more wild readings than a normal distribution, ``(C,)``."""
         return self.unlike & (self.times > _HEAVY * self.core)
 
     @property
@@ -57,22 +57,23 @@ def unlike_said(
     all of them, with its sign. So neither the noise's size nor its tails count.
 
     Args:
-      residual: of held-out grasps, in units of the noise, ``(G, S, 4)``.
+      residual: of held-out grasps, in units of the noise, ``(G, S, C)``.
       numerical: as for :func:`~forcegrasp.compare.floor.numerical_floor`.
       target: the measurements.
-      predicted: signals, ``(G, S, 4)``; by them, for they have no noise, slow and fast samples are told apart.
+      predicted: signals, ``(G, S, C)``; by them, for they have no noise, slow and fast samples are told apart.
     """
-    one = np.eye(len(SIGNALS), dtype=bool)
+    count = residual.shape[-1]
+    one = np.eye(count, dtype=bool)
     times = np.array([rms(residual, target, signal) for signal in one])
-    core = np.array([_core(residual[..., k][_there(residual[..., k], target)]) for k in range(len(SIGNALS))])
+    core = np.array([_core(residual[..., k][_there(residual[..., k], target)]) for k in range(count)])
     if not excess(residual, numerical, target):
         less = times < _LESS
         return Noise(times, core, less) if less.any() else None
-    clean, unlike = residual.copy(), np.zeros(len(SIGNALS), bool)
+    clean, unlike = residual.copy(), np.zeros(count, bool)
     for k, signal in enumerate(one):
         values, floor = residual[..., k], numerical_floor(numerical, target, signal)
         scores, beyond = _normal_scores(values, _there(values, target)), 1 - (min(floor, core[k]) / times[k]) ** 2
-        groups = _partitions(target, predicted[..., k % 2 :: 2])
+        groups = _partitions(target, predicted[..., target.side_of(k)])
         if _is_white(scores, beyond, groups) and not _some_group_as_said(values / floor, groups):
             clean[..., k], unlike[k] = scores, True
     return None if excess(clean, numerical, target) else Noise(times, core, unlike)
@@ -100,11 +101,12 @@ def _partitions(target: Target, predicted: np.ndarray) -> tuple[np.ndarray, ...]
 
     Args:
       target: the measurements.
-      predicted: position and force of one finger, ``(G, S, 2)``.
+      predicted: position and force, if there is one, of one side, ``(G, S, 2)``.
     """
-    position, force = predicted[..., 0], predicted[..., 1]
+    position = predicted[..., 0]
     motion = np.abs(np.diff(position, axis=1, prepend=position[:, :1]))
-    halves = (np.where(x > np.median(x[target.mask]), 1, 0) for x in (motion, force))
+    sizes = (motion, *np.moveaxis(predicted[..., 1:], -1, 0))
+    halves = (np.where(x > np.median(x[target.mask]), 1, 0) for x in sizes)
     return target.phase, *(np.where(target.mask, half, -1) for half in halves)
 
 

@@ -38,7 +38,7 @@ class Case(ShortRepr):
 
 
 def predict(replay: Replay, cases: Sequence[Case]) -> np.ndarray:
-    """Predicted signals of all cases, ``(cases, G, S, 4)``; everything that must be simulated is simulated at once.
+    """Predicted signals of all cases, ``(cases, G, S, C)``; everything that must be simulated is simulated at once.
 
     The replay remembers how the first case of each call moved: the next call often asks for that one again.
     """

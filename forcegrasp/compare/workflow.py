@@ -22,7 +22,8 @@ from forcegrasp.compare.problem import Problem
 from forcegrasp.compare.refine import refine
 from forcegrasp.compare.score import Background, Signatures
 from forcegrasp.compare.target import Target, make_target
-from forcegrasp.effects import Effect, catalogue
+from forcegrasp.effects import Effect
+from forcegrasp.effects.for_gripper import effect_of, effects_of
 from forcegrasp.effects.model_file import Fitted, FoundEffect, Model
 from forcegrasp.effects.quantisation import Quantisation
 from forcegrasp.errors import ConfigError, MeasurementError
@@ -64,12 +65,12 @@ def load(path: str | Path) -> Loaded[MeasurementSet] | Loaded[FinalForceTable]:
     if isinstance(measured, FinalForceTable):
         return Loaded(measured, gripper, check_table(measured, gripper.stroke))
     odd = check_set(measured, gripper.stroke, half_opening_m=float(gripper.opening.opening_m[-1]) / 2)
-    return Loaded(measured, gripper, odd + check_given_noise(measured))
+    return Loaded(measured, gripper, odd + check_given_noise(measured, gripper.unit))
 
 
 def fit_model(loaded: Loaded[MeasurementSet], seed: int, progress: Progress) -> tuple[Target, Simulators, BaseFit]:
     """Fits the base model to a set, from several starts."""
-    target = make_target(loaded.measured)
+    target = make_target(loaded.measured, loaded.gripper)
     problem = Problem(loaded.gripper, target.grasps)
     simulators = Simulators(problem)
     return target, simulators, fit_base(target, problem, simulators, np.random.default_rng(seed), progress)
@@ -95,9 +96,9 @@ def apply_model(
     """
     if model.gripper.name != loaded.gripper.name:
         raise ConfigError(f"model: is of gripper {model.gripper.name}, the set is of {loaded.gripper.name}")
-    target = make_target(loaded.measured)
+    target = make_target(loaded.measured, loaded.gripper)
     # rounding is not fitted: the measurements show it, and it counts as noise
-    effects = [(e.effect, e.variant) for e in model.effects if e.effect is not Quantisation]
+    effects = [(e.effect, e.variant) for e in model.effects if e.effect.name != Quantisation.name]
     problem = Problem(loaded.gripper, target.grasps, effects)
     simulators = Simulators(problem)
     vector, unknown = _coordinates(problem, model)
@@ -134,7 +135,7 @@ def diagnose_set(
 
     Raises:
       MeasurementError: if there are too few grasps to hold any out.
-      ConfigError: if an effect is unknown.
+      ConfigError: if an effect is unknown, or can't show on this gripper.
     """
     if len(loaded.measured.grasps) < LEAST_GRASPS:
         raise MeasurementError(
@@ -145,9 +146,19 @@ def diagnose_set(
         target, simulators, base = fit_model(loaded, seed, progress)
     else:
         target, simulators, base = apply_model(loaded, model, progress, refit=True)
-    chosen = [effect for name, effect in catalogue().items() if not names or name in names]
+    chosen = chosen_effects(loaded.gripper, names)
     rng = np.random.default_rng(seed + 1)
     return diagnose(target, base, simulators, chosen, rng, progress), simulators
+
+
+def chosen_effects(gripper: Gripper, names: Sequence[str]) -> list[type[Effect]]:
+    """The effects of these names as a gripper has them, in the order in which they act; without names all.
+
+    Raises:
+      ConfigError: if one is unknown, or can't show on this gripper.
+    """
+    wanted = {effect_of(name, gripper).name for name in names}
+    return [effect for name, effect in effects_of(gripper).items() if not names or name in wanted]
 
 
 @dataclass(frozen=True, repr=False)
@@ -171,14 +182,14 @@ def add_effect(loaded: Loaded[MeasurementSet], model: Model, effect: type[Effect
     Raises:
       ConfigError: if the model has the effect, or the effect leaves no trace in these data.
     """
-    if any(e.effect is effect for e in model.effects):
+    if any(e.effect.name == effect.name for e in model.effects):
         raise ConfigError(f"effect={effect.name}: the model has it already")
     target, simulators, base = apply_model(loaded, model, progress, refit=True)
     before, folds = base.fit, make_folds(target.grasps)
     progress(
         f"without {effect.name}: {rms(heldout_residual(before, target, folds), target):.3f} × noise on held-out grasps"
     )
-    if effect is Quantisation and target.quantum.any():  # it is in the noise already
+    if effect.name == Quantisation.name and any(target.rounding):  # it is in the noise already
         coarse = target.sigma / target.sensor_sigma
         held = heldout_residual(before, target, folds)
         same = model_of(before, target, loaded, numerical_error(before, target))
@@ -219,9 +230,10 @@ def model_of(fit: Fit, target: Target, loaded: Loaded, numerical: Sequence[np.nd
         else:
             grasps.setdefault(first.name, {})[entry.parameter] = fitted
     found = [FoundEffect(e, v, p) for (e, v), p in zip(problem.effects, effects, strict=True)]
-    if target.quantum.any():
-        steps = zip(Quantisation.parameters, target.quantum[[0, 2]], strict=True)
-        found.append(FoundEffect(Quantisation, "", {p.name: Fitted(s, s, s, p.unit) for p, s in steps}))
+    if any(target.rounding):
+        rounding = effect_of(Quantisation.name, loaded.gripper)
+        steps = zip(rounding.parameters, target.rounding, strict=True)
+        found.append(FoundEffect(rounding, "", {p.name: Fitted(s, s, s, p.unit) for p, s in steps}))
     data = {"set": loaded.measured.name, "fingerprint": loaded.measured.fingerprint}
     return Model(loaded.gripper, base, objects, grasps, tuple(found), data, tuple(warnings(fit, errors)))
 
@@ -232,7 +244,7 @@ def _coordinates(problem: Problem, model: Model) -> tuple[np.ndarray, np.ndarray
     for index, entry in enumerate(problem.entries):
         first = problem.grasps[int(np.flatnonzero(entry.members)[0])]
         if entry.effect >= 0:
-            places = [e.parameters for e in model.effects if e.effect is problem.effects[entry.effect][0]]
+            places = [e.parameters for e in model.effects if e.effect.name == problem.effects[entry.effect][0].name]
         else:
             places = [model.base, model.objects.get(first.object, {}), model.grasps.get(first.name, {})]
         fitted = next((place[entry.parameter] for place in places if entry.parameter in place), None)

@@ -57,7 +57,7 @@ def made_up() -> SimpleNamespace:
         Path(f"/tmp/{NASTY}"), NASTY, "tiago", NASTY, "none", SIGMA[0], SIGMA[2], grasps, "fingerprint"
     )
     loaded = Loaded(measured, load_gripper("tiago"), [f"odd: {NASTY}"])
-    target = make_target(measured)
+    target = make_target(measured, loaded.gripper)
     noise = rng.standard_normal((8, 150, 4))
     # white noise about 0 in every cell, so that a constant can be put on top
     left = noise.copy()

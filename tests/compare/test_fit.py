@@ -71,7 +71,7 @@ def measure(bias: np.ndarray) -> tuple[Target, Problem]:
     full = tuple(
         dataclasses.replace(g, position_m=signals[i, :, :2], force_n=signals[i, :, 2:]) for i, g in enumerate(bare)
     )
-    target = make_target(MeasurementSet(Path(), "", "tiago", "", "", SIGMA[0], SIGMA[2], full, ""))
+    target = make_target(MeasurementSet(Path(), "", "tiago", "", "", SIGMA[0], SIGMA[2], full, ""), TIAGO)
     return target, Problem(TIAGO, target.grasps)
 
 

@@ -21,6 +21,7 @@ from forcegrasp.measure import MeasuredGrasp
 from forcegrasp.physics.gripper_file import load_gripper
 
 G, S = 8, 150
+TIAGO = load_gripper("tiago")
 ONES = np.ones(4)
 
 
@@ -35,7 +36,7 @@ def make(count: int = G, lengths: tuple[int, ...] | None = None) -> Target:
     mask = np.arange(S) < np.array(lengths or [S] * count)[:, None]
     phase = np.where(mask, np.arange(S) * len(PHASES) // S, -1)
     grasps = tuple(grasp(i) for i in range(count))
-    return Target(grasps, np.zeros((count, S, 4)), mask, ONES, ONES, 0 * ONES, True, phase)
+    return Target(grasps, np.zeros((count, S, 4)), mask, ONES, ONES, 0 * ONES, True, phase, TIAGO)
 
 
 class _Counted(SimpleNamespace):

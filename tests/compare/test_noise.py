@@ -12,8 +12,10 @@ from forcegrasp.compare.floor import excess
 from forcegrasp.compare.noise import Noise, unlike_said
 from forcegrasp.compare.target import PHASES, Target
 from forcegrasp.measure import MeasuredGrasp
+from forcegrasp.physics.gripper_file import load_gripper
 
 G, S = 8, 150
+TIAGO = load_gripper("tiago")
 ONES = np.ones(4)
 NOTHING = (np.zeros((G, S, 4)),) * 2
 PHASE = np.arange(S) * len(PHASES) // S
@@ -30,7 +32,7 @@ def make(count: int = G) -> Target:
         MeasuredGrasp(f"g{i}", "cup", "", 0.02, 0.0, None, np.arange(S) * 0.04, pair, pair, pair, None)
         for i in range(count)
     )
-    return Target(grasps, np.zeros((count, S, 4)), mask, ONES, ONES, 0 * ONES, True, np.tile(PHASE, (count, 1)))
+    return Target(grasps, np.zeros((count, S, 4)), mask, ONES, ONES, 0 * ONES, True, np.tile(PHASE, (count, 1)), TIAGO)
 
 
 def normal(seed: int) -> np.ndarray:

@@ -21,7 +21,7 @@ def test_finds_what_was_hidden_in_another_gripper(tmp_path):
         "rich",
         grasps=6,
         objects=1,
-        effects=[parse_effect("force_lag time_constant_s=0.1")],
+        effects=[parse_effect("force_lag time_constant_s=0.1", load_gripper(str(SECOND)))],
         known={},
         off_nominal=0.1,
         position_std_m=3e-5,

@@ -332,6 +332,7 @@ def test_of_many_grasps_the_worst_are_drawn():
 
 def test_signals_may_stand_still(made_up):
     """Residuals without any spread, and covariates that are nowhere defined."""
-    values = {"time_since_contact_s": np.full((2, 5, 2), np.nan), "direction": np.zeros((2, 5, 2))}
-    figure = figures.dependence(values, np.zeros((2, 5, 4)), np.ones((2, 5), bool))
+    count = made_up.target.mask.shape
+    values = {"time_since_contact_s": np.full((*count, 2), np.nan), "direction": np.zeros((*count, 2))}
+    figure = figures.dependence(values, np.zeros((*count, 4)), made_up.target)
     figure.canvas.draw()

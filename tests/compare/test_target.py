@@ -12,8 +12,10 @@ from forcegrasp.compare.quantised import find_step
 from forcegrasp.compare.target import PHASES, contacts, estimate_noise, find_phases, make_target
 from forcegrasp.errors import MeasurementError
 from forcegrasp.measure import MeasuredGrasp, MeasurementSet
+from forcegrasp.physics.gripper_file import load_gripper
 
 SIGMA_M, SIGMA_N = 3e-5, 0.02
+TIAGO = load_gripper("tiago")
 TIME = np.arange(150) * 0.04
 
 
@@ -67,10 +69,10 @@ def test_noise_that_cannot_be_told_is_asked_for(std, kind):
 def test_given_noise_is_believed():
     rng = np.random.default_rng(2)
     grasps = [smooth_grasp(rng) for _ in range(4)]
-    given = make_target(measured(*grasps, std=(1e-4, 0.05)))
+    given = make_target(measured(*grasps, std=(1e-4, 0.05)), TIAGO)
     assert given.sigma.tolist() == given.sensor_sigma.tolist() == [1e-4, 1e-4, 0.05, 0.05]
     assert given.sigma_known
-    half = make_target(measured(*grasps, std=(1e-4, None)))
+    half = make_target(measured(*grasps, std=(1e-4, None)), TIAGO)
     assert half.sigma[0] == 1e-4
     assert half.sigma[2] == pytest.approx(SIGMA_N, rel=0.1)
     assert not half.sigma_known
@@ -93,8 +95,8 @@ def staged(contact: tuple[slice, slice], bias: float = 0.0) -> MeasuredGrasp:
 def test_phases_of_a_grasp(bias):
     """Contact is young for 0.2 s (5 samples), a command is held after 0.3 s (8 samples); a bias is no contact."""
     grasp = staged((slice(24, 90), slice(30, 86)), bias)
-    assert contacts(grasp, np.full(2, 0.013)).sum(axis=0).tolist() == [66, 56]
-    phase = np.array(PHASES)[find_phases(grasp, np.full(2, 0.013))]
+    assert contacts(grasp, np.full(2, 0.013), TIAGO).sum(axis=0).tolist() == [66, 56]
+    phase = np.array(PHASES)[find_phases(grasp, np.full(2, 0.013), TIAGO)]
     for expected, first, last in (
         ("free", 0, 23),
         ("first_contact", 24, 34),
@@ -107,9 +109,9 @@ def test_phases_of_a_grasp(bias):
 
 
 def test_phases_without_a_second_contact_and_without_any():
-    phase = np.array(PHASES)[find_phases(staged((slice(24, 76), slice(0, 0))), np.full(2, 0.013))]
+    phase = np.array(PHASES)[find_phases(staged((slice(24, 76), slice(0, 0))), np.full(2, 0.013), TIAGO)]
     assert set(phase[24:76]) == {"first_contact"}
-    assert set(find_phases(staged((slice(0, 0), slice(0, 0))), np.full(2, 0.013))) == {PHASES.index("free")}
+    assert set(find_phases(staged((slice(0, 0), slice(0, 0))), np.full(2, 0.013), TIAGO)) == {PHASES.index("free")}
 
 
 # --- steps of a converter ------------------------------------------------------------------------------------------
@@ -138,12 +140,12 @@ def test_rounding_counts_as_noise_where_it_is_coarse():
     grasps = [smooth_grasp(rng) for _ in range(4)]
     step = 0.08
     rounded = [dataclasses.replace(g, force_n=step * np.round(g.force_n / step)) for g in grasps]
-    target = make_target(measured(*rounded, std=(SIGMA_M, SIGMA_N)))
+    target = make_target(measured(*rounded, std=(SIGMA_M, SIGMA_N)), TIAGO)
     assert target.quantum == pytest.approx([0, 0, step, step])
     assert target.sigma[2] == pytest.approx(np.sqrt(SIGMA_N**2 + step**2 / 12))
     assert target.sensor_sigma[2] == SIGMA_N
     fine = [dataclasses.replace(g, force_n=0.001 * np.round(g.force_n / 0.001)) for g in grasps]
-    assert not make_target(measured(*fine, std=(SIGMA_M, SIGMA_N))).quantum.any()  # hidden by the noise
+    assert not make_target(measured(*fine, std=(SIGMA_M, SIGMA_N)), TIAGO).quantum.any()  # hidden by the noise
 
 
 # --- lining up -----------------------------------------------------------------------------------------------------
@@ -153,7 +155,7 @@ def test_padding_residuals_and_subsets():
     rng = np.random.default_rng(4)
     lengths = (100, 150, 60)
     grasps = [dataclasses.replace(smooth_grasp(rng, n), name=f"g{n}", object=f"o{n}") for n in lengths]
-    target = make_target(measured(*grasps, std=(SIGMA_M, SIGMA_N)))
+    target = make_target(measured(*grasps, std=(SIGMA_M, SIGMA_N)), TIAGO)
     assert target.signals.shape == (3, 150, 4)
     assert target.mask.sum(axis=1).tolist() == list(lengths)
     assert np.all(target.phase[~target.mask] == -1)

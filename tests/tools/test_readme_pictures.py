@@ -14,6 +14,7 @@ from forcegrasp.compare.comparison import Comparison
 from forcegrasp.compare.figures import WITH, WITHOUT
 from forcegrasp.compare.target import make_target
 from forcegrasp.measure import MeasuredGrasp, MeasurementSet
+from forcegrasp.physics.gripper_file import load_gripper
 from forcegrasp.physics.scene_renderer import no_renderer
 from tools import readme_pictures
 
@@ -30,7 +31,9 @@ def beside_two_models() -> tuple[Comparison, Comparison]:
     signals = np.stack([position, position, *[200 * (position - command)] * 2], axis=1) + noise
     pair = np.stack([command, command], axis=1)
     grasp = MeasuredGrasp("g", "thing", "s", 0.02, 0.0, None, time, pair, signals[:, :2], signals[:, 2:], None)
-    target = make_target(MeasurementSet(Path("set"), "set", "tiago", "", "", SIGMA[0], SIGMA[2], (grasp,), ""))
+    target = make_target(
+        MeasurementSet(Path("set"), "set", "tiago", "", "", SIGMA[0], SIGMA[2], (grasp,), ""), load_gripper("tiago")
+    )
     having = (noise / SIGMA)[None]
     missed = having + 6 * np.array([0, 1, 0, 1]) * (position < 0.02)[None, :, None]
     before, after = (Comparison(target, target.signals - r * SIGMA, r, r, 1.0) for r in (missed, having))
