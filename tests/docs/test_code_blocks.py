@@ -25,14 +25,20 @@ from forcegrasp.physics.plant import Plant
 
 #: Pages whose Python runs here as it stands; the others have tests of their own.
 RUN = [
-    "README.md",
     "docs/calibration.md",
     "docs/quickstart.md",
     "docs/write-a-transform.md",
     "docs/write-an-effect.md",
     "docs/your-gripper.md",
 ]
-ELSEWHERE = {"docs/compare-your-data.md", "docs/deploy.md", "docs/gpu.md", "docs/python.md", "docs/tutorial.md"}
+ELSEWHERE = {
+    "README.md",
+    "docs/compare-your-data.md",
+    "docs/deploy.md",
+    "docs/gpu.md",
+    "docs/python.md",
+    "docs/tutorial.md",
+}
 
 
 @pytest.fixture
