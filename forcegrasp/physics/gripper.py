@@ -175,7 +175,7 @@ class Gripper(ShortRepr):
         if self.force == "motor":
             for motor in self.motors:
                 spec.add_sensor(
-                    name=own_sensor(motor.actuator),
+                    name=effort_sensor(motor),
                     type=mujoco.mjtSensor.mjSENS_ACTUATORFRC,
                     objtype=mujoco.mjtObj.mjOBJ_ACTUATOR,
                     objname=motor.actuator,
@@ -186,6 +186,11 @@ class Gripper(ShortRepr):
 def own_sensor(name: str) -> str:
     """Name of a sensor that the scene does not have and the simulator adds."""
     return f"forcegrasp_{name}"
+
+
+def effort_sensor(motor: Motor) -> str:
+    """Name of the sensor of a motor's effort; not that of a side, though an actuator may be called left."""
+    return own_sensor(f"effort_{motor.actuator}")
 
 
 #: Contact points that an added sensor counts.

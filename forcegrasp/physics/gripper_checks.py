@@ -121,7 +121,7 @@ def _check_direction(
 ) -> None:
     """Refuses a finger that slides the wrong way; of others, the opening that is measured tells."""
     finger, axis = gripper.fingers[side], "xyz"[gripper.axis]
-    motor = gripper.motors[min(side, len(gripper.motors) - 1)]
+    motor = gripper.motors[max(finger.motor, 0)]
     if motor.joint != finger.joint or motor.unit != "m":
         return
     joint = model.joint(finger.joint)

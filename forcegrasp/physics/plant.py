@@ -13,7 +13,7 @@ from mujoco.batch import Batch
 
 from forcegrasp.physics import guard
 from forcegrasp.physics.fast import SPHERE
-from forcegrasp.physics.gripper import SIDES, Gripper, own_sensor
+from forcegrasp.physics.gripper import SIDES, Gripper, effort_sensor, own_sensor
 from forcegrasp.physics.gripper_parts import BaseParameter, Finger
 from forcegrasp.physics.inertia import inertia_of_radius
 from forcegrasp.physics.opening import command_law
@@ -121,7 +121,7 @@ class Plant:
         """Where the motors' efforts are read, and the fingertip newtons of each, pressing positive, per unit of it."""
         if self.gripper.force != "motor":
             return [], np.empty(0)
-        addresses = [model.sensor(own_sensor(motor.actuator)).adr[0] for motor in self.gripper.motors]
+        addresses = [model.sensor(effort_sensor(motor)).adr[0] for motor in self.gripper.motors]
         factors = np.empty(self.motors)
         for index, motor in enumerate(self.gripper.motors):
             drive = model.actuator(motor.actuator)

@@ -1,4 +1,4 @@
-"""docs/python.md runs, on results made up by hand."""
+"""docs/python.md and the README's Python run, on results made up by hand."""
 
 from __future__ import annotations
 
@@ -24,3 +24,15 @@ def test_page_runs(work, capsys):
     except NoRendererError as error:
         pytest.skip(str(error))
     assert names["picture"].shape == (360, 480, 3)
+
+
+def test_python_of_the_readme_runs(work, capsys):
+    functions, gymnasium = blocks("README.md", "python")
+    names: dict = {"__name__": "__main__"}
+    exec(compile(functions.code, "README.md", "exec"), names)
+    assert "AddResult(" in capsys.readouterr().out
+    assert Path("better.yaml").is_file()
+    assert Path("runs/better_fit/report.html").is_file()
+    assert names["rollout"]["next", "force"].shape == (64, 150, 2)
+    exec(compile(gymnasium.code, "README.md", "exec"), names)
+    assert names["env"].observation_space.contains(names["observation"])

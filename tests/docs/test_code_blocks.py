@@ -13,6 +13,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import matplotlib as mpl
+import numpy as np
 import pytest
 import yaml
 from doc_pages import PAGES, blocks, program, unpack
@@ -20,17 +21,24 @@ from doc_pages import PAGES, blocks, program, unpack
 from forcegrasp.deploy import Contract, controller
 from forcegrasp.errors import ConfigError
 from forcegrasp.physics.gripper_file import load_gripper
+from forcegrasp.physics.plant import Plant
 
 #: Pages whose Python runs here as it stands; the others have tests of their own.
 RUN = [
-    "README.md",
     "docs/calibration.md",
     "docs/quickstart.md",
     "docs/write-a-transform.md",
     "docs/write-an-effect.md",
     "docs/your-gripper.md",
 ]
-ELSEWHERE = {"docs/compare-your-data.md", "docs/deploy.md", "docs/gpu.md", "docs/python.md", "docs/tutorial.md"}
+ELSEWHERE = {
+    "README.md",
+    "docs/compare-your-data.md",
+    "docs/deploy.md",
+    "docs/gpu.md",
+    "docs/python.md",
+    "docs/tutorial.md",
+}
 
 
 @pytest.fixture
@@ -115,14 +123,52 @@ def test_gripper_of_the_page_does_what_the_page_says(page):
 
 
 @pytest.mark.parametrize(
+    ("name", "columns"),
+    [
+        ("coupled_slides", "q_m qdes_m f_l_n f_r_n"),
+        ("tendon", "q_m qdes_m f_l_n f_r_n"),
+        ("coupled_hinges", "q_rad qdes_rad f_l_n f_r_n"),
+        ("fixed_jaw", "q_m qdes_m f_l_n f_r_n"),
+        ("motor_effort", "q_m qdes_m f_n"),
+    ],
+)
+def test_other_mechanisms_of_the_page_grasp(page, name, columns):
+    """Sections of an example take the place of those of the whole scene and description."""
+    page("docs/your-gripper.md")
+    scene = ElementTree.parse("my_gripper.xml").getroot()
+    for section in ElementTree.parse(f"{name}.xml").getroot():
+        for other in scene.findall(section.tag):
+            scene.remove(other)
+        scene.append(section)
+    Path(f"{name}.xml").write_bytes(ElementTree.tostring(scene))
+    description = yaml.safe_load(Path("my_gripper.yaml").read_text()) | yaml.safe_load(Path(f"{name}.yaml").read_text())
+    Path(f"{name}.yaml").write_text(yaml.safe_dump(description))
+    gripper = load_gripper(f"./{name}.yaml")
+    assert " ".join(c.column for c in (*gripper.positions, *gripper.commands, *gripper.forces)) == columns
+    plant = Plant(gripper, n=1)
+    plant.reset(np.zeros(1, int), np.zeros(1), np.full((1, len(gripper.motors)), gripper.stroke))
+    plant.advance(np.zeros((1, len(gripper.motors))), round(2 / plant.dt))
+    assert (plant.pad_force > 0.3).all()
+    assert not plant.warnings().any()
+
+
+SIDES = "left: {joint: left, force_sensor: left}\n  right: {joint: right, force_sensor: right}"
+SWAPPED = "left: {joint: right, force_sensor: left}\n  right: {joint: left, force_sensor: right}"
+
+
+@pytest.mark.parametrize(
     ("file", "old", "new"),
     [
-        ("yaml", "joints: [left,", "joints: [lefft,"),
-        ("yaml", "joints: [left, right]", "joints: [right, left]"),
+        ("yaml", "joint: left,", "joint: lefft,"),
+        ("yaml", "closed: 0.0, open: 0.04", "closed: 0.04, open: 0.0"),
+        ("yaml", SIDES, SWAPPED),
         ("yaml", "open: 0.04", "open: 40"),
+        ("yaml", "open: 0.04}\n\n", "open: 0.05}\n\n"),
         ("xml", '<position name="left"', '<motor name="left"'),
-        ("yaml", "actuators: [left, right]", "actuators: [right, left]"),
+        ("yaml", "actuator: left", "actuator: right"),
         ("xml", '<joint name="left"', '<joint type="hinge" name="left"'),
+        ("yaml", "{joint: left, force_sensor: left}", "{force_sensor: left}"),
+        ("yaml", "axis: x\n", "axis: x\nforce: motor\n"),
         ("xml", '"object" type="box"', '"object" type="ellipsoid"'),
         ("yaml", "[dof_damping]", "[dof_dampin]"),
         ("yaml", "[geom_solimp 2]", "[geom_solimp]"),
@@ -135,11 +181,19 @@ def test_messages_are_as_quoted(page, file, old, new):
     path = Path(f"my_gripper.{file}")
     text = path.read_text()
     assert old in text
-    path.write_text(text.replace(old, new, 1))
+    path.write_text(text.replace(old, new))
     with pytest.raises(ConfigError) as caught:
         load_gripper("./my_gripper.yaml")
     quoted = re.findall(r"^\| [^|]* \| `([^`]+)`", PAGES["docs/your-gripper.md"], re.MULTILINE)
     assert any(message in str(caught.value) for message in quoted), str(caught.value)
+
+
+def test_actuators_whose_effort_is_read_may_be_called_left_and_right(page):
+    page("docs/your-gripper.md")
+    path = Path("my_gripper.yaml")
+    sides = "left: {joint: left}\n  right: {joint: right}\nforce: motor"
+    path.write_text(path.read_text().replace(SIDES, sides))
+    assert [c.column for c in load_gripper("./my_gripper.yaml").forces] == ["f_l_n", "f_r_n"]
 
 
 def test_loop_of_the_deploy_page_reaches_its_goal(page, capsys):
