@@ -111,9 +111,8 @@ def stiffness() -> Drawn:
     ]
     for name, slope in PAPER_SLOPES_N_M.items():
         scale = float(match_force_scale(slope, unit))
-        rows.append(
-            f"robot, {name} | {slope:.0f} | – | **{scale:.2f}** | **{float(default_gripper().training.kappa_of_force_scale(scale)):.2f}**"
-        )
+        kappa = float(default_gripper().training.kappa_of_force_scale(scale))
+        rows.append(f"robot, {name} | {slope:.0f} | – | **{scale:.2f}** | **{kappa:.2f}**")
     return figure, table("object | slope of f(T) [N/m] | offset [mN] | f_α | κ", rows)
 
 

@@ -235,7 +235,15 @@ def model_of(fit: Fit, target: Target, loaded: Loaded, numerical: Sequence[np.nd
         steps = zip(rounding.parameters, target.rounding, strict=True)
         found.append(FoundEffect(rounding, "", {p.name: Fitted(s, s, s, p.unit) for p, s in steps}))
     data = {"set": loaded.measured.name, "fingerprint": loaded.measured.fingerprint}
-    return Model(loaded.gripper, base, objects, grasps, tuple(found), data, tuple(warnings(fit, errors)))
+    told = tuple(warnings(fit, errors))
+    return Model(loaded.gripper, base, objects, grasps, tuple(found), data, told, _noise_of(target))
+
+
+def _noise_of(target: Target) -> tuple[float, float] | None:
+    """Noise of positions and forces, before rounding, for a policy to be trained with; None if it is not known."""
+    kinds = [target.sensor_sigma[part] for part in (target.positions, target.forces)]
+    noise = [float(np.mean(sigma)) for sigma in kinds if len(sigma) and (sigma > 0).all()]
+    return (noise[0], noise[1]) if len(noise) == 2 else None
 
 
 def _coordinates(problem: Problem, model: Model) -> tuple[np.ndarray, np.ndarray]:

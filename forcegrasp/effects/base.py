@@ -93,7 +93,7 @@ class Effect:
         self.reset(self.rows)
 
     def __getitem__(self, parameter: str) -> np.ndarray:
-        """A parameter as a column ``(rows, 1)``; by the name it has in the class that defines it, whatever the gripper."""
+        """A parameter as a column ``(rows, 1)``, by the name it has in the class that defines it."""
         index = self.index(parameter)
         return self.values[:, index : index + 1]
 

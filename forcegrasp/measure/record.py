@@ -15,6 +15,7 @@ from forcegrasp.measure.plans import PERIOD_S, SAMPLES, make_plan
 from forcegrasp.measure.replay import EffectOn, Replay
 from forcegrasp.measure.schema import MeasuredGrasp, MeasurementSet, columns_of, fingerprint_of_set
 from forcegrasp.physics.gripper import Gripper
+from forcegrasp.physics.gripper_file import default_gripper
 from forcegrasp.physics.gripper_parts import BaseParameter
 from forcegrasp.physics.sensors import rounding_steps, with_noise
 from forcegrasp.short_repr import ShortRepr
@@ -106,14 +107,14 @@ def record(
     return Recorded(measured, base)
 
 
-def parse_effect(text: str, gripper: Gripper) -> tuple[type[Effect], str, np.ndarray]:
-    """Reads ``NAME [VARIANT] [PARAMETER=VALUE ...]``; what is not given is typical of this gripper.
+def parse_effect(text: str, gripper: Gripper | None = None) -> tuple[type[Effect], str, np.ndarray]:
+    """Reads ``NAME [VARIANT] [PARAMETER=VALUE ...]``; what is not given is typical of the gripper (the paper's).
 
     Raises:
       ConfigError: if the gripper has no such effect, variant or parameter, or a value is out of bounds.
     """
     name, *words = text.split() or [""]
-    effect, variant = effect_of(name, gripper), ""
+    effect, variant = effect_of(name, gripper or default_gripper()), ""
     values = dict(zip((p.name for p in effect.parameters), effect.typical_values(), strict=True))
     bounds = {p.name: p for p in effect.parameters}
     for word in words:

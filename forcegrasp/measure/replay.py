@@ -17,7 +17,7 @@ from forcegrasp.short_repr import ShortRepr
 
 #: Threads of the engine; 0 uses every core. Programs that run several diagnoses side by side set it to 1.
 THREADS = 0
-# A motor starts where its first command or the end of its range is, if it was measured so near to it. Share of its stroke.
+# A motor starts where its first command or the end of its range is, if measured so near to it. Share of its stroke.
 _AT_REST = 1 / 45
 #: Rows × physics steps that are kept in memory at once.
 _CHUNK = 8_000_000

@@ -10,6 +10,7 @@ import numpy as np
 from forcegrasp.effects import Effect
 from forcegrasp.physics.gripper_file import load_gripper
 from forcegrasp.physics.plant import Plant, write_base
+from forcegrasp.physics.sensors import is_rounding
 
 PERIOD_S = 0.04
 START_M = 0.0275
@@ -87,9 +88,19 @@ def play(plant: Plant, commands: np.ndarray = RICH) -> Trace:
     steps, seen = round(PERIOD_S / plant.dt), []
     for command in commands:
         plant.advance(command, steps)
-        seen.append((plant.measured_position, plant.measured_force, plant.position, plant.force, plant.object_position))
+        seen.append((*read(plant), plant.position, plant.force, plant.object_position))
     assert not plant.warnings().any()
     return Trace(*(np.array(values) for values in zip(*seen, strict=True)))
+
+
+def read(plant: Plant) -> tuple[np.ndarray, np.ndarray]:
+    """Positions and forces as sensors without noise give them: what the plant measures, then rounded."""
+    position, force = plant.measured_position.copy(), plant.measured_force.copy()
+    for effect in plant._effects:
+        if is_rounding(type(effect)):
+            position[effect.rows] = effect.read_position(position[effect.rows])
+            force[effect.rows] = effect.read_force(force[effect.rows])
+    return position, force
 
 
 def rollout(

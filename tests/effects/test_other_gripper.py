@@ -12,6 +12,8 @@ from forcegrasp.effects import Effect, catalogue, get_effect
 from forcegrasp.physics.gripper_file import load_gripper
 from forcegrasp.physics.plant import Plant, write_base
 
+from .rollouts import read
+
 SECOND = Path(__file__).parents[1] / "grippers" / "second.yaml"
 TOUCH_M, GAIN, FRICTION_N = 0.02, 250.0, 0.02
 #: Free reversal, a small step, light touch, fast squeeze, partial and full release; an object off the centre.
@@ -33,7 +35,8 @@ def simulate(*uses: tuple[type[Effect], np.ndarray, str], moves: np.ndarray) -> 
     for command in moves:
         for _ in range(4):
             plant.advance(np.full((1, 2), command), 40)
-            seen.append([plant.measured_position[0], plant.measured_force[0], [plant.object_position[0], 0]])
+            position, force = read(plant)
+            seen.append([position[0], force[0], [plant.object_position[0], 0]])
     assert not plant.warnings().any()
     return np.array(seen)
 

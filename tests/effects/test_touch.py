@@ -14,7 +14,7 @@ ROWS = np.arange(2)
 def _depth(touch: Touch, position: float, force: float, thing: float = 0.0) -> np.ndarray:
     """Of both fingers at one position, in both rows, metres, ``(2, 2)``."""
     both = np.full((2, 2), position)
-    plant = SimpleNamespace(position=both, pad_shift_m=np.zeros((2, 2)), object_position=np.full(2, thing))
+    plant = SimpleNamespace(pad_position=both, pad_shift_m=np.zeros((2, 2)), object_position=np.full(2, thing))
     return touch.depth(plant, ROWS, np.full((2, 2), force))
 
 
