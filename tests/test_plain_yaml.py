@@ -21,6 +21,11 @@ def test_what_is_said_is_read(file):
     assert plain_yaml.load(file, text_only=True) == {"a": "1", "b": ["1.5e-3", "x", "yes"], "c": {"d": "007"}}
 
 
+def test_many_lines_are_not_deep(file):
+    file.write_text("".join(f"key_{number}: [{number}]\n" for number in range(200)))
+    assert plain_yaml.load(file) == {f"key_{number}": [number] for number in range(200)}
+
+
 @pytest.mark.parametrize(
     ("text", "told"),
     [

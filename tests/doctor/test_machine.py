@@ -58,6 +58,11 @@ def test_quota(membership, contents, quota, groups):
         ("", {}, None),
         ("0::/a\n", {"a/memory.max": "1000", "a/memory.current": "400", "memory.max": "max"}, 600),
         (
+            "0::/a\n",  # the group around it has less left
+            {"a/memory.max": "1000", "a/memory.current": "400", "memory.max": "900", "memory.current": "800"},
+            100,
+        ),
+        (
             "4:memory:/\n",
             {"memory/memory.limit_in_bytes": "9223372036854771712", "memory/memory.usage_in_bytes": "5"},
             None,

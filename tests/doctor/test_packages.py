@@ -175,6 +175,13 @@ def test_missing_modules(told, monkeypatch):
     assert "not there: not_there, not_here.either; install" in told(check_imports, "mend")
 
 
+def test_a_process_loads_no_opengl_unless_it_is_asked_to(monkeypatch):
+    monkeypatch.setenv("MUJOCO_GL", "egl")
+    program = "import os; print(os.environ['MUJOCO_GL'])"
+    assert child.run_python("-c", program).output == "disable\n"
+    assert child.run_python("-c", program, MUJOCO_GL="osmesa").output == "osmesa\n"
+
+
 def test_a_process_that_does_not_answer(monkeypatch):
     monkeypatch.setattr(child, "LIMIT_S", 0.1)
     assert child.run_python("-c", "import time; time.sleep(9)").failure == "no answer within 0.1 s"

@@ -39,7 +39,10 @@ def test_this_machine_computes_it(told):
 
 
 @pytest.mark.parametrize("tier", KNOWN)
-@pytest.mark.parametrize(("which", "change", "unit"), [(0, 3e-6, "m"), (1, 0.04, "N"), (1, float("nan"), "N")])
+@pytest.mark.parametrize(
+    ("which", "change", "unit"),
+    [(0, 3e-6, "m"), (0, -3e-6, "m"), (1, 0.04, "N"), (1, -0.04, "N"), (1, float("nan"), "N")],
+)
 def test_another_end(tier, which, change, unit, told, monkeypatch):
     ends = json.loads(json.dumps(KNOWN))
     ends[tier][which][1] += change

@@ -45,19 +45,19 @@ def toy(tmp_path, monkeypatch):
     """A checkout of one module, whose tests know half of it, and a list of errors."""
     files = {
         "toy.py": "def double(x):\n    return 2 * x\ndef half(x):\n    return x / 2\ndef minus(x):\n    return -x\n",
-        "tests/test_double.py": "from toy import double\n\n\ndef test_double():\n    assert double(3) == 6\n",
-        "tests/test_minus.py": "from toy import minus\n\n\ndef test_minus():\n    assert minus(3) == -3\n",
+        "tests/toy/test_double.py": "from toy import double\n\n\ndef test_double():\n    assert double(3) == 6\n",
+        "tests/toy/test_minus.py": "from toy import minus\n\n\ndef test_minus():\n    assert minus(3) == -3\n",
         "odd/test_odd.py": "def test_odd():\n    assert False\n",
     }
-    planted = [("tests/test_double.py", "2 * x", "3 * x"), ("tests/test_double.py", "x / 2", "x / 3")]
+    planted = [("tests/toy/test_double.py", "2 * x", "3 * x"), ("tests/toy/test_double.py", "x / 2", "x / 3")]
     planted += [
-        ("tests/test_double.py", "return -x", "return x"),
+        ("tests/toy/test_double.py", "return -x", "return x"),
         ("odd", "x / 2", "x * 2"),
-        ("tests", "return", "pass"),
+        ("tests/toy", "return", "pass"),
     ]
     lines = [f"toy.py | {tests}\n- {right}\n+ {wrong}\n" for tests, right, wrong in planted]
     for name, text in {**files, "lists/toy.txt": "# a comment\n" + "\n".join(lines)}.items():
-        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text(text)
     subprocess.run(["git", "init", "--quiet", tmp_path], check=True)
     monkeypatch.setattr(judge, "HEAVY", ["pytest"])
@@ -76,9 +76,9 @@ def test_verdicts(toy, capsys):
     assert [one["verdict"] for one in found] == ["caught", "survived", "caught", "broken", "stale"]
     # what no named test notices, another one in its folder may
     assert [one["by"] for one in found[:3]] == [
-        "tests/test_double.py::test_double",
+        "tests/toy/test_double.py::test_double",
         "",
-        "tests/test_minus.py::test_minus",
+        "tests/toy/test_minus.py::test_minus",
     ]
     assert found[3]["by"] == "odd/test_odd.py fails without any error, too"
     assert found[4]["by"] == "stands there 3 times"
@@ -98,5 +98,5 @@ def test_what_was_caught_is_not_tried_again(toy, capsys, monkeypatch):
 
 
 def test_tests_that_take_too_long_notice_nothing(toy):
-    endless = judge.Judge(toy, timeout_s=0.001).judge(Error("toy.py", "2 * x", "3 * x", ("tests/test_double.py",)))
+    endless = judge.Judge(toy, timeout_s=0.001).judge(Error("toy.py", "2 * x", "3 * x", ("tests/toy/test_double.py",)))
     assert (endless.verdict, endless.by) == ("timeout", "more than 0.001 s")

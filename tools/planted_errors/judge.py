@@ -57,14 +57,18 @@ class Judge:
         """Runs the tests that are named, then, if they pass, all those in their folders."""
         if problem := error.problem(self.tree):
             return Outcome(STALE, problem)
-        named = [self.tree / test for test in error.tests]
-        folders = tuple(str((test if test.is_dir() else test.parent).relative_to(self.tree)) for test in named)
+        wider = tuple(dict.fromkeys(self._wider(test) for test in error.tests))
         outcome = Outcome(SURVIVED)
-        for tests in dict.fromkeys([error.tests, tuple(dict.fromkeys(folders))]):
+        for tests in dict.fromkeys([error.tests, wider]):
             outcome = self._try(error, tests)
             if outcome.verdict != SURVIVED:
                 break
         return outcome
+
+    def _wider(self, test: str) -> str:
+        """The folder of a file of tests; but not the one of all tests."""
+        folder = Path(test).parent
+        return test if (self.tree / test).is_dir() or folder.name == "tests" else str(folder)
 
     def _try(self, error: Error, tests: tuple[str, ...]) -> Outcome:
         path = self.tree / error.file
