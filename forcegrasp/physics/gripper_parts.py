@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from forcegrasp.short_repr import ShortRepr
+
 
 @dataclass(frozen=True)
 class FieldWrite:
@@ -74,8 +76,8 @@ class Finger:
     force_sensor: str  #: empty if it has none
 
 
-@dataclass(frozen=True)
-class Training:
+@dataclass(frozen=True, repr=False)
+class Training(ShortRepr):
     """What a training draws and how its sensors are, unless its options say otherwise."""
 
     radius_m: tuple[float, float]  #: object radii
@@ -93,6 +95,10 @@ class Training:
     contact_threshold_n: float  #: force above which a finger counts as touching
     assumed_stiffness: float  #: k of the hand-written controller, N per unit of the motors
     closing_step: float  #: its command step while it closes, unit of the motors
+
+    def summary(self) -> str:
+        low, high = self.radius_m
+        return f"radii {low:g} to {high:g} m, forces up to {self.max_force_n:g} N"
 
     def at(self, parameter: str, kappa: np.ndarray | float) -> np.ndarray | float:
         """A parameter that follows the softness κ; linear in it, from the smaller of its two values up."""

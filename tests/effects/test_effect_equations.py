@@ -9,7 +9,7 @@ import pytest
 from scipy.signal import lfilter
 
 from forcegrasp.effects import Effect, catalogue, get_effect
-from forcegrasp.physics.gripper import load_gripper
+from forcegrasp.physics.gripper_file import load_gripper
 from forcegrasp.physics.plant import Plant, write_base
 
 from .rollouts import FORCE_SCALE, START_M, make_plant, path, play, rollout, start
@@ -162,9 +162,9 @@ def test_coulomb_friction_holds_up_to_its_size():
 def test_stiction_follows_the_stribeck_curve():
     effect = make("stiction", 0.05, 0.4)
     for speed in (0.0, 0.001, 0.002, -0.002, 0.01, 1.0):
-        stub = SimpleNamespace(velocity=np.full((1, 2), speed), friction_n=np.full((1, 2), 0.01))
+        stub = SimpleNamespace(velocity=np.full((1, 2), speed), friction=np.full((1, 2), 0.01))
         effect.attach(stub, np.array([0])).act()
-        assert stub.friction_n - 0.01 == pytest.approx(0.02 + 0.03 * np.exp(-((speed / 0.002) ** 2)), abs=1e-12)
+        assert stub.friction - 0.01 == pytest.approx(0.02 + 0.03 * np.exp(-((speed / 0.002) ** 2)), abs=1e-12)
 
 
 def test_stiction_sticks_then_jumps():
@@ -261,7 +261,7 @@ class Pads:
 
     def __init__(self, distance: np.ndarray, force: np.ndarray | float, centre: float = 0.0) -> None:
         pads = np.array([-1, 1]) * distance + centre  # the left one stands on the negative side
-        self.position, self.object_position = (pads * [-1, 1])[None], np.array([centre])
+        self.pad_position, self.object_position = (pads * [-1, 1])[None], np.array([centre])
         self.pad_force = np.broadcast_to(np.asarray(force, float), (1, 2))
         self.finger_push_n, self.object_push_n = np.zeros((1, 2)), np.zeros(1)
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from forcegrasp.effects.base import Effect
-from forcegrasp.physics.gripper import load_gripper
+from forcegrasp.physics.gripper_file import load_gripper
 from forcegrasp.physics.plant import Plant
 
 SECOND = str(Path(__file__).parents[1] / "grippers" / "second.yaml")
@@ -69,7 +69,7 @@ def test_each_pad_has_a_shift_of_its_own(gripper):
     plant.reset(np.arange(1), np.zeros(1), np.full((1, 2), 0.04))
     plant.advance(np.full((1, 2), 0.04))
     moved = np.abs(plant.field("geom_pos")[0] - plant.model.geom_pos).max(axis=1)
-    left, right = (plant.model.geom_bodyid == plant.model.joint(name).bodyid[0] for name in plant.gripper.joints)
+    left, right = (plant.model.geom_bodyid == plant.model.body(finger.body).id for finger in plant.gripper.fingers)
     np.testing.assert_allclose(moved, np.where(right, 0.002, 0.0), atol=1e-12)
     assert left.any()
     assert right.any()
