@@ -47,8 +47,8 @@ def step(milliseconds: float, make_up: bool = True) -> Callable[[mujoco.MjModel]
 
     def change(model: mujoco.MjModel) -> None:
         model.opt.timestep = milliseconds / 1000
-        for name in TIAGO.joints:
-            dof, gain = model.joint(name).dofadr[0], model.actuator(name).gainprm[0]
+        for motor in TIAGO.motors:
+            dof, gain = model.joint(motor.joint).dofadr[0], model.actuator(motor.actuator).gainprm[0]
             model.dof_damping[dof] = 1 + make_up * gain * (model.opt.timestep - 0.002) / 2
 
     return change
@@ -95,8 +95,8 @@ class Run:
         plant, grasps = self.plant, self.grasps
         base = {
             "velocity_gain": grasps.b2,
-            "rho_m": grasps.rho_m,
-            "force_scale": grasps.force_scale,
+            "rho_m": np.asarray(TIAGO.training.at("rho_m", grasps.kappa)),
+            "force_scale": np.asarray(TIAGO.training.force_scale(grasps.kappa)),
             "radius_m": grasps.radius_m,
             "offset_m": grasps.offset_m,
         }

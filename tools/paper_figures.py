@@ -260,7 +260,7 @@ def bias() -> Drawn:
         had = torch.tensor(state, dtype=torch.float64).expand(401, 2)
         error = (goal - force)[:, None].expand(401, 2)
         phi = contact_bias(
-            had, error, torch.full((401, 1), goal, dtype=torch.float64), config.bias_one_contact, config.bias_floor
+            had, error, torch.full((401, 1), goal, dtype=torch.float64), config.bias_one_contact, config.bias_floor, 2
         )[:, 0]
         axes.plot(force / goal, phi, color=colour, lw=2, label=name)
     axes.set_xlabel("force / goal force")

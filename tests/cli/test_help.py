@@ -12,6 +12,7 @@ import pytest
 from forcegrasp import __version__
 from forcegrasp.cli.main import VERBS, main
 from forcegrasp.cli.options import COMMON, SCHEMAS, groups, leaves
+from forcegrasp.config import is_left_out
 
 
 def printed(capsys, *arguments: str) -> str:
@@ -51,7 +52,8 @@ def test_every_verb_has_help(capsys):
 def test_all_of_the_help_names_every_option_and_preset(capsys, verb, arguments):
     out = printed(capsys, verb, *arguments)
     for name, entry, default in leaves(SCHEMAS[verb]):
-        line = f"  {name}={str(default).replace(' ', '').replace(chr(39), '')}\n"
+        left = entry.metadata["of_gripper"] and is_left_out(default)
+        line = f"  {name}={'(of gripper)' if left else str(default).replace(' ', '').replace(chr(39), '')}\n"
         assert line in out
         text = out.partition(line)[2].partition("\n")[0]
         assert entry.metadata["doc"] in text
