@@ -15,7 +15,7 @@ import torch
 from authors_episodes import EPISODES, INSTANTS, actions, parameters, read
 
 from forcegrasp.gpu.simulator import WarpGraspSimulator
-from forcegrasp.physics import GraspSimulator
+from forcegrasp.physics import GraspSimulator, default_gripper
 
 FOLDER = Path(os.environ.get("FORCEGRASP_REFERENCE") or Path(__file__).parents[3] / "shared" / "reference")
 _INDEX_FILE = FOLDER / "index.csv"
@@ -106,9 +106,9 @@ def test_warp_over_all_episodes(warp, episodes, fast_deviations, tier):
 
 
 def test_softness_gives_the_authors_parameters():
-    authors = parameters(INDEX)
-    np.testing.assert_allclose(authors.rho_m, [float(row["rho_m"]) for row in INDEX], rtol=1e-8)
-    np.testing.assert_allclose(authors.force_scale, [float(row["f_alpha"]) for row in INDEX], rtol=1e-8)
+    law, kappa = default_gripper().training, parameters(INDEX).kappa
+    np.testing.assert_allclose(law.at("rho_m", kappa), [float(row["rho_m"]) for row in INDEX], rtol=1e-8)
+    np.testing.assert_allclose(law.force_scale(kappa), [float(row["f_alpha"]) for row in INDEX], rtol=1e-8)
 
 
 def test_what_a_clone_has_is_taken_from_these(episodes):
