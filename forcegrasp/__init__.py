@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 __all__ = ["ForcegraspError", "add", "build_env", "compare", "diagnose", "fit", "load", "report"]
 
-_HOMES = dict.fromkeys(("add", "diagnose", "fit", "load", "report"), "forcegrasp.api") | {"build_env": "forcegrasp.env"}
+_HOMES = dict.fromkeys(__all__, "forcegrasp.api") | {"build_env": "forcegrasp.env"}
 
 with contextlib.suppress(ImportError):  # a robot's computer runs forcegrasp.deploy with numpy and onnxruntime alone
     import gymnasium
@@ -27,8 +27,6 @@ with contextlib.suppress(ImportError):  # a robot's computer runs forcegrasp.dep
 if not TYPE_CHECKING:
 
     def __getattr__(name: str):
-        if name == "compare":  # the package of that name, which can be called
-            return importlib.import_module("forcegrasp.compare")
         if name not in _HOMES:
             raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
         return getattr(importlib.import_module(_HOMES[name]), name)

@@ -6,7 +6,7 @@ import os
 
 import pytest
 
-from forcegrasp.bounded import read_bytes
+from forcegrasp.files.bounded import read_bytes
 
 
 def test_a_file_of_the_largest_size_is_read_whole(tmp_path):

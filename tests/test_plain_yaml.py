@@ -6,8 +6,8 @@ import os
 
 import pytest
 
-from forcegrasp import plain_yaml
-from forcegrasp.plain_yaml import PlainYamlError
+from forcegrasp.files import plain_yaml
+from forcegrasp.files.plain_yaml import PlainYamlError
 
 
 @pytest.fixture

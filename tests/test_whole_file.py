@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import stat
 
-from forcegrasp.whole_file import write_whole
+from forcegrasp.files.whole_file import write_whole
 
 
 def test_content_and_then_the_folder_are_synced(tmp_path, monkeypatch):

@@ -76,8 +76,9 @@ def right_names(job: Job) -> set[str]:
 def run_job(job: Job) -> dict:
     """Records and diagnoses one set."""
     from forcegrasp.cli.measuring import refuse_table
-    from forcegrasp.compare import workflow
-    from forcegrasp.measure import replay
+    from forcegrasp.diagnosis import workflow as diagnosis_workflow
+    from forcegrasp.identify import workflow
+    from forcegrasp.replay import replay
     from tests.independent.rig import record
 
     replay.THREADS = 1
@@ -86,7 +87,7 @@ def run_job(job: Job) -> dict:
         truth = record(folder / "set", dict.fromkeys(job.hidden, job.size), job.seed, job.grasps, contact=job.contact)
         started, busy = time.perf_counter(), time.process_time()
         loaded = refuse_table(workflow.load(folder / "set"), "fit")
-        diagnosis, _ = workflow.diagnose_set(loaded, None, [], 0, lambda text: None)
+        diagnosis, _ = diagnosis_workflow.diagnose_set(loaded, None, [], 0, lambda text: None)
         seconds, processor = time.perf_counter() - started, time.process_time() - busy
         model = workflow.model_of(diagnosis.fit, diagnosis.target, loaded, diagnosis.numerical)
     finally:

@@ -11,9 +11,10 @@ from pathlib import Path
 from mujoco.batch import Batch
 
 from forcegrasp.cli.measuring import refuse_table
-from forcegrasp.compare import workflow
-from forcegrasp.measure import replay
-from forcegrasp.measure.replay import Replay
+from forcegrasp.diagnosis import workflow as diagnosis_workflow
+from forcegrasp.identify import workflow
+from forcegrasp.replay import replay
+from forcegrasp.replay.replay import Replay
 
 #: Function that simulates → what it does it for; the innermost one that is running counts.
 PARTS = {
@@ -70,7 +71,7 @@ def main() -> None:
         watch(Batch, name, stepped)
     loaded = refuse_table(workflow.load(arguments.set), "fit")
     wall, processor = time.perf_counter(), time.process_time()
-    diagnosis, _ = workflow.diagnose_set(loaded, None, [], 0, lambda text: None)
+    diagnosis, _ = diagnosis_workflow.diagnose_set(loaded, None, [], 0, lambda text: None)
     wall, processor = time.perf_counter() - wall, time.process_time() - processor
     print(f"{diagnosis.verdict} {', '.join(diagnosis.effects)}: {wall:.0f} s, {processor:.0f} s of processor time")
     for name, seconds in sorted(spent.items(), key=lambda item: -item[1]):

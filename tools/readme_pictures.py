@@ -21,13 +21,13 @@ from PIL import Image
 
 from forcegrasp.cli.main import main as forcegrasp
 from forcegrasp.cli.measuring import refuse_table
-from forcegrasp.compare.comparison import Comparison
-from forcegrasp.compare.figures import MEASURED, WITH, WITHOUT
-from forcegrasp.compare.heldout import rms
-from forcegrasp.compare.target import PHASES
-from forcegrasp.compare.workflow import compare, load
-from forcegrasp.effects.model_file import read_model
 from forcegrasp.evaluate.plots import figure_pixels
+from forcegrasp.identify.comparison import Comparison
+from forcegrasp.identify.cross_validation import rms
+from forcegrasp.identify.target import PHASES
+from forcegrasp.identify.workflow import compare, load
+from forcegrasp.models.model_file import read_model
+from forcegrasp.reports.figures import MEASURED, WITH, WITHOUT
 
 FIGURES = Path(__file__).resolve().parent.parent / "docs" / "figures"
 GRASP = ["render", "policies=[ib,force_pi]", "kappa=0.8"]

@@ -10,10 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
-from forcegrasp.compare.final_force import analyse_table
-from forcegrasp.compare.final_force_output import draw
+from forcegrasp.final_force.analysis import analyse_table
 from forcegrasp.measure.schema import FinalForceTable, fingerprint_of_table
 from forcegrasp.physics.gripper_file import load_gripper
+from forcegrasp.reports.final_force import draw, lines, sections
 from forcegrasp.reports.html import write_report
 
 SOURCE = (
@@ -52,11 +52,11 @@ def main() -> None:
     parser.add_argument("--report", type=Path, help="also writes the HTML report")
     options = parser.parse_args()
     analysis = analyse_table(real_table(), load_gripper("tiago"))
-    print("\n".join(analysis.lines()))
+    print("\n".join(lines(analysis)))
     draw(analysis).savefig(options.figure, dpi=140)
     if options.report:
         facts = {"set": analysis.table.name, "fingerprint": analysis.table.fingerprint, "source": SOURCE}
-        write_report(options.report, "Final forces of TIAGo's gripper", analysis.reason, analysis.sections(), facts)
+        write_report(options.report, "Final forces of TIAGo's gripper", analysis.reason, sections(analysis), facts)
 
 
 if __name__ == "__main__":

@@ -16,14 +16,15 @@ from forcegrasp.api.results import (
 )
 from forcegrasp.cli import measuring
 from forcegrasp.cli.results import default_out
-from forcegrasp.compare import workflow
-from forcegrasp.compare.advice import advise
-from forcegrasp.compare.final_force import analyse_table
-from forcegrasp.compare.workflow import Loaded, Progress
 from forcegrasp.config import CompareConfig, DiagnoseConfig, FitConfig, validate
-from forcegrasp.effects.model_file import Model, read_model, write_model
+from forcegrasp.diagnosis import workflow as diagnosis_workflow
+from forcegrasp.diagnosis.advice import advise
 from forcegrasp.errors import ConfigError
+from forcegrasp.final_force.analysis import analyse_table
+from forcegrasp.identify import workflow
+from forcegrasp.identify.workflow import Loaded, Progress
 from forcegrasp.measure import FinalForceTable, MeasurementSet
+from forcegrasp.models.model_file import Model, read_model, write_model
 from forcegrasp.short_repr import cut
 
 Writable = TypeVar("Writable", FitResult, AddResult)
@@ -123,9 +124,9 @@ def diagnose(
     loaded, tell = _open(data, progress)
     if measuring.is_table(loaded):
         return _analyse(loaded, "diagnosis", model=model, effects=only)
-    tried = workflow.chosen_effects(loaded.gripper, only)
+    tried = diagnosis_workflow.chosen_effects(loaded.gripper, only)
     given, loaded = (None, loaded) if model is None else _beside(model, loaded, tell)
-    diagnosis, _ = workflow.diagnose_set(loaded, given, [effect.name for effect in tried], seed, tell)
+    diagnosis, _ = diagnosis_workflow.diagnose_set(loaded, given, [effect.name for effect in tried], seed, tell)
     return DiagnoseResult(loaded, diagnosis, advise(diagnosis), tuple(tried), only, given is None)
 
 
@@ -156,9 +157,9 @@ def add(
     loaded, tell = _open(data, progress)
     grasps = measuring.refuse_table(loaded, "add")
     measuring.refuse_one_grasp(grasps)
-    (chosen,) = workflow.chosen_effects(grasps.gripper, [effect])
+    (chosen,) = diagnosis_workflow.chosen_effects(grasps.gripper, [effect])
     given, grasps = _beside(model, grasps, tell)
-    added = workflow.add_effect(grasps, given, chosen, tell)
+    added = diagnosis_workflow.add_effect(grasps, given, chosen, tell)
     measuring.refuse_useless(added, chosen, "forcegrasp.diagnose")
     return _written(AddResult(grasps, added, chosen, path))
 

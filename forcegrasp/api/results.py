@@ -8,19 +8,24 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from forcegrasp.cli import measuring
-from forcegrasp.compare import compare_output, diagnose_output, fit_output, workflow
-from forcegrasp.compare.advice import Advice
-from forcegrasp.compare.base_fit import BaseFit
-from forcegrasp.compare.comparison import Comparison
-from forcegrasp.compare.diagnose import Diagnosis
-from forcegrasp.compare.final_force import TableAnalysis
-from forcegrasp.compare.floor import numerical_error
-from forcegrasp.compare.heldout import rms
-from forcegrasp.compare.target import Target
-from forcegrasp.compare.workflow import Added, Loaded
+from forcegrasp.diagnosis.advice import Advice
+from forcegrasp.diagnosis.search import Diagnosis
+from forcegrasp.diagnosis.workflow import Added
 from forcegrasp.effects import Effect
-from forcegrasp.effects.model_file import Model
+from forcegrasp.final_force.analysis import TableAnalysis
+from forcegrasp.identify import workflow
+from forcegrasp.identify.base_fit import BaseFit
+from forcegrasp.identify.comparison import Comparison
+from forcegrasp.identify.cross_validation import rms
+from forcegrasp.identify.noise_floor import numerical_error
+from forcegrasp.identify.target import Target
+from forcegrasp.identify.workflow import Loaded
 from forcegrasp.measure import FinalForceTable, MeasurementSet
+from forcegrasp.models.model_file import Model
+from forcegrasp.reports import comparison as comparison_report
+from forcegrasp.reports import diagnosis as diagnosis_report
+from forcegrasp.reports import final_force as final_force_report
+from forcegrasp.reports import fit as fit_report
 from forcegrasp.short_repr import ShortRepr, counted, cut, some
 
 if TYPE_CHECKING:
@@ -85,7 +90,7 @@ class CompareResult(Result):
 
     @property
     def answer(self) -> str:
-        return compare_output.answer(self.comparison)
+        return comparison_report.answer(self.comparison)
 
     @property
     def title(self) -> str:
@@ -93,16 +98,16 @@ class CompareResult(Result):
 
     def to_dict(self) -> dict[str, Any]:
         name = self.given or "base model, fitted to this set"
-        return compare_output.compare_json(self.comparison, self.name, name, list(self.notes))
+        return comparison_report.compare_json(self.comparison, self.name, name, list(self.notes))
 
     def sections(self) -> list[Section]:
-        return compare_output.sections(self.comparison, list(self.notes))
+        return comparison_report.sections(self.comparison, list(self.notes))
 
     def models(self) -> dict[str, Model]:
         return {} if self.given else {measuring.BASE_MODEL: dataclasses.replace(self.model, warnings=self.notes)}
 
     def summary(self) -> str:
-        worst = compare_output.worst_cell(self.comparison.cells())
+        worst = comparison_report.worst_cell(self.comparison.cells())
         return (
             f"{cut(self.name)}: error {self.error:.2f} × noise, a perfect model {self.floor:.2f};"
             f" largest in {worst.phase}, {worst.signal}: {worst.ratio:.1f} × noise"
@@ -129,21 +134,21 @@ class FitResult(Result):
     @cached_property
     def error(self) -> float:
         """rms error on held-out grasps; NaN where there are too few to hold any out."""
-        return rms(fit_output.held_out(self.base.fit, self.target), self.target)
+        return rms(fit_report.held_out(self.base.fit, self.target), self.target)
 
     @property
     def answer(self) -> str:
-        return fit_output.fit_answer(self.base, self.target)
+        return fit_report.fit_answer(self.base, self.target)
 
     @property
     def title(self) -> str:
         return f"Base model of {self.name}"
 
     def to_dict(self) -> dict[str, Any]:
-        return fit_output.fit_json(self.base, self.target, self.model, self.name, self.path or Path("model.yaml"))
+        return fit_report.fit_json(self.base, self.target, self.model, self.name, self.path or Path("model.yaml"))
 
     def sections(self) -> list[Section]:
-        return fit_output.fit_sections(self.base, self.target, self.model)
+        return fit_report.fit_sections(self.base, self.target, self.model)
 
     def models(self) -> dict[str, Model]:
         return {"model.yaml": self.model}
@@ -203,7 +208,7 @@ class DiagnoseResult(Result):
 
     @property
     def answer(self) -> str:
-        answer = diagnose_output.answer(self.diagnosis)
+        answer = diagnosis_report.answer(self.diagnosis)
         return f"{answer} Only {', '.join(self.only)} were tried." if self.only else answer
 
     @property
@@ -211,10 +216,10 @@ class DiagnoseResult(Result):
         return f"What the model lacks: {self.name}"
 
     def to_dict(self) -> dict[str, Any]:
-        return diagnose_output.diagnosis_json(self.diagnosis, self.advice, self.tried, self.name)
+        return diagnosis_report.diagnosis_json(self.diagnosis, self.advice, self.tried, self.name)
 
     def sections(self) -> list[Section]:
-        return diagnose_output.sections(self.diagnosis, self.advice, self.tried)
+        return diagnosis_report.sections(self.diagnosis, self.advice, self.tried)
 
     def models(self) -> dict[str, Model]:
         base = {measuring.BASE_MODEL: self._base_model} if self.from_base else {}
@@ -254,17 +259,17 @@ class AddResult(Result):
 
     @property
     def answer(self) -> str:
-        return fit_output.add_answer(self.added, self.effect)
+        return fit_report.add_answer(self.added, self.effect)
 
     @property
     def title(self) -> str:
         return f"{self.effect.name} added: {self.name}"
 
     def to_dict(self) -> dict[str, Any]:
-        return fit_output.add_json(self.added, self.effect, self.name, self.path or Path("model.yaml"))
+        return fit_report.add_json(self.added, self.effect, self.name, self.path or Path("model.yaml"))
 
     def sections(self) -> list[Section]:
-        return fit_output.add_sections(self.added, self.effect)
+        return fit_report.add_sections(self.added, self.effect)
 
     def models(self) -> dict[str, Model]:
         return {"model.yaml": self.model}
@@ -301,10 +306,11 @@ class TableResult(Result):
         return measuring.table_title(self.data, self.file)
 
     def to_dict(self) -> dict[str, Any]:
-        return self.analysis.compare_json() if self.file == "compare" else self.analysis.diagnosis_json()
+        as_json = final_force_report.compare_json if self.file == "compare" else final_force_report.diagnosis_json
+        return as_json(self.analysis)
 
     def sections(self) -> list[Section]:
-        return self.analysis.sections()
+        return final_force_report.sections(self.analysis)
 
     def summary(self) -> str:
         return f"{cut(self.name)}: {self.verdict} {some(self.effects) or cut(self.analysis.reason, 150)}"

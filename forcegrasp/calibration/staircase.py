@@ -9,8 +9,8 @@ import numpy as np
 
 from forcegrasp.calibration.rig import MAX_DELTA_M, Closing, Values, close, column_of
 from forcegrasp.calibration.stiffness import RADIUS_M, kappa_values
-from forcegrasp.compare.final_force_shapes import BIAS, bootstrap, fit_shape
 from forcegrasp.errors import ConfigError, MeasurementError
+from forcegrasp.final_force.shapes import BIAS, bootstrap, fit_shape
 from forcegrasp.physics.gripper import Gripper
 from forcegrasp.physics.gripper_file import default_gripper
 

@@ -36,32 +36,34 @@ def main(arguments: list[str]) -> int:
         tell_warnings,
         write_results,
     )
-    from forcegrasp.compare import fit_output, workflow
-    from forcegrasp.effects.model_file import write_model
+    from forcegrasp.diagnosis import workflow as diagnosis_workflow
+    from forcegrasp.identify import workflow
+    from forcegrasp.models.model_file import write_model
+    from forcegrasp.reports import fit as fit_report
 
     check_effects("effect", [config.effect])
     folder = check_folder(default_out("add", ""))
     path = check_file(folder / "model.yaml" if not config.out else need(config.out, "out", "better.yaml"))
     loaded = refuse_table(workflow.load(data), "add")
     refuse_one_grasp(loaded)
-    (effect,) = workflow.chosen_effects(loaded.gripper, [config.effect])
+    (effect,) = diagnosis_workflow.chosen_effects(loaded.gripper, [config.effect])
     model, loaded = take_model(old, loaded)
     tell_warnings(loaded)
-    added = workflow.add_effect(loaded, model, effect, narrator())
+    added = diagnosis_workflow.add_effect(loaded, model, effect, narrator())
     refuse_useless(added, effect, f"forcegrasp diagnose data={data} model={old}")
-    lead = fit_output.add_answer(added, effect)
-    print_table(fit_output.printed_fall(added, effect))
-    print_table(fit_output.printed_parameters(added.model))
+    lead = fit_report.add_answer(added, effect)
+    print_table(fit_report.printed_fall(added, effect))
+    print_table(fit_report.printed_parameters(added.model))
     print("\n".join([lead, *(f"warning: {warning}" for warning in added.model.warnings)]))
     write_model(added.model, path)
     print(f"wrote {path}. Train with it: forcegrasp train model={path}")
     write_results(
         folder,
         "add",
-        fit_output.add_json(added, effect, loaded.measured.name, path),
+        fit_report.add_json(added, effect, loaded.measured.name, path),
         f"{effect.name} added: {loaded.measured.name}",
         lead,
-        fit_output.add_sections(added, effect),
+        fit_report.add_sections(added, effect),
         loaded,
     )
     return 0

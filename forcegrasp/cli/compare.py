@@ -34,8 +34,9 @@ def main(arguments: list[str]) -> int:
         tell_warnings,
         write_results,
     )
-    from forcegrasp.compare import compare_output, workflow
-    from forcegrasp.effects.model_file import write_model
+    from forcegrasp.identify import workflow
+    from forcegrasp.models.model_file import write_model
+    from forcegrasp.reports import comparison as comparison_report
 
     out = check_folder(default_out("compare", config.out))
     loaded = workflow.load(data)
@@ -46,9 +47,9 @@ def main(arguments: list[str]) -> int:
     tell_warnings(loaded)
     comparison, used, notes = workflow.compare(loaded, model, config.seed, narrator())
     notes, name = [*notes, *used.warnings], config.model or "base model, fitted to this set"
-    lead = compare_output.answer(comparison)
-    print_table(compare_output.printed(comparison))
-    print("\n".join([lead, *compare_output.details(comparison), *(f"note: {note}" for note in notes)]))
+    lead = comparison_report.answer(comparison)
+    print_table(comparison_report.printed(comparison))
+    print("\n".join([lead, *comparison_report.details(comparison), *(f"note: {note}" for note in notes)]))
     if model is None:
         known = out / BASE_MODEL
         write_model(dataclasses.replace(used, warnings=tuple(notes)), known)
@@ -56,10 +57,10 @@ def main(arguments: list[str]) -> int:
     write_results(
         out,
         "compare",
-        compare_output.compare_json(comparison, loaded.measured.name, name, notes),
+        comparison_report.compare_json(comparison, loaded.measured.name, name, notes),
         f"Where the model fails: {loaded.measured.name}",
         lead,
-        compare_output.sections(comparison, notes),
+        comparison_report.sections(comparison, notes),
         loaded,
     )
     return 0

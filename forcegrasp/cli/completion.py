@@ -60,7 +60,7 @@ def table() -> Iterator[list[str]]:
     from forcegrasp.cli.main import VERBS
     from forcegrasp.cli.options import HYDRA_OPTIONS, LAUNCHERS, SCHEMAS, groups, leaves
     from forcegrasp.effects import catalogue
-    from forcegrasp.effects.model_file import SHIPPED
+    from forcegrasp.models.model_file import SHIPPED
     from forcegrasp.policies import shipped_policies
 
     policies, effects = [*shipped_policies(), *CONTROLLERS, FILES], list(catalogue())

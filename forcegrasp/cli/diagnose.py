@@ -41,9 +41,11 @@ def main(arguments: list[str]) -> int:
         tell_warnings,
         write_results,
     )
-    from forcegrasp.compare import diagnose_output, workflow
-    from forcegrasp.compare.advice import advise
-    from forcegrasp.effects.model_file import write_model
+    from forcegrasp.diagnosis import workflow as diagnosis_workflow
+    from forcegrasp.diagnosis.advice import advise
+    from forcegrasp.identify import workflow
+    from forcegrasp.models.model_file import write_model
+    from forcegrasp.reports import diagnosis as diagnosis_report
 
     check_effects("effects", config.effects)
     out = check_folder(default_out("diagnose", config.out))
@@ -51,17 +53,17 @@ def main(arguments: list[str]) -> int:
     if is_table(loaded):
         report_table(loaded, "diagnosis", out, model=config.model, effects=config.effects)
         return 0
-    tried = workflow.chosen_effects(loaded.gripper, config.effects)
+    tried = diagnosis_workflow.chosen_effects(loaded.gripper, config.effects)
     model, loaded = take_model(Path(config.model), loaded) if config.model else (None, loaded)
     tell_warnings(loaded)
-    diagnosis, _ = workflow.diagnose_set(loaded, model, [e.name for e in tried], config.seed, narrator())
+    diagnosis, _ = diagnosis_workflow.diagnose_set(loaded, model, [e.name for e in tried], config.seed, narrator())
     advice = advise(diagnosis)
-    lead, table = diagnose_output.answer(diagnosis), diagnose_output.printed(diagnosis)
+    lead, table = diagnosis_report.answer(diagnosis), diagnosis_report.printed(diagnosis)
     if config.effects:
         lead += f" Only {', '.join(config.effects)} were tried."
     if table is not None:
         print_table(table)
-    print("\n".join([f"{diagnosis.verdict}: {lead}", *diagnose_output.lines(diagnosis, advice)]))
+    print("\n".join([f"{diagnosis.verdict}: {lead}", *diagnosis_report.lines(diagnosis, advice)]))
     known = config.model or out / BASE_MODEL
     if model is None:
         write_model(base_model(diagnosis.base, diagnosis.target, loaded), out / BASE_MODEL)
@@ -74,10 +76,10 @@ def main(arguments: list[str]) -> int:
     write_results(
         out,
         "diagnosis",
-        diagnose_output.diagnosis_json(diagnosis, advice, tried, loaded.measured.name),
+        diagnosis_report.diagnosis_json(diagnosis, advice, tried, loaded.measured.name),
         f"What the model lacks: {loaded.measured.name}",
         lead,
-        diagnose_output.sections(diagnosis, advice, tried),
+        diagnosis_report.sections(diagnosis, advice, tried),
         loaded,
     )
     return 0

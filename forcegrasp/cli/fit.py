@@ -29,8 +29,9 @@ def main(arguments: list[str]) -> int:
         tell_warnings,
         write_results,
     )
-    from forcegrasp.compare import fit_output, workflow
-    from forcegrasp.effects.model_file import write_model
+    from forcegrasp.identify import workflow
+    from forcegrasp.models.model_file import write_model
+    from forcegrasp.reports import fit as fit_report
 
     folder = check_folder(default_out("fit", ""))
     path = check_file(folder / "model.yaml" if not config.out else need(config.out, "out", "model.yaml"))
@@ -38,18 +39,18 @@ def main(arguments: list[str]) -> int:
     tell_warnings(loaded)
     target, _, base = workflow.fit_model(loaded, config.seed, narrator())
     model = base_model(base, target, loaded)
-    lead = fit_output.fit_answer(base, target)
-    print_table(fit_output.printed_parameters(model))
+    lead = fit_report.fit_answer(base, target)
+    print_table(fit_report.printed_parameters(model))
     print("\n".join([lead, *(f"warning: {warning}" for warning in model.warnings)]))
     write_model(model, path)
     print(f"wrote {path}. Which effect is missing? forcegrasp diagnose data={data} model={path}")
     write_results(
         folder,
         "fit",
-        fit_output.fit_json(base, target, model, loaded.measured.name, path),
+        fit_report.fit_json(base, target, model, loaded.measured.name, path),
         f"Base model of {loaded.measured.name}",
         lead,
-        fit_output.fit_sections(base, target, model),
+        fit_report.fit_sections(base, target, model),
         loaded,
     )
     return 0

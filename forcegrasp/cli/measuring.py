@@ -14,13 +14,14 @@ from forcegrasp.errors import ConfigError, closest
 if TYPE_CHECKING:
     from typing_extensions import TypeIs
 
-    from forcegrasp.compare.base_fit import BaseFit
-    from forcegrasp.compare.final_force import TableAnalysis
-    from forcegrasp.compare.target import Target
-    from forcegrasp.compare.workflow import Added, Loaded
+    from forcegrasp.diagnosis.workflow import Added
     from forcegrasp.effects import Effect
-    from forcegrasp.effects.model_file import Model
+    from forcegrasp.final_force.analysis import TableAnalysis
+    from forcegrasp.identify.base_fit import BaseFit
+    from forcegrasp.identify.target import Target
+    from forcegrasp.identify.workflow import Loaded
     from forcegrasp.measure import FinalForceTable, MeasurementSet
+    from forcegrasp.models.model_file import Model
     from forcegrasp.reports.html import Section
 
 
@@ -58,8 +59,8 @@ def check_file(file: Path) -> Path:
 
 def take_model(path: Path, loaded: Loaded[MeasurementSet]) -> tuple[Model, Loaded[MeasurementSet]]:
     """Reads a model, and returns it and the set, with a warning if the model was fitted to another one."""
-    from forcegrasp.compare.workflow import warn_of_other_set
-    from forcegrasp.effects.model_file import read_model
+    from forcegrasp.identify.workflow import warn_of_other_set
+    from forcegrasp.models.model_file import read_model
 
     model = read_model(path)
     return model, warn_of_other_set(loaded, model, path)
@@ -98,8 +99,8 @@ def write_files(
 
 def base_model(base: BaseFit, target: Target, loaded: Loaded[MeasurementSet]) -> Model:
     """A fitted base model, which says if it is not to be believed."""
-    from forcegrasp.compare.floor import numerical_error
-    from forcegrasp.compare.workflow import model_of
+    from forcegrasp.identify.noise_floor import numerical_error
+    from forcegrasp.identify.workflow import model_of
 
     model = model_of(base.fit, target, loaded, numerical_error(base.fit, target))
     if base.converged:
@@ -141,15 +142,16 @@ def report_table(loaded: Loaded[FinalForceTable], name: str, out: Path, **unused
       ConfigError: if one of those is given.
     """
     refuse_options(loaded, **unused)
-    from forcegrasp.compare.final_force import analyse_table
+    from forcegrasp.final_force.analysis import analyse_table
+    from forcegrasp.reports import final_force as final_force_report
 
     tell_warnings(loaded)
     analysis = analyse_table(loaded.measured, loaded.gripper)
-    for line in analysis.lines():
+    for line in final_force_report.lines(analysis):
         print(line)
-    content = analysis.compare_json() if name == "compare" else analysis.diagnosis_json()
+    as_json = final_force_report.compare_json if name == "compare" else final_force_report.diagnosis_json
     title, lead = table_title(loaded, name), table_answer(analysis)
-    write_results(out, name, content, title, lead, analysis.sections(), loaded)
+    write_results(out, name, as_json(analysis), title, lead, final_force_report.sections(analysis), loaded)
 
 
 def refuse_options(loaded: Loaded[FinalForceTable], **unused: object) -> None:

@@ -21,11 +21,11 @@ def main(arguments: list[str]) -> int:
         return 0
     config = compose("record", arguments)
 
-    from forcegrasp.effects.variation import read_model_of, with_noise_of
     from forcegrasp.measure import write_set
-    from forcegrasp.measure.record import parse_effect, record
+    from forcegrasp.models.variation import read_model_of, with_noise_of
     from forcegrasp.physics.completion import complete
     from forcegrasp.physics.gripper_file import load_gripper
+    from forcegrasp.replay.record import parse_effect, record
 
     out = default_out("record", config.out)
     gripper = load_gripper(config.gripper)

@@ -116,7 +116,7 @@ def _check(config: TrainConfig) -> TrainConfig:
     if config.physics.engine == "warp":
         check_gripper_for_warp(gripper)
     if config.model:
-        from forcegrasp.effects.variation import read_model_of
+        from forcegrasp.models.variation import read_model_of
 
         read_model_of(gripper, config.model)
     if config.collector.kind == "ray":

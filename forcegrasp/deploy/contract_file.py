@@ -15,9 +15,9 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from forcegrasp.assets import DEFAULT_GRIPPER
-from forcegrasp.bounded import read_bytes
 from forcegrasp.deploy.contract import PARTS, Contract, ForcePIGains, GripperInterface
 from forcegrasp.errors import DeployError, closest
+from forcegrasp.files.bounded import read_bytes
 
 FORMAT, FIRST_FORMAT = "forcegrasp-policy/2", "forcegrasp-policy/1"
 CONTRACT_FILE, NETWORK_FILE = "contract.json", "policy.onnx"

@@ -5,12 +5,11 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from forcegrasp.physics.plant import Plant
+from forcegrasp.physics.plant import Plant
 
 #: Stages in the order in which they act.
 STAGES = ("command", "actuator", "transmission", "contact", "object", "sensor")

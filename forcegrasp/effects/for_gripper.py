@@ -74,10 +74,17 @@ def _adapt(effect: type[Effect], traits: _Traits) -> type[Effect]:
     if effect.per:
         tried = tried[tried.any(axis=1)]
     own = [p.name for p in effect.parameters]
+
+    def trials(cls: type[Effect]) -> np.ndarray:
+        return tried.copy()
+
+    def index(cls: type[Effect], parameter: str) -> int:
+        return own.index(parameter)
+
     return type(effect.__name__, (effect,), {
         "__doc__": effect.__doc__, "__module__": effect.__module__, "parameters": parameters,
         "motors": traits.motors, "channels": traits.channels, "position_scale": traits.position,
-        "trials": classmethod(lambda cls: tried.copy()), "index": classmethod(lambda cls, name: own.index(name)),
+        "trials": classmethod(trials), "index": classmethod(index),
     })  # fmt: skip
 
 

@@ -19,10 +19,10 @@ from forcegrasp.config import (
     SensorConfig,
     validate,
 )
-from forcegrasp.effects.model_file import Model
-from forcegrasp.effects.variation import read_model_of, with_noise_of
 from forcegrasp.env.grasp_env import GraspEnv
 from forcegrasp.errors import ConfigError
+from forcegrasp.models.model_file import Model
+from forcegrasp.models.variation import read_model_of, with_noise_of
 from forcegrasp.physics import GraspParameters, Gripper, load_gripper
 from forcegrasp.physics.completion import complete
 from forcegrasp.physics.gripper import NO_FORCES

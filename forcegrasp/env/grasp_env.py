@@ -12,10 +12,10 @@ from torchrl.data import Bounded, Categorical, Composite, Unbounded
 from torchrl.envs import EnvBase
 
 from forcegrasp.config import GraspConfig, PhysicsConfig, RewardConfig, check_no_effects, validate
-from forcegrasp.effects.model_file import Model
-from forcegrasp.effects.variation import ModelVariation
 from forcegrasp.env.reward import force_reward, normalised_force_reward, object_penalty
 from forcegrasp.gpu.simulator import WarpGraspSimulator
+from forcegrasp.models.model_file import Model
+from forcegrasp.models.variation import ModelVariation
 from forcegrasp.physics import GraspParameters, GraspSampler, GraspSimulator, Gripper, default_gripper
 from forcegrasp.physics.completion import complete
 

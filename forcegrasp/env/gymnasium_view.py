@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, cast
 
 import gymnasium
 import numpy as np
@@ -11,6 +11,7 @@ from tensordict import TensorDictBase
 from torchrl.envs.utils import step_mdp
 
 from forcegrasp.env.build import build_env, seed_env
+from forcegrasp.env.grasp_env import GraspEnv
 from forcegrasp.errors import ConfigError
 from forcegrasp.physics.scene_renderer import SceneRenderer
 
@@ -40,7 +41,7 @@ class GraspGymnasiumEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             raise ConfigError(f"render_mode={render_mode}: must be rgb_array, or left out")
         self.render_mode = render_mode
         self._env = build_env(1, seed=seed, **parts)
-        gripper = self._env.base_env.gripper
+        gripper = cast(GraspEnv, self._env.base_env).gripper
         self._renderer = SceneRenderer(WIDTH, HEIGHT, gripper)
         self._motors = len(gripper.motors)
         self._state: TensorDictBase | None = None

@@ -14,7 +14,6 @@ from rich.progress import track
 from tensordict import TensorDictBase
 
 from forcegrasp.config import EvaluateConfig, RewardConfig
-from forcegrasp.effects.variation import read_model_of, with_noise_of
 from forcegrasp.env.episodes import FIGURES, summarise
 from forcegrasp.evaluate.colours import policy_colours
 from forcegrasp.evaluate.contestants import gripper_of, load_contestants
@@ -26,6 +25,7 @@ from forcegrasp.evaluate.statistics import Bootstrap
 from forcegrasp.evaluate.summary import print_summary, simulator_notes
 from forcegrasp.evaluate.tables import markdown
 from forcegrasp.gpu import check_engine
+from forcegrasp.models.variation import read_model_of, with_noise_of
 from forcegrasp.physics import Gripper
 from forcegrasp.physics.completion import complete
 

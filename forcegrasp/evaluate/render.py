@@ -7,13 +7,13 @@ from pathlib import Path
 import torch
 
 from forcegrasp.config import GraspConfig, RenderConfig
-from forcegrasp.effects.variation import read_model_of, with_noise_of
 from forcegrasp.env.episodes import summarise
 from forcegrasp.evaluate.contestants import gripper_of, load_contestants
 from forcegrasp.evaluate.grasp_figure import describe
 from forcegrasp.evaluate.one_grasp import draw_one_grasp
 from forcegrasp.evaluate.rollouts import roll_out
 from forcegrasp.evaluate.video import grasp_video
+from forcegrasp.models.variation import read_model_of, with_noise_of
 from forcegrasp.physics.completion import complete
 
 

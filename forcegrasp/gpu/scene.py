@@ -11,7 +11,7 @@ import torch
 import warp as wp
 from torch import Tensor
 
-from forcegrasp.gpu.floor import GAP_M, exact_contacts
+from forcegrasp.gpu.ground_contact import GAP_M, exact_contacts
 from forcegrasp.physics.gripper import Gripper
 from forcegrasp.physics.inertia import inertia_of_radius
 

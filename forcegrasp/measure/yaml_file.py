@@ -8,8 +8,8 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from forcegrasp import plain_yaml
 from forcegrasp.errors import MeasurementError
+from forcegrasp.files import plain_yaml
 from forcegrasp.measure.folder import show
 from forcegrasp.measure.names import misfits
 

@@ -14,9 +14,9 @@ from typing import Any
 
 import mujoco
 
-from forcegrasp import plain_yaml
 from forcegrasp.assets import DEFAULT_GRIPPER
 from forcegrasp.errors import ConfigError, closest
+from forcegrasp.files import plain_yaml
 from forcegrasp.physics.gripper import SIDES, SPECIAL, Gripper, shipped_folder
 from forcegrasp.physics.gripper_checks import check_gripper
 from forcegrasp.physics.gripper_defaults import training_of_scene

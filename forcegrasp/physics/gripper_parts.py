@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
 from forcegrasp.short_repr import ShortRepr
+
+Softness = TypeVar("Softness", float, np.ndarray)
 
 
 @dataclass(frozen=True)
@@ -100,7 +103,7 @@ class Training(ShortRepr):
         low, high = self.radius_m
         return f"radii {low:g} to {high:g} m, forces up to {self.max_force_n:g} N"
 
-    def at(self, parameter: str, kappa: np.ndarray | float) -> np.ndarray | float:
+    def at(self, parameter: str, kappa: Softness) -> Softness:
         """A parameter that follows the softness κ; linear in it, from the smaller of its two values up."""
         hard, soft = self.softness[parameter]
         low, high, share = (hard, soft, kappa) if hard <= soft else (soft, hard, 1 - kappa)
@@ -116,6 +119,6 @@ class Training(ShortRepr):
         """Force above which a policy that was trained with this may close no further: a third above what it reaches."""
         return self.max_force_n * float(np.max(self.force_scale(np.array([0.0, 1.0])))) * 4 / 3
 
-    def force_scale(self, kappa: np.ndarray | float) -> np.ndarray | float:
+    def force_scale(self, kappa: Softness) -> Softness:
         """f_α of an object of softness κ; 1 where it does not depend on it."""
         return self.at("force_scale", kappa) if "force_scale" in self.softness else 1.0 + 0.0 * kappa

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -17,10 +17,8 @@ from forcegrasp.physics.gripper import SIDES, Gripper, effort_sensor, own_sensor
 from forcegrasp.physics.gripper_parts import BaseParameter, Finger
 from forcegrasp.physics.inertia import inertia_of_radius
 from forcegrasp.physics.opening import command_law
+from forcegrasp.physics.protocols import PlantEffect
 from forcegrasp.physics.sensors import ReadingEffects
-
-if TYPE_CHECKING:
-    from forcegrasp.effects.base import Effect
 
 # Constraint that holds a finger against dry friction: as stiff as the step allows, lest it creeps under load.
 _STIFF_SOLREF = (0.004, 1.0)
@@ -96,8 +94,8 @@ class Plant:
         self._fields: dict[str, np.ndarray] = {}
         self._base: dict[str, np.ndarray] = {}
         self._friction_active: np.ndarray | None = None  # which motors' friction was stiffened, ``(n, motors)``
-        self._effects: list[Effect] = []
-        self._hooked: dict[str, list[Effect]] = {}
+        self._effects: list[PlantEffect] = []
+        self._hooked: dict[str, list[PlantEffect]] = {}
         self._reading_effects = ReadingEffects([])
         self.force_scale = np.ones(n)  #: f_α, factor from the force sensors to the reading, ``(n,)``
         #: What effects add to in each step: friction of the motors ``(n, motors)``, displacement of the pads towards
@@ -245,7 +243,7 @@ class Plant:
             inertia = inertia_of_radius(model, self.gripper, radius_m)
             self._write_base("body_inertia", (ids, self._object_body), inertia)
 
-    def attach(self, effects: Sequence[tuple[Effect, np.ndarray]]) -> None:
+    def attach(self, effects: Sequence[tuple[PlantEffect, np.ndarray]]) -> None:
         """Puts effects into the plant, each on its own rows, in the order of their stages; replaces earlier ones."""
         self._effects = [effect.attach(self, rows) for effect, rows in sorted(effects, key=lambda pair: pair[0].rank)]
         hooks = ("change_model", "command", "act", "interaction")

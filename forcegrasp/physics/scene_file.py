@@ -6,8 +6,8 @@ import math
 from pathlib import Path
 from xml.etree import ElementTree
 
-from forcegrasp.bounded import read_bytes
 from forcegrasp.errors import ConfigError
+from forcegrasp.files.bounded import read_bytes
 
 MAX_BYTES = 1_000_000
 MAX_ASSET_BYTES = 100_000_000

@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from forcegrasp.effects.base import Effect
+from forcegrasp.physics.protocols import PlantEffect
 
 
-def is_rounding(effect: type[Effect]) -> bool:
+def is_rounding(effect: type[PlantEffect]) -> bool:
     """Whether an effect comes after the noise, as a converter's rounding does: readings lie on its grid."""
     return effect.after_noise
 
 
-def rounding_steps(effects: Iterable[tuple[type[Effect], np.ndarray]]) -> np.ndarray:
+def rounding_steps(effects: Iterable[tuple[type[PlantEffect], np.ndarray]]) -> np.ndarray:
     """Steps that positions and forces are rounded to after the noise, ``(2,)``; 0 rounds nothing.
 
     Args:
@@ -32,7 +31,7 @@ class ReadingEffects:
       effects: any; those that change no reading, or come after the noise, are left out.
     """
 
-    def __init__(self, effects: Sequence[Effect]) -> None:
+    def __init__(self, effects: Sequence[PlantEffect]) -> None:
         live = sorted((e for e in effects if e.reads() and not is_rounding(type(e))), key=lambda e: e.rank)
         self._force = [e for e in live if "read_force" in e.hooks()]
         self._position = [e for e in live if "read_position" in e.hooks()]

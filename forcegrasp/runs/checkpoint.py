@@ -13,7 +13,7 @@ from safetensors.torch import save
 from torch import Tensor
 
 from forcegrasp.errors import CheckpointError
-from forcegrasp.whole_file import write_whole
+from forcegrasp.files.whole_file import write_whole
 
 
 def write(path: Path, tensors: dict[str, Tensor], facts: dict[str, Any]) -> None:

@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from forcegrasp import plain_yaml
-from forcegrasp.bounded import read_bytes
 from forcegrasp.config import TrainConfig
 from forcegrasp.errors import CheckpointError
-from forcegrasp.runs.started_with import experiment
+from forcegrasp.files import plain_yaml
+from forcegrasp.files.bounded import read_bytes
+from forcegrasp.runs.provenance import experiment
 
 #: A row is half a kB, and a batch takes a second.
 MAX_METRICS_BYTES = 200_000_000

@@ -23,16 +23,16 @@ from omegaconf import OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 from torch import Tensor
 
-from forcegrasp import plain_yaml
 from forcegrasp.config import TrainConfig, validate
-from forcegrasp.effects.model_file import Model, write_model
-from forcegrasp.effects.variation import read_model_of
 from forcegrasp.errors import CheckpointError, ConfigError
+from forcegrasp.files import plain_yaml
+from forcegrasp.files.whole_file import write_whole
+from forcegrasp.models.model_file import Model, write_model
+from forcegrasp.models.variation import read_model_of
 from forcegrasp.physics import load_gripper
 from forcegrasp.physics.completion import complete
 from forcegrasp.runs import checkpoint
 from forcegrasp.runs.lock import only_writer
-from forcegrasp.whole_file import write_whole
 
 _PACKAGES = ("torch", "torchrl", "tensordict", "mujoco", "gymnasium", "hydra-core", "numpy")
 

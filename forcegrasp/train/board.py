@@ -6,8 +6,8 @@ import shlex
 
 from forcegrasp.config import TrainConfig
 from forcegrasp.env.episodes import FIGURES
+from forcegrasp.runs.provenance import experiment
 from forcegrasp.runs.run_dir import RunDir
-from forcegrasp.runs.started_with import experiment
 
 #: What the first screen shows, in its order; TensorBoard sorts by name, hence the numbers.
 OVERVIEW = (

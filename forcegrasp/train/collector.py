@@ -22,8 +22,8 @@ from torchrl.modules import ProbabilisticActor
 
 from forcegrasp.config import TrainConfig
 from forcegrasp.curriculum import CurriculumHook, CurriculumValues, LinearSchedule
-from forcegrasp.effects.model_file import Model
 from forcegrasp.env import GraspEnv, build_env
+from forcegrasp.models.model_file import Model
 from forcegrasp.train import cluster
 
 

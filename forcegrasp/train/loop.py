@@ -14,10 +14,10 @@ from torchrl.envs import TransformedEnv
 from forcegrasp.config import TrainConfig
 from forcegrasp.controllers.policy import make_policy
 from forcegrasp.curriculum import CurriculumValues, LinearSchedule
-from forcegrasp.effects.model_file import Model
-from forcegrasp.effects.variation import with_noise_of
 from forcegrasp.env.episodes import summarise
 from forcegrasp.errors import CheckpointError
+from forcegrasp.models.model_file import Model
+from forcegrasp.models.variation import with_noise_of
 from forcegrasp.physics import load_gripper
 from forcegrasp.physics.completion import complete
 from forcegrasp.runs.run_dir import RunDir

@@ -9,7 +9,9 @@ from types import SimpleNamespace
 import pytest
 
 from forcegrasp.api import results
-from forcegrasp.compare import advice, floor, workflow
+from forcegrasp.diagnosis import advice
+from forcegrasp.identify import noise_floor as floor
+from forcegrasp.identify import workflow
 from tests.compare.conftest import made_up as made_up  # a fixture
 
 TABLE_META = "format: forcegrasp-measurements/1\nkind: final_force\ngripper: tiago\nsource: a test\nlicense: none\n"

@@ -14,9 +14,9 @@ import pytest
 import forcegrasp as fg
 from forcegrasp.api import AddResult, CompareResult, DiagnoseResult, FitResult, TableResult
 from forcegrasp.measure import read_set
-from forcegrasp.measure.plans import make_plan
-from forcegrasp.measure.record import Recorded
 from forcegrasp.physics import GraspParameters, default_gripper
+from forcegrasp.replay.plans import make_plan
+from forcegrasp.replay.record import Recorded
 from forcegrasp.short_repr import LONGEST, ShortRepr, cut, some
 
 

@@ -115,8 +115,8 @@ def test_diagnose_writes_the_base_model_beside_the_report_and_suggests_it(loop):
 
 
 def test_compare_writes_the_base_model_beside_the_report_and_suggests_it(folder, capsys, monkeypatch):
-    from forcegrasp.compare import workflow
-    from forcegrasp.effects.model_file import read_model
+    from forcegrasp.identify import workflow
+    from forcegrasp.models.model_file import read_model
 
     fitted, real = read_model(Path("model.yaml")), workflow.compare
     monkeypatch.setattr(workflow, "compare", lambda loaded, model, *rest: real(loaded, fitted, *rest))  # saves a fit
@@ -132,8 +132,8 @@ def test_compare_writes_the_base_model_beside_the_report_and_suggests_it(folder,
 @pytest.mark.parametrize("verb", ["compare", "diagnose", "add"])
 @pytest.mark.parametrize("other", [True, False])
 def test_a_model_of_other_measurements_is_used_with_a_warning(verb, other, folder, capsys, monkeypatch):
-    from forcegrasp.compare import workflow
     from forcegrasp.errors import ConfigError
+    from forcegrasp.identify import workflow
 
     def stop(loaded, model, *rest):
         raise ConfigError(f"with {model.data['set']} and {len(loaded.warnings)} warnings")
@@ -151,7 +151,7 @@ def test_a_model_of_other_measurements_is_used_with_a_warning(verb, other, folde
 
 
 def test_noise_that_is_given_is_held_against_the_readings_before_anything_is_fitted(folder, capsys, monkeypatch):
-    from forcegrasp.compare import workflow
+    from forcegrasp.identify import workflow
 
     meta = (folder / "my_set" / "meta.yaml").read_text()
     monkeypatch.setattr(workflow, "make_target", None)  # nothing may be fitted
@@ -205,7 +205,7 @@ def test_a_table_of_final_forces(folder, capsys):
 
 
 def test_an_effect_that_does_not_help_is_not_added(folder, capsys, monkeypatch):
-    from forcegrasp.compare import workflow
+    from forcegrasp.identify import workflow
 
     def useless(*arguments):
         return SimpleNamespace(error_before=1.0, error_after=0.996)

@@ -8,16 +8,17 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from forcegrasp.compare.advice import Advice
-from forcegrasp.compare.base_fit import BaseFit
-from forcegrasp.compare.comparison import Comparison
-from forcegrasp.compare.diagnose import Candidate, Diagnosis, Step
-from forcegrasp.compare.fit import Fit
-from forcegrasp.compare.problem import Problem
-from forcegrasp.compare.score import Score
-from forcegrasp.compare.target import make_target
-from forcegrasp.compare.workflow import Added, Loaded, model_of
+from forcegrasp.diagnosis.advice import Advice
+from forcegrasp.diagnosis.search import Candidate, Diagnosis, Step
+from forcegrasp.diagnosis.signatures import Score
+from forcegrasp.diagnosis.workflow import Added
 from forcegrasp.effects import get_effect
+from forcegrasp.identify.base_fit import BaseFit
+from forcegrasp.identify.comparison import Comparison
+from forcegrasp.identify.fit import Fit
+from forcegrasp.identify.problem import Problem
+from forcegrasp.identify.target import make_target
+from forcegrasp.identify.workflow import Loaded, model_of
 from forcegrasp.measure import MeasuredGrasp, MeasurementSet
 from forcegrasp.physics.gripper_file import load_gripper
 

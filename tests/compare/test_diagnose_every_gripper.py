@@ -7,18 +7,22 @@ import dataclasses
 import numpy as np
 import pytest
 
-from forcegrasp.compare import compare_output, diagnose_output, fit_output, workflow
-from forcegrasp.compare.advice import advise
-from forcegrasp.compare.comparison import Comparison
-from forcegrasp.compare.geometry import guess, pad_distances
-from forcegrasp.compare.problem import Problem
-from forcegrasp.compare.target import PHASES, contacts, find_phases, make_target
+from forcegrasp.diagnosis import workflow as diagnosis_workflow
+from forcegrasp.diagnosis.advice import advise
 from forcegrasp.effects import get_effect
 from forcegrasp.errors import ConfigError
+from forcegrasp.identify import workflow
+from forcegrasp.identify.comparison import Comparison
+from forcegrasp.identify.initial_guess import guess, pad_distances
+from forcegrasp.identify.problem import Problem
+from forcegrasp.identify.target import PHASES, contacts, find_phases, make_target
 from forcegrasp.measure import MeasuredGrasp
-from forcegrasp.measure.record import parse_effect, record
 from forcegrasp.physics.gripper import Gripper
 from forcegrasp.physics.gripper_file import load_gripper
+from forcegrasp.replay.record import parse_effect, record
+from forcegrasp.reports import comparison as comparison_report
+from forcegrasp.reports import diagnosis as diagnosis_report
+from forcegrasp.reports import fit as fit_report
 from forcegrasp.reports.html import write_report
 
 LOOK_ALIKES = ["backlash", "coulomb_friction", "command_delay"]
@@ -32,7 +36,7 @@ NAMES = {
 
 def recorded(gripper: Gripper, hidden: list[str], grasps: int, monkeypatch, objects: int = 2) -> workflow.Loaded:
     """Typical noise; never written, so that its fingerprint does not matter."""
-    monkeypatch.setattr("forcegrasp.measure.record.fingerprint_of_set", lambda *_: "set")
+    monkeypatch.setattr("forcegrasp.replay.record.fingerprint_of_set", lambda *_: "set")
     made = record(
         gripper,
         "rich",
@@ -52,17 +56,17 @@ def recorded(gripper: Gripper, hidden: list[str], grasps: int, monkeypatch, obje
 def test_finds_what_was_hidden(name, monkeypatch, tmp_path):
     """A coupled hand with two force sensors; one jaw whose motor's effort is read. And all that is told of it."""
     loaded = recorded(load_gripper(name), ["backlash"], 6, monkeypatch, objects=1)
-    diagnosis, _ = workflow.diagnose_set(loaded, None, LOOK_ALIKES, 0, lambda text: None)
+    diagnosis, _ = diagnosis_workflow.diagnose_set(loaded, None, LOOK_ALIKES, 0, lambda text: None)
     assert (diagnosis.verdict, diagnosis.effects) == ("effect", ("backlash",))
     assert diagnosis.error_after <= 1.1 * diagnosis.floor
     assert diagnosis.error_after < 0.7 * diagnosis.error_before
     (found,) = workflow.model_of(diagnosis.fit, diagnosis.target, loaded, diagnosis.numerical).effects
     assert found.values == pytest.approx(parse_effect("backlash", loaded.gripper)[2], rel=0.1)
 
-    told = diagnose_output.diagnosis_json(diagnosis, None, [], "set")
+    told = diagnosis_report.diagnosis_json(diagnosis, None, [], "set")
     assert list(told["parameters"]["backlash"]) == [p.name for p in found.effect.parameters]
-    assert diagnose_output.lines(diagnosis, advise(diagnosis))[0].startswith("backlash: ")
-    write_report(tmp_path / "report.html", "", "", diagnose_output.sections(diagnosis, None, []), {})
+    assert diagnosis_report.lines(diagnosis, advise(diagnosis))[0].startswith("backlash: ")
+    write_report(tmp_path / "report.html", "", "", diagnosis_report.sections(diagnosis, None, []), {})
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -79,16 +83,16 @@ def test_signals_are_the_grippers(name, monkeypatch, tmp_path):
 
     residual = np.where(target.mask[..., None], 1.0, 0.0) * np.ones(len(target.names))
     comparison = Comparison(target, target.signals - residual * target.sigma, residual, residual, 1.0)
-    told = compare_output.compare_json(comparison, "set", "model", [])
+    told = comparison_report.compare_json(comparison, "set", "model", [])
     unit = gripper.unit
     assert list(told["signals"]) == NAMES[name]
     assert told["signals"][NAMES[name][0]][f"rms_{unit}"] == pytest.approx(target.sigma[0])
-    words = compare_output.noise_sentence(target)
+    words = comparison_report.noise_sentence(target)
     assert {"m": "positions 27 µm, forces 13 mN", "rad": "positions 0.432 mrad, forces 130 mN"}[unit] in words or (
         name == "franka_hand" and "positions 27 µm, forces 130 mN" in words
     )
-    write_report(tmp_path / "report.html", "", "", compare_output.sections(comparison, []), {})
-    assert compare_output.printed(comparison).row_count > 1
+    write_report(tmp_path / "report.html", "", "", comparison_report.sections(comparison, []), {})
+    assert comparison_report.printed(comparison).row_count > 1
 
 
 def test_contact_is_a_push_without_motion_where_the_motors_effort_is_read():
@@ -128,8 +132,8 @@ def test_a_gripper_without_forces_is_told_by_its_motion(monkeypatch, tmp_path):
     comparison = Comparison(target, target.signals, residual, residual, 1.0)
     assert {kind for _, kind, _ in comparison.explanations()} == {"position"}
     assert "force_n" not in comparison.covariates()
-    assert compare_output.noise_sentence(target).startswith("sensor noise: positions 27 µm, as")
-    write_report(tmp_path / "report.html", "", "", compare_output.sections(comparison, []), {})
+    assert comparison_report.noise_sentence(target).startswith("sensor noise: positions 27 µm, as")
+    write_report(tmp_path / "report.html", "", "", comparison_report.sections(comparison, []), {})
 
 
 @pytest.mark.parametrize("name", ["franka_hand", "robotiq_2f85", "so101_gripper"])
@@ -159,12 +163,14 @@ def test_radii_are_felt(name, monkeypatch):
 
 def test_effects_are_those_of_the_gripper():
     hand, jaw = load_gripper("franka_hand"), load_gripper("so101_gripper")
-    (delay,) = workflow.chosen_effects(hand, ["command_delay"])
+    (delay,) = diagnosis_workflow.chosen_effects(hand, ["command_delay"])
     assert delay.motors == 1
     assert get_effect("command_delay").motors == 2
-    assert len(workflow.chosen_effects(jaw, [])) < len(workflow.chosen_effects(load_gripper("tiago"), []))
+    assert len(diagnosis_workflow.chosen_effects(jaw, [])) < len(
+        diagnosis_workflow.chosen_effects(load_gripper("tiago"), [])
+    )
     with pytest.raises(ConfigError, match="force_crosstalk: needs 2 force readings; so101_gripper has 1"):
-        workflow.chosen_effects(jaw, ["force_crosstalk"])
+        diagnosis_workflow.chosen_effects(jaw, ["force_crosstalk"])
 
 
 def test_steps_of_a_turning_motor_are_a_parameter_in_radians(monkeypatch):
@@ -172,5 +178,5 @@ def test_steps_of_a_turning_motor_are_a_parameter_in_radians(monkeypatch):
     loaded = recorded(gripper, ["quantisation position_step_rad=0.004 force_step_n=0.4"], 2, monkeypatch)
     target = make_target(loaded.measured, gripper)
     assert target.rounding == pytest.approx((0.004, 0.4))
-    assert "readings come in steps: positions 4 mrad, forces 400 mN" in compare_output.noise_sentence(target)
-    assert fit_output.steps_picture(target).caption.startswith("Readings of force left")
+    assert "readings come in steps: positions 4 mrad, forces 400 mN" in comparison_report.noise_sentence(target)
+    assert fit_report.steps_picture(target).caption.startswith("Readings of force left")

@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from forcegrasp.compare.final_force import TableAnalysis, analyse_table
-from forcegrasp.compare.final_force_causes import CAUSES, MENU, causes_of
-from forcegrasp.compare.final_force_output import draw
 from forcegrasp.effects import catalogue
+from forcegrasp.final_force.analysis import TableAnalysis, analyse_table
+from forcegrasp.final_force.causes import CAUSES, MENU, causes_of
 from forcegrasp.measure.schema import FinalForceTable
 from forcegrasp.physics.gripper_file import load_gripper
 from forcegrasp.physics.plant import Plant, write_base
+from forcegrasp.reports.final_force import draw
 from forcegrasp.reports.html import write_report
 
 GRIPPER = load_gripper("tiago")

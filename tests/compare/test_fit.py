@@ -11,26 +11,26 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from forcegrasp.compare import fit as fit_module
-from forcegrasp.compare import score as score_module
-from forcegrasp.compare.base_fit import BaseFit, check_gradient, fit_base, rms_error
-from forcegrasp.compare.diagnose import Diagnosis, diagnose
-from forcegrasp.compare.diagnose_output import diagnosis_json, printed
-from forcegrasp.compare.diagnose_output import lines as lines_of
-from forcegrasp.compare.fit import Fit, Simulators, fit_exactly, fit_once
-from forcegrasp.compare.floor import beyond_fit, excess, numerical_error, numerical_floor
-from forcegrasp.compare.heldout import heldout_residual, make_folds, rms
-from forcegrasp.compare.intervals import intervals, standard_errors, warnings
-from forcegrasp.compare.predict import Applied, Case, predict
-from forcegrasp.compare.problem import Problem
-from forcegrasp.compare.refine import refine
-from forcegrasp.compare.score import Background, Signatures, best_sizes
-from forcegrasp.compare.target import Target, make_target
-from forcegrasp.compare.workflow import Loaded, model_of
+from forcegrasp.diagnosis import signatures as score_module
+from forcegrasp.diagnosis.refine import refine
+from forcegrasp.diagnosis.search import Diagnosis, diagnose
+from forcegrasp.diagnosis.signatures import Background, Signatures, best_sizes
 from forcegrasp.effects import get_effect
+from forcegrasp.identify import fit as fit_module
+from forcegrasp.identify.base_fit import BaseFit, check_gradient, fit_base, rms_error
+from forcegrasp.identify.cross_validation import heldout_residual, make_folds, rms
+from forcegrasp.identify.fit import Fit, Simulators, fit_exactly, fit_once
+from forcegrasp.identify.intervals import intervals, standard_errors, warnings
+from forcegrasp.identify.noise_floor import beyond_fit, excess, numerical_error, numerical_floor
+from forcegrasp.identify.predict import Applied, Case, predict
+from forcegrasp.identify.problem import Problem
+from forcegrasp.identify.target import Target, make_target
+from forcegrasp.identify.workflow import Loaded, model_of
 from forcegrasp.measure import MeasuredGrasp, MeasurementSet
-from forcegrasp.measure.replay import Replay
 from forcegrasp.physics.gripper_file import load_gripper
+from forcegrasp.replay.replay import Replay
+from forcegrasp.reports.diagnosis import diagnosis_json, printed
+from forcegrasp.reports.diagnosis import lines as lines_of
 
 TIAGO = load_gripper("tiago")
 SIGMA = np.array([2.7e-5, 2.7e-5, 0.013, 0.013])

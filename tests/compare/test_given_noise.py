@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from forcegrasp.compare.given_noise import check_given_noise, noise_range
 from forcegrasp.errors import MeasurementError
+from forcegrasp.identify.given_noise import check_given_noise, noise_range
 from forcegrasp.measure import MeasuredGrasp, MeasurementSet
 
 SIGMA_M, SIGMA_N = 3e-5, 0.02

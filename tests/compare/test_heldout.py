@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from forcegrasp.compare.fit import Fit
-from forcegrasp.compare.floor import cells, excess, numerical_floor
-from forcegrasp.compare.heldout import FOLDS, heldout_residual, log_likelihood, make_folds, rms
-from forcegrasp.compare.intervals import intervals, reached_bound, standard_errors, warnings
-from forcegrasp.compare.problem import Problem
-from forcegrasp.compare.target import PHASES, Target
 from forcegrasp.effects import get_effect
+from forcegrasp.identify.cross_validation import FOLDS, heldout_residual, log_likelihood, make_folds, rms
+from forcegrasp.identify.fit import Fit
+from forcegrasp.identify.intervals import intervals, reached_bound, standard_errors, warnings
+from forcegrasp.identify.noise_floor import cells, excess, numerical_floor
+from forcegrasp.identify.problem import Problem
+from forcegrasp.identify.target import PHASES, Target
 from forcegrasp.measure import MeasuredGrasp
 from forcegrasp.physics.gripper_file import load_gripper
 

@@ -6,9 +6,10 @@ import dataclasses
 
 import pytest
 
-from forcegrasp.compare import workflow
+from forcegrasp.diagnosis import workflow as diagnosis_workflow
 from forcegrasp.effects import get_effect
 from forcegrasp.errors import ConfigError, MeasurementError
+from forcegrasp.identify import workflow
 from forcegrasp.measure import check_set
 from tests.independent.rig import record
 
@@ -25,7 +26,7 @@ def recorded(folder, hidden: dict, seed: int = 1, grasps: int = GRASPS) -> workf
 
 
 def diagnosed(loaded: workflow.Loaded):
-    return workflow.diagnose_set(loaded, None, [], 0, silent)[0]
+    return diagnosis_workflow.diagnose_set(loaded, None, [], 0, silent)[0]
 
 
 @pytest.mark.parametrize("name", ["object_friction"])
@@ -91,13 +92,13 @@ def test_the_wrong_effect_does_not_lower_the_error(tmp_path):
     loaded = recorded(tmp_path, {"force_lag": "medium"}, grasps=8)
     target, _, base = workflow.fit_model(loaded, 0, silent)
     model = workflow.model_of(base.fit, target, loaded, [])
-    right = workflow.add_effect(loaded, model, get_effect("force_lag"), silent)
-    wrong = workflow.add_effect(loaded, model, get_effect("object_friction"), silent)
+    right = diagnosis_workflow.add_effect(loaded, model, get_effect("force_lag"), silent)
+    wrong = diagnosis_workflow.add_effect(loaded, model, get_effect("object_friction"), silent)
     assert right.error_after < 0.8 * right.error_before
     assert wrong.error_after > 0.97 * wrong.error_before
     assert right.model.effects[0].parameters["time_constant_s"].value == pytest.approx(0.03, abs=0.003)
     with pytest.raises(ConfigError, match="has it already"):
-        workflow.add_effect(loaded, right.model, get_effect("force_lag"), silent)
+        diagnosis_workflow.add_effect(loaded, right.model, get_effect("force_lag"), silent)
 
 
 def test_a_diagnosis_needs_grasps_to_hold_out(tmp_path):

@@ -7,12 +7,12 @@ import dataclasses
 import numpy as np
 import pytest
 
-from forcegrasp.compare import diagnose_output
-from forcegrasp.compare.floor import excess
-from forcegrasp.compare.noise import Noise, unlike_said
-from forcegrasp.compare.target import PHASES, Target
+from forcegrasp.diagnosis.noise_check import Noise, unlike_said
+from forcegrasp.identify.noise_floor import excess
+from forcegrasp.identify.target import PHASES, Target
 from forcegrasp.measure import MeasuredGrasp
 from forcegrasp.physics.gripper_file import load_gripper
+from forcegrasp.reports import diagnosis as diagnosis_report
 
 G, S = 8, 150
 TIAGO = load_gripper("tiago")
@@ -186,7 +186,7 @@ def of(made_up, verdict: str, times: list[float], core: list[float], unlike: lis
 
 def test_the_answer_tells_the_noise(made_up):
     diagnosis = of(made_up, "explained", [3.0, 3.1, 1.0, 1.7], [3.0, 3.1, 1.0, 1.1], [True, True, False, True])
-    answer = diagnose_output.answer(diagnosis)
+    answer = diagnosis_report.answer(diagnosis)
     assert answer.startswith("The model explains these data: they show no missing effect")
     assert (
         "positions scatter by 3.1 ×, force right scatter by 1.7 × (with heavy tails) the noise that was given" in answer
@@ -194,7 +194,7 @@ def test_the_answer_tells_the_noise(made_up):
     assert "white in time and alike in all phases" in answer
     assert "give position_std_m and force_std_n" in answer
     assert "none of the effects" not in answer
-    found = diagnose_output.diagnosis_json(diagnosis, None, made_up.tried, "s")
+    found = diagnosis_report.diagnosis_json(diagnosis, None, made_up.tried, "s")
     assert set(found["noise"]) == {"position_l", "position_r", "force_r"}
     assert found["noise"]["force_r"] == {"times_stated": 1.7, "core": 1.1, "heavy_tails": True}
     assert found["where"]["explainable"] == 0
@@ -202,14 +202,14 @@ def test_the_answer_tells_the_noise(made_up):
 
 def test_an_effect_and_other_noise(made_up):
     diagnosis = of(made_up, "effect", [3.0] * 4, [3.0] * 4, [True] * 4, error_before=5.0, error_after=3.0)
-    answer = diagnose_output.answer(diagnosis)
+    answer = diagnosis_report.answer(diagnosis)
     assert answer.startswith("The model lacks force_bias. ")
     assert "positions scatter by 3 ×, forces scatter by 3 ×" in answer
     assert diagnosis.explained == pytest.approx(1)
 
 
 def test_a_noise_that_is_smaller_may_hide_effects(made_up):
-    answer = diagnose_output.answer(
+    answer = diagnosis_report.answer(
         of(made_up, "explained", [1, 1, 0.3, 0.3], [1, 1, 0.3, 0.3], [False] * 2 + [True] * 2)
     )
     assert "the noise is smaller than that: forces scatter by 0.3 ×" in answer
@@ -218,5 +218,5 @@ def test_a_noise_that_is_smaller_may_hide_effects(made_up):
 
 def test_noise_as_said_is_not_mentioned(made_up):
     diagnosis = made_up.diagnosis("explained")
-    assert "white in time" not in diagnose_output.answer(diagnosis)
-    assert diagnose_output.diagnosis_json(diagnosis, None, made_up.tried, "s")["noise"] is None
+    assert "white in time" not in diagnosis_report.answer(diagnosis)
+    assert diagnosis_report.diagnosis_json(diagnosis, None, made_up.tried, "s")["noise"] is None

@@ -6,11 +6,12 @@ from pathlib import Path
 
 import numpy as np
 
-from forcegrasp.compare import workflow
-from forcegrasp.effects.model_file import read_model, write_model
+from forcegrasp.diagnosis import workflow as diagnosis_workflow
+from forcegrasp.identify import workflow
 from forcegrasp.measure import write_set
-from forcegrasp.measure.record import parse_effect, record
+from forcegrasp.models.model_file import read_model, write_model
 from forcegrasp.physics.gripper_file import load_gripper
+from forcegrasp.replay.record import parse_effect, record
 
 SECOND = Path(__file__).parent.parent / "grippers" / "second.yaml"
 
@@ -32,7 +33,7 @@ def test_finds_what_was_hidden_in_another_gripper(tmp_path):
     loaded = workflow.load(tmp_path / "set")
     assert loaded.gripper.name == load_gripper(str(SECOND)).name
     names = ["force_lag", "force_bias"]
-    diagnosis, _ = workflow.diagnose_set(loaded, None, names, 0, lambda text: None)
+    diagnosis, _ = diagnosis_workflow.diagnose_set(loaded, None, names, 0, lambda text: None)
     assert (diagnosis.verdict, diagnosis.effects) == ("effect", ("force_lag",))
     assert diagnosis.error_after < 1.1 * diagnosis.floor < 1.2 * diagnosis.error_before
 

@@ -13,12 +13,15 @@ from rich.console import Console
 
 from forcegrasp.cli.measuring import write_results
 from forcegrasp.cli.results import write_json
-from forcegrasp.compare import compare_output, diagnose_output, figures, fit_output
-from forcegrasp.compare.base_fit import BaseFit
-from forcegrasp.compare.diagnose import Step
-from forcegrasp.compare.fit import Fit
-from forcegrasp.compare.workflow import model_of
+from forcegrasp.diagnosis.search import Step
 from forcegrasp.effects import get_effect
+from forcegrasp.identify.base_fit import BaseFit
+from forcegrasp.identify.fit import Fit
+from forcegrasp.identify.workflow import model_of
+from forcegrasp.reports import comparison as comparison_report
+from forcegrasp.reports import diagnosis as diagnosis_report
+from forcegrasp.reports import figures
+from forcegrasp.reports import fit as fit_report
 from forcegrasp.reports.html import Picture, Table
 
 VERDICTS = ("effect", "one_of", "explained", "unknown", "not_fitted")
@@ -41,7 +44,7 @@ def plain(content: dict, folder: Path) -> dict:
 
 
 def test_compare_json_holds_the_planted_errors(made_up, tmp_path):
-    found = plain(compare_output.compare_json(made_up.comparison, "my_set", "m.yaml", []), tmp_path)
+    found = plain(comparison_report.compare_json(made_up.comparison, "my_set", "m.yaml", []), tmp_path)
     assert {"set", "model", "signals", "phases", "floor_ratio", "heldout"} <= set(found)
     assert (found["set"], found["model"]) == ("my_set", "m.yaml")
     hold = found["phases"]["hold"]["force_l"]
@@ -60,73 +63,73 @@ def test_compare_json_holds_the_planted_errors(made_up, tmp_path):
 
 
 def test_compare_answers_where(made_up):
-    answer = compare_output.answer(made_up.comparison)
+    answer = comparison_report.answer(made_up.comparison)
     assert "on held-out grasps" in answer
     assert "hold, force left" in answer
-    table = shown(compare_output.printed(made_up.comparison))
+    table = shown(comparison_report.printed(made_up.comparison))
     assert max(map(len, table.splitlines())) <= 80
     cell = next(c for c in made_up.comparison.cells() if (c.signal, c.phase) == ("force_l", "hold"))
     assert re.search(rf"^ +hold .* {cell.rms * 1e3:.1f} mN {cell.ratio:.1f}× ", table, re.MULTILINE)
-    assert "g3 on thing 1" in compare_output.details(made_up.comparison)[0].partition(",")[0]
+    assert "g3 on thing 1" in comparison_report.details(made_up.comparison)[0].partition(",")[0]
 
 
 def test_compare_of_a_model_that_has_not_seen_the_set(made_up):
     unseen = dataclasses.replace(made_up.comparison, heldout=made_up.comparison.residual)
-    assert "to which the model was not fitted" in compare_output.answer(unseen)
+    assert "to which the model was not fitted" in comparison_report.answer(unseen)
 
 
 def test_compare_without_failure_says_so(made_up):
     calm = np.random.default_rng(3).standard_normal(made_up.comparison.residual.shape)
     comparison = dataclasses.replace(made_up.comparison, residual=calm, heldout=calm.copy())
-    assert "no failure" in compare_output.answer(comparison)
-    assert not any("goes with" in line for line in compare_output.details(comparison))
+    assert "no failure" in comparison_report.answer(comparison)
+    assert not any("goes with" in line for line in comparison_report.details(comparison))
 
 
 def test_an_estimated_noise_is_called_a_lower_bound(made_up):
-    assert "as given" in compare_output.noise_sentence(made_up.target)
+    assert "as given" in comparison_report.noise_sentence(made_up.target)
     estimated = dataclasses.replace(made_up.target, sigma_known=False)
-    assert "lower bound" in compare_output.noise_sentence(estimated)
+    assert "lower bound" in comparison_report.noise_sentence(estimated)
 
 
 @pytest.mark.parametrize(
     ("value", "unit", "text"), [(2.7e-5, "m", "27 µm"), (0.0123, "m", "12300 µm"), (0.0131, "N", "13.1 mN")]
 )
 def test_amounts_have_units(value, unit, text):
-    assert compare_output.amount(value, unit) == text
+    assert comparison_report.amount(value, unit) == text
 
 
 # --- fit and add ---------------------------------------------------------------------------------------------------
 
 
 def test_fit_json_and_answer(made_up, tmp_path):
-    found = plain(fit_output.fit_json(made_up.base, made_up.target, made_up.model, "s", Path("m.yaml")), tmp_path)
+    found = plain(fit_report.fit_json(made_up.base, made_up.target, made_up.model, "s", Path("m.yaml")), tmp_path)
     assert found["converged"] is True
     assert found["starts"] == [2.0, 2.001, 2.3]
     assert set(found["parameters"]["position_gain"]) == {"value", "low", "high", "unit"}
     assert "rho_m of thing 0" in found["parameters"]
-    assert "is fitted" in fit_output.fit_answer(made_up.base, made_up.target)
-    table = shown(fit_output.printed_parameters(made_up.model))
+    assert "is fitted" in fit_report.fit_answer(made_up.base, made_up.target)
+    table = shown(fit_report.printed_parameters(made_up.model))
     assert all(name in table for name in ("position_gain", "rho_m of thing 1", "N/m"))
 
 
 def test_a_fit_that_did_not_converge_says_why_and_what_to_do(made_up):
-    answer = fit_output.fit_answer(BaseFit(made_up.base.fit, (1.0,), False, "the starts differ"), made_up.target)
+    answer = fit_report.fit_answer(BaseFit(made_up.base.fit, (1.0,), False, "the starts differ"), made_up.target)
     assert "NOT fitted: the starts differ" in answer
     assert "record more grasps" in answer
 
 
 def test_add_tells_the_fall(made_up, tmp_path):
     effect = get_effect("force_bias")
-    found = plain(fit_output.add_json(made_up.added, effect, "s", Path("b.yaml")), tmp_path)
+    found = plain(fit_report.add_json(made_up.added, effect, "s", Path("b.yaml")), tmp_path)
     assert found["error_before"] > 1.5 > 1.0 == found["error_after"]
     assert found["signals"]["force_l"]["before"] > 3 * found["signals"]["force_l"]["after"]
     assert "force_bias.left_n" in found["parameters"]
-    assert "to 1.00 × noise" in fit_output.add_answer(made_up.added, effect)
-    assert re.search(r"force left +\d\.\d\d +1\.\d\d", shown(fit_output.printed_fall(made_up.added, effect)))
+    assert "to 1.00 × noise" in fit_report.add_answer(made_up.added, effect)
+    assert re.search(r"force left +\d\.\d\d +1\.\d\d", shown(fit_report.printed_fall(made_up.added, effect)))
 
 
 def test_the_symptom_is_shown_where_it_is_strongest(made_up):
-    picture = fit_output.symptom_picture(
+    picture = fit_report.symptom_picture(
         made_up.target, made_up.added.before, made_up.added.after, get_effect("force_bias")
     )
     assert "force left of grasp g3 on thing 1" in picture.caption
@@ -151,13 +154,13 @@ def test_a_parameter_at_its_bound_is_marked_in_every_table(made_up):
     added = dataclasses.replace(made_up.added, after=fit, model=model)
     base = BaseFit(fit, (1.0,), True)
     for shown_texts in (
-        [shown(fit_output.printed_parameters(model))],
-        texts(fit_output.fit_sections(base, made_up.target, model)),
-        texts(fit_output.add_sections(added, get_effect("force_bias"))),
+        [shown(fit_report.printed_parameters(model))],
+        texts(fit_report.fit_sections(base, made_up.target, model)),
+        texts(fit_report.add_sections(added, get_effect("force_bias"))),
     ):
         assert any("300 (at its bound)" in text for text in shown_texts)
         assert any("1 (at its bound)" in text for text in shown_texts)  # force_bias
-    plainly = shown(fit_output.printed_parameters(made_up.model))
+    plainly = shown(fit_report.printed_parameters(made_up.model))
     assert "at its bound" not in plainly
 
 
@@ -169,17 +172,17 @@ def test_a_diagnosis_marks_parameters_at_their_bounds(made_up, tmp_path):
         one, fit=candidates[0].fit, steps=(dataclasses.replace(step, candidates=candidates),)
     )
     bias, drift = (effect.parameters[0].high for effect in (get_effect("force_bias"), get_effect("force_drift")))
-    table = shown(diagnose_output.printed(diagnosis), 200)
-    cells = texts(diagnose_output.sections(diagnosis, None, made_up.tried))
+    table = shown(diagnosis_report.printed(diagnosis), 200)
+    cells = texts(diagnosis_report.sections(diagnosis, None, made_up.tried))
     for high in (bias, drift):
         assert f"{high:g} (at its bound) N" in table
         assert any(f"{high:g} (at its bound) N" in cell for cell in cells)
     assert f"{bias:g} (at its bound)" in cells  # the table of the effect's parameters
-    lines = diagnose_output.lines(diagnosis, None)
+    lines = diagnosis_report.lines(diagnosis, None)
     assert any(line.startswith(f"  left_n {bias:g} (at its bound) N (95 %: ") for line in lines)
     warning = f"force_bias.left_n ended at its bound {bias:g} N: widen it or doubt the model"
     assert f"warning: {warning}" in lines
-    assert warning in plain(diagnose_output.diagnosis_json(diagnosis, None, made_up.tried, "s"), tmp_path)["warnings"]
+    assert warning in plain(diagnosis_report.diagnosis_json(diagnosis, None, made_up.tried, "s"), tmp_path)["warnings"]
 
 
 def test_values_of_a_step_give_way_to_final_ones(made_up):
@@ -191,13 +194,13 @@ def test_values_of_a_step_give_way_to_final_ones(made_up):
     drift = dict(one.steps[0].candidates[1].parameters())
     (left, right) = final.values[-2:]
     assert left != pytest.approx(bias.parameters()["left_n"])
-    found = diagnose_output.diagnosis_json(diagnosis, None, made_up.tried, "s")
+    found = diagnosis_report.diagnosis_json(diagnosis, None, made_up.tried, "s")
     for rows in (found["ranking"], found["steps"][0]["ranking"]):
         assert rows[0]["parameters"] == {"left_n": left, "right_n": right}
         assert rows[1]["parameters"] == drift
-    table = shown(diagnose_output.printed(diagnosis), 200)
+    table = shown(diagnosis_report.printed(diagnosis), 200)
     assert f"left_n {left:.3g} N" in table
-    cells = texts(diagnose_output.sections(diagnosis, None, made_up.tried))
+    cells = texts(diagnosis_report.sections(diagnosis, None, made_up.tried))
     assert any(f"left_n {left:.3g} N" in cell for cell in cells)
     step_value = f"left_n {bias.parameters()['left_n']:.3g} N,"
     assert not any(step_value in text for text in (table, *cells))
@@ -210,7 +213,7 @@ def test_values_of_a_step_give_way_to_final_ones(made_up):
 def test_diagnosis_json(made_up, verdict, tmp_path):
     diagnosis = made_up.diagnosis(verdict)
     advice = made_up.advice if verdict == "one_of" else None
-    found = plain(diagnose_output.diagnosis_json(diagnosis, advice, made_up.tried, "s"), tmp_path)
+    found = plain(diagnosis_report.diagnosis_json(diagnosis, advice, made_up.tried, "s"), tmp_path)
     assert found["verdict"] == verdict
     assert found["effects"] == {"effect": ["force_bias"], "one_of": ["force_bias", "force_drift"]}.get(verdict, [])
     assert [step["verdict"] for step in found["steps"]] == (
@@ -252,13 +255,13 @@ def test_diagnosis_json(made_up, verdict, tmp_path):
 )
 def test_the_verdict_in_words(made_up, verdict, told):
     diagnosis = made_up.diagnosis(verdict)
-    assert told in diagnose_output.answer(diagnosis)
-    lines = "\n".join(diagnose_output.lines(diagnosis, made_up.advice))
+    assert told in diagnosis_report.answer(diagnosis)
+    lines = "\n".join(diagnosis_report.lines(diagnosis, made_up.advice))
     assert (get_effect("force_bias").symptom in lines) == (verdict in ("effect", "one_of"))
     assert ("could also be: force_drift" in lines) == (verdict == "one_of")
     assert "record next: slow ramp" in lines
     assert ("largest in force left, hold" in lines) == (verdict == "unknown")
-    table = diagnose_output.printed(diagnosis)
+    table = diagnosis_report.printed(diagnosis)
     assert (table is None) == (verdict == "not_fitted")
     assert table is None or "force_drift" in shown(table)
 
@@ -271,22 +274,22 @@ def test_rounding_is_found_without_any_fit(made_up, tmp_path):
     diagnosis = dataclasses.replace(
         plainly, target=target, steps=(step, *plainly.steps), effects=("quantisation", "force_bias")
     )
-    found = plain(diagnose_output.diagnosis_json(diagnosis, None, made_up.tried, "s"), tmp_path)
+    found = plain(diagnosis_report.diagnosis_json(diagnosis, None, made_up.tried, "s"), tmp_path)
     assert [row["effect"] for row in found["ranking"]][:2] == ["quantisation", "force_bias"]
     assert found["ranking"][0]["parameters"] == {"position_step_m": 0, "force_step_n": 0.04}
     assert found["parameters"]["quantisation"]["force_step_n"]["value"] == 0.04
-    assert "quantisation and force_bias" in diagnose_output.answer(diagnosis)
-    lines = diagnose_output.lines(diagnosis, None)
+    assert "quantisation and force_bias" in diagnosis_report.answer(diagnosis)
+    lines = diagnosis_report.lines(diagnosis, None)
     assert any(line.startswith("quantisation: few distinct values") for line in lines)
     assert "steps: forces 40 mN" in lines[-1]
-    assert "quantisation" in shown(diagnose_output.printed(diagnosis))
-    first, second = diagnose_output.sections(diagnosis, None, made_up.tried)[:2]
+    assert "quantisation" in shown(diagnosis_report.printed(diagnosis))
+    first, second = diagnosis_report.sections(diagnosis, None, made_up.tried)[:2]
     assert (first.title, second.title) == ("1. quantisation", "2. force_bias")
     assert "multiples of 40 mN" in next(b for b in first.blocks if isinstance(b, Picture)).caption
 
 
 def test_the_report_of_a_diagnosis_shows_what_the_answer_rests_on(made_up):
-    sections = diagnose_output.sections(made_up.diagnosis("one_of"), made_up.advice, made_up.tried)
+    sections = diagnosis_report.sections(made_up.diagnosis("one_of"), made_up.advice, made_up.tried)
     first, advice = sections[:2]
     assert first.title == "1. force_bias or force_drift"
     assert "helps most" in next(b for b in first.blocks if isinstance(b, Picture)).caption
@@ -299,11 +302,11 @@ def test_the_report_of_a_diagnosis_shows_what_the_answer_rests_on(made_up):
 
 def all_reports(made_up):
     effect = get_effect("force_bias")
-    yield compare_output.sections(made_up.comparison, [f"note {made_up.loaded.measured.name}"])
-    yield fit_output.fit_sections(made_up.base, made_up.target, made_up.model)
-    yield fit_output.add_sections(made_up.added, effect)
+    yield comparison_report.sections(made_up.comparison, [f"note {made_up.loaded.measured.name}"])
+    yield fit_report.fit_sections(made_up.base, made_up.target, made_up.model)
+    yield fit_report.add_sections(made_up.added, effect)
     for verdict in VERDICTS:
-        yield diagnose_output.sections(made_up.diagnosis(verdict), made_up.advice, made_up.tried)
+        yield diagnosis_report.sections(made_up.diagnosis(verdict), made_up.advice, made_up.tried)
 
 
 def test_reports_are_harmless_and_load_nothing(made_up, tmp_path, capsys):

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from forcegrasp.compare.problem import Problem
 from forcegrasp.effects import catalogue, get_effect
+from forcegrasp.identify.problem import Problem
 from forcegrasp.measure import MeasuredGrasp
 from forcegrasp.physics.gripper_file import load_gripper
 

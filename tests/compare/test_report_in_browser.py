@@ -14,7 +14,8 @@ from typing import Any
 import pytest
 
 from forcegrasp.cli.measuring import write_results
-from forcegrasp.compare import compare_output, diagnose_output
+from forcegrasp.reports import comparison as comparison_report
+from forcegrasp.reports import diagnosis as diagnosis_report
 
 DRIVER, BROWSER = shutil.which("chromedriver"), shutil.which("chromium") or shutil.which("google-chrome")
 pytestmark = pytest.mark.skipif(
@@ -77,12 +78,12 @@ def browser(tmp_path_factory) -> Iterator[Browser]:
 @pytest.fixture(params=["compare", "diagnose, one of two", "diagnose, unknown"])
 def report(request, made_up, tmp_path) -> Path:
     if request.param == "compare":
-        lead = compare_output.answer(made_up.comparison)
-        sections = compare_output.sections(made_up.comparison, [])
+        lead = comparison_report.answer(made_up.comparison)
+        sections = comparison_report.sections(made_up.comparison, [])
     else:
         diagnosis = made_up.diagnosis("unknown" if "unknown" in request.param else "one_of")
-        lead = diagnose_output.answer(diagnosis)
-        sections = diagnose_output.sections(diagnosis, made_up.advice, made_up.tried)
+        lead = diagnosis_report.answer(diagnosis)
+        sections = diagnosis_report.sections(diagnosis, made_up.advice, made_up.tried)
     name = made_up.loaded.measured.name
     write_results(tmp_path, "x", {}, f"Report of {name}", f"{lead} {name}", sections, made_up.loaded)
     return tmp_path / "report.html"

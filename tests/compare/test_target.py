@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from forcegrasp.compare.quantised import find_step
-from forcegrasp.compare.target import PHASES, contacts, estimate_noise, find_phases, make_target
 from forcegrasp.errors import MeasurementError
+from forcegrasp.identify.rounding import find_step
+from forcegrasp.identify.target import PHASES, contacts, estimate_noise, find_phases, make_target
 from forcegrasp.measure import MeasuredGrasp, MeasurementSet
 from forcegrasp.physics.gripper_file import load_gripper
 

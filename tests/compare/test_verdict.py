@@ -9,10 +9,11 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from forcegrasp.compare import diagnose, diagnose_output
-from forcegrasp.compare.diagnose import Diagnosis, Step
-from forcegrasp.compare.verdict import conclude, explained_share
+from forcegrasp.diagnosis import search as diagnose
+from forcegrasp.diagnosis.search import Diagnosis, Step
+from forcegrasp.diagnosis.verdict import conclude, explained_share
 from forcegrasp.effects import get_effect
+from forcegrasp.reports import diagnosis as diagnosis_report
 
 
 def candidate(made_up, **changed: Any):
@@ -108,19 +109,19 @@ def two_steps(made_up, rivals: tuple[str, ...] = ("coulomb_friction", "stiction"
 
 def test_the_headline_is_no_stronger_than_its_steps(made_up):
     diagnosis = two_steps(made_up)
-    first = diagnose_output.answer(diagnosis).partition(". ")[0]
+    first = diagnosis_report.answer(diagnosis).partition(". ")[0]
     assert first == (
         "The model lacks coulomb_friction (or stiction: these data can't tell which, and coulomb_friction is preferred,"
         " for it has fewer parameters) and force_bias"
     )
-    found = diagnose_output.diagnosis_json(diagnosis, None, made_up.tried, "s")
+    found = diagnosis_report.diagnosis_json(diagnosis, None, made_up.tried, "s")
     assert (found["verdict"], found["effects"]) == ("one_of", ["coulomb_friction", "force_bias", "stiction"])
     assert found["preferred"] == ["coulomb_friction", "force_bias"]
     assert [step["preferred_because"] for step in found["steps"]] == ["it has fewer parameters", ""]
 
 
 def test_of_equally_many_parameters_the_gain_decides(made_up):
-    answer = diagnose_output.answer(made_up.diagnosis("one_of"))
+    answer = diagnosis_report.answer(made_up.diagnosis("one_of"))
     assert "force_bias or force_drift: these data can't tell which, and force_bias is preferred" in answer
     assert "for its held-out gain is larger" in answer
 
@@ -136,14 +137,14 @@ def test_of_equally_many_parameters_the_gain_decides(made_up):
 )
 def test_much_that_is_left_is_said_first(made_up, before, after, left, said):
     diagnosis = two_steps(made_up, error_before=before, error_after=after, left=left)
-    first = diagnose_output.answer(diagnosis).partition(". ")[0]
+    first = diagnosis_report.answer(diagnosis).partition(". ")[0]
     assert said in first
     assert ("not all" in first) == bool(said)
 
 
 def test_little_explained_is_unknown_and_says_what_it_would_take_off(made_up):
     diagnosis = two_steps(made_up, verdict="unknown", error_before=348.0, error_after=173.0, left="in all")
-    first = diagnose_output.answer(diagnosis).partition(". ")[0]
+    first = diagnosis_report.answer(diagnosis).partition(". ")[0]
     assert "none of the effects I know" in first
     assert "348.00 × the sensor noise, and coulomb_friction and force_bias would only take it down to 173.00 ×" in first
 

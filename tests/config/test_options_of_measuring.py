@@ -105,7 +105,7 @@ class BegunError(Exception):
 
 def begun(monkeypatch, verb: str, **values: Any) -> dict[str, Any]:
     """What a verb sets out to compute: the arguments of the first expensive step, and where it would write."""
-    from forcegrasp.compare import workflow
+    from forcegrasp.identify import workflow
 
     def told(value: Any) -> Any:
         match value:

@@ -9,7 +9,7 @@ import yaml
 
 from forcegrasp.cli.options import SCHEMAS, compose, compose_sweep, groups, leaves
 from forcegrasp.config import EvaluateConfig, TrainConfig, is_left_out
-from forcegrasp.runs.started_with import DEFAULT_EXPERIMENT
+from forcegrasp.runs.provenance import DEFAULT_EXPERIMENT
 
 CONF = Path(__file__).parents[2] / "conf"
 FILES = sorted(CONF.glob("*/**/*.yaml"))

@@ -15,8 +15,8 @@ from forcegrasp.cli.options import SCHEMAS, compose
 from forcegrasp.cli.train import single_runs
 from forcegrasp.controllers import CONTROLLERS
 from forcegrasp.effects import get_effect
-from forcegrasp.measure.record import parse_effect
 from forcegrasp.policies import shipped_policies
+from forcegrasp.replay.record import parse_effect
 
 #: Programs of other packages.
 FOREIGN = {"pip", "git", "cd", "tensorboard", ".", "pre-commit", "ray"}

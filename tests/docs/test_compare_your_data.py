@@ -18,8 +18,8 @@ from doc_pages import PAGES, blocks, unpack
 from forcegrasp.cli.main import main
 from forcegrasp.errors import MeasurementError
 from forcegrasp.measure import check_set, read_set, write_set
-from forcegrasp.measure.record import record
 from forcegrasp.physics.gripper_file import load_gripper
+from forcegrasp.replay.record import record
 
 #: In the command that has the first → the second: a small set, few rivals, hardly any training.
 SMALLER = {

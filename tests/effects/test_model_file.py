@@ -11,8 +11,8 @@ import pytest
 
 from forcegrasp.effects import catalogue, get_effect
 from forcegrasp.effects.for_gripper import effect_of
-from forcegrasp.effects.model_file import Fitted, FoundEffect, Model, read_model, write_model
 from forcegrasp.errors import ConfigError
+from forcegrasp.models.model_file import Fitted, FoundEffect, Model, read_model, write_model
 from forcegrasp.physics.gripper_file import load_gripper
 
 SECOND = Path(__file__).parents[1] / "grippers" / "second.yaml"

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from forcegrasp.effects import catalogue, get_effect
-from forcegrasp.effects.model_file import Fitted, FoundEffect, Model, write_model
-from forcegrasp.effects.variation import ModelVariation, read_model_of
 from forcegrasp.errors import ConfigError
+from forcegrasp.models.model_file import Fitted, FoundEffect, Model, write_model
+from forcegrasp.models.variation import ModelVariation, read_model_of
 from forcegrasp.physics import GraspParameters, GraspSimulator
 from forcegrasp.physics.gripper_file import default_gripper, load_gripper
 from forcegrasp.physics.plant import Plant

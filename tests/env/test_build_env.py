@@ -21,11 +21,11 @@ from forcegrasp.config import (
     SensorConfig,
 )
 from forcegrasp.effects import get_effect
-from forcegrasp.effects.model_file import Fitted, FoundEffect, Model
-from forcegrasp.effects.variation import read_model_of
 from forcegrasp.env import build_env, seed_env
 from forcegrasp.env.reward import normalised_force_reward
 from forcegrasp.errors import ConfigError
+from forcegrasp.models.model_file import Fitted, FoundEffect, Model
+from forcegrasp.models.variation import read_model_of
 from forcegrasp.physics import FixedGrasps, default_gripper
 from forcegrasp.physics.completion import complete
 from forcegrasp.physics.gripper_file import load_gripper

@@ -7,8 +7,8 @@ import dataclasses
 import pytest
 
 from forcegrasp.config import SensorConfig
-from forcegrasp.effects.model_file import Model, read_model
 from forcegrasp.env import build_env
+from forcegrasp.models.model_file import Model, read_model
 from forcegrasp.transforms import ObservationNoise
 
 NOISE = (1.5e-4, 0.07)

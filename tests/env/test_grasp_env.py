@@ -11,10 +11,10 @@ from torchrl.envs.utils import check_env_specs
 
 from forcegrasp.config import GraspConfig, PhysicsConfig, RewardConfig
 from forcegrasp.effects import get_effect
-from forcegrasp.effects.model_file import Fitted, FoundEffect, Model
 from forcegrasp.env import GraspEnv
 from forcegrasp.env.grasp_env import OBSERVATIONS
 from forcegrasp.errors import ConfigError
+from forcegrasp.models.model_file import Fitted, FoundEffect, Model
 from forcegrasp.physics import FixedGrasps, GraspSimulator
 from forcegrasp.physics.gripper_file import load_gripper
 

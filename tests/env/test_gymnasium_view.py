@@ -16,9 +16,9 @@ from torchrl.envs.utils import step_mdp
 
 import forcegrasp
 from forcegrasp.config import GraspConfig, ObservationConfig, PhysicsConfig
-from forcegrasp.effects.model_file import read_model
 from forcegrasp.env import build_env
 from forcegrasp.errors import ConfigError
+from forcegrasp.models.model_file import read_model
 from forcegrasp.physics.scene_renderer import NoRendererError, SceneRenderer
 
 ID = "forcegrasp/Grasp-v0"

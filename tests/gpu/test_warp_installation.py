@@ -6,10 +6,10 @@ import pytest
 import torch
 
 from forcegrasp.config import GraspConfig, PhysicsConfig
-from forcegrasp.effects.variation import read_model_of
 from forcegrasp.env import GraspEnv
 from forcegrasp.errors import ConfigError
 from forcegrasp.gpu import check_engine, installation
+from forcegrasp.models.variation import read_model_of
 from forcegrasp.physics import default_gripper
 
 

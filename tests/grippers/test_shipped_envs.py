@@ -12,8 +12,8 @@ from forcegrasp.config import GraspConfig, ObservationConfig, PhysicsConfig
 from forcegrasp.controllers import ForcePI, make_controller
 from forcegrasp.controllers.policy import observation_size
 from forcegrasp.effects.for_gripper import effect_of
-from forcegrasp.effects.model_file import Fitted, FoundEffect, Model
 from forcegrasp.env import build_env
+from forcegrasp.models.model_file import Fitted, FoundEffect, Model
 from forcegrasp.physics import Gripper
 from forcegrasp.physics.sensors import with_noise
 from forcegrasp.transforms import ObservationNoise

@@ -10,10 +10,10 @@ import pytest
 
 from forcegrasp.errors import MeasurementError
 from forcegrasp.measure import MeasuredGrasp, MeasurementSet, check_set, read_set, write_set
-from forcegrasp.measure.record import record
 from forcegrasp.measure.schema import TWO_FINGERS, columns_of, fingerprint_of_set
 from forcegrasp.physics.gripper import Gripper
 from forcegrasp.physics.gripper_file import load_gripper, shipped_grippers
+from forcegrasp.replay.record import record
 
 NAMES = shipped_grippers()
 SETS: dict[str, MeasurementSet] = {}

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from forcegrasp.measure.plans import MENU, OFF_CENTRE, PERIOD_S, PLANS, SAMPLES, make_command, make_plan
 from forcegrasp.physics import default_gripper
+from forcegrasp.replay.plans import MENU, OFF_CENTRE, PERIOD_S, PLANS, SAMPLES, make_command, make_plan
 
 OPEN_M, CONTACT_M, SQUEEZE_M = 0.045, 0.025, 0.003
 TIME = np.arange(SAMPLES) * PERIOD_S

@@ -12,12 +12,12 @@ import pytest
 from forcegrasp.effects import Effect, catalogue, get_effect
 from forcegrasp.errors import ConfigError
 from forcegrasp.measure import check_set, read_set, write_set
-from forcegrasp.measure.plans import PERIOD_S, PLANS, SAMPLES
-from forcegrasp.measure.record import Recorded, parse_effect, record
-from forcegrasp.measure.replay import EffectOn, Replay
 from forcegrasp.physics.gripper import Gripper
 from forcegrasp.physics.gripper_file import load_gripper
 from forcegrasp.physics.sensors import rounding_steps, with_noise
+from forcegrasp.replay.plans import PERIOD_S, PLANS, SAMPLES
+from forcegrasp.replay.record import Recorded, parse_effect, record
+from forcegrasp.replay.replay import EffectOn, Replay
 
 TIAGO = load_gripper("tiago")
 SECOND = load_gripper(str(Path(__file__).parents[1] / "grippers" / "second.yaml"))

@@ -12,8 +12,8 @@ import pytest
 import torch
 from safetensors.torch import save_file
 
-from forcegrasp import whole_file
 from forcegrasp.errors import CheckpointError
+from forcegrasp.files import whole_file
 from forcegrasp.runs import checkpoint
 
 FACTS = {"frames": 3, "name": "κ → 1", "nested": {"big": 2**100, "list": [1, None, 0.1]}}

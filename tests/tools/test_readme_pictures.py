@@ -10,12 +10,12 @@ import pytest
 from matplotlib.colors import to_rgb
 from PIL import Image, ImageSequence
 
-from forcegrasp.compare.comparison import Comparison
-from forcegrasp.compare.figures import WITH, WITHOUT
-from forcegrasp.compare.target import make_target
+from forcegrasp.identify.comparison import Comparison
+from forcegrasp.identify.target import make_target
 from forcegrasp.measure import MeasuredGrasp, MeasurementSet
 from forcegrasp.physics.gripper_file import load_gripper
 from forcegrasp.physics.scene_renderer import no_renderer
+from forcegrasp.reports.figures import WITH, WITHOUT
 from tools import readme_pictures
 
 SIGMA = np.array([2.7e-5, 2.7e-5, 0.013, 0.013])

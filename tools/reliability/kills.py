@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from forcegrasp import whole_file
 from forcegrasp.config import TrainConfig
+from forcegrasp.files import whole_file
 from forcegrasp.runs.run_dir import RunDir
 from forcegrasp.train.loop import train
 from tools.reliability.child import fork

@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 
 from forcegrasp.cli.main import main
-from forcegrasp.compare.given_noise import check_given_noise
-from forcegrasp.effects.model_file import read_model
 from forcegrasp.errors import ForcegraspError
+from forcegrasp.identify.given_noise import check_given_noise
 from forcegrasp.measure import MeasurementSet, check_set, read_set
+from forcegrasp.models.model_file import read_model
 from forcegrasp.physics import default_gripper
 from tools.reliability import spoil
 from tools.reliability.child import each, fork, peak_memory_mb

@@ -10,9 +10,9 @@ from pathlib import Path
 import yaml
 
 from forcegrasp.config import GraspConfig
-from forcegrasp.effects.model_file import read_model
 from forcegrasp.evaluate.grids import read_objects
 from forcegrasp.measure import read_set
+from forcegrasp.models.model_file import read_model
 from forcegrasp.physics.gripper import shipped_folder
 from forcegrasp.physics.gripper_file import load_gripper
 from forcegrasp.runs.history import find_histories

@@ -1,0 +1,1 @@
+"""Finds out which physical effects a model lacks."""

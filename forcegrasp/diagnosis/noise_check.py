@@ -1,0 +1,159 @@
+"""Whether what a model leaves is noise of another size or shape than was said: white, and alike everywhere."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import ndtr, ndtri
+
+from forcegrasp.identify.cross_validation import rms
+from forcegrasp.identify.noise_floor import excess, numerical_floor
+from forcegrasp.identify.target import Target
+
+# Lags over which a missing effect would show, in samples.
+_LAGS = 5
+# Of the mean square beyond the noise that was said, so much may follow from the sample before and still be called
+# noise: no effect that explains less is looked for. And so much may phases, speeds and forces differ by.
+_IN_TIME, _BETWEEN_GROUPS = 0.25, 0.35
+# A group is as was said if its readings are this many times likelier then (logarithm) than drawn from all groups.
+_LIKELIER, _LEAST_SAMPLES = np.log(3.0), 40
+# Residuals are counted between these quantiles of their sizes, and beyond so many σ; the rarest class is of this share.
+_QUANTILES, _WILD, _LEAST_SHARE = (0.25, 0.5, 0.75, 0.9, 0.97), 4.0, 1e-3
+# Readings that scatter less than this share of the noise that was said.
+_LESS = 0.8
+# rms ÷ core above which tails are heavy: 1 if the noise is normal, 1.5 with three degrees of freedom.
+_HEAVY = 1.2
+# Half of a normal distribution lies within so many σ.
+_MEDIAN = float(ndtri(0.75))
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Noise that is not what was said. One figure per signal where not told otherwise."""
+
+    times: np.ndarray  #: rms of the residuals ÷ the noise that was said, ``(C,)``
+    core: np.ndarray  #: the same of the middle half of them, which tails don't reach, ``(C,)``
+    unlike: np.ndarray  #: which signals it concerns, ``(C,)``
+
+    @property
+    def heavy_tails(self) -> np.ndarray:
+        """Which of these signals have more wild readings than a normal distribution, ``(C,)``."""
+        return self.unlike & (self.times > _HEAVY * self.core)
+
+    @property
+    def stronger(self) -> bool:
+        """Whether some signal is noisier than was said, or has wilder readings."""
+        return bool(np.any(self.unlike & (self.times > 1)) or self.heavy_tails.any())
+
+
+def unlike_said(
+    residual: np.ndarray, numerical: Sequence[np.ndarray], target: Target, predicted: np.ndarray
+) -> Noise | None:
+    """The noise, if it is not what was said, and all that residuals show; None if it is, or if they show more than it.
+
+    A signal's residuals are judged by their normal scores: each is replaced by the quantile that its size has among
+    all of them, with its sign. So neither the noise's size nor its tails count.
+
+    Args:
+      residual: of held-out grasps, in units of the noise, ``(G, S, C)``.
+      numerical: as for :func:`~forcegrasp.identify.noise_floor.numerical_floor`.
+      target: the measurements.
+      predicted: signals, ``(G, S, C)``; by them, for they have no noise, slow and fast samples are told apart.
+    """
+    count = residual.shape[-1]
+    one = np.eye(count, dtype=bool)
+    times = np.array([rms(residual, target, signal) for signal in one])
+    core = np.array([_core(residual[..., k][_there(residual[..., k], target)]) for k in range(count)])
+    if not excess(residual, numerical, target):
+        less = times < _LESS
+        return Noise(times, core, less) if less.any() else None
+    clean, unlike = residual.copy(), np.zeros(count, bool)
+    for k, signal in enumerate(one):
+        values, floor = residual[..., k], numerical_floor(numerical, target, signal)
+        scores, beyond = _normal_scores(values, _there(values, target)), 1 - (min(floor, core[k]) / times[k]) ** 2
+        groups = _partitions(target, predicted[..., target.side_of(k)])
+        if _is_white(scores, beyond, groups) and not _some_group_as_said(values / floor, groups):
+            clean[..., k], unlike[k] = scores, True
+    return None if excess(clean, numerical, target) else Noise(times, core, unlike)
+
+
+def _there(values: np.ndarray, target: Target) -> np.ndarray:
+    return target.mask & np.isfinite(values)
+
+
+def _core(values: np.ndarray) -> float:
+    return float(np.median(np.abs(values)) / _MEDIAN) if len(values) else float("nan")
+
+
+def _normal_scores(values: np.ndarray, there: np.ndarray) -> np.ndarray:
+    """Values with their signs and order, but normally distributed, ``(G, S)``; NaN where there are none."""
+    inside = values[there]
+    ranks = np.argsort(np.argsort(np.abs(inside)))
+    scores = np.full(values.shape, np.nan)
+    scores[there] = np.sign(inside) * ndtri(0.5 + 0.5 * (ranks + 0.5) / len(inside))
+    return scores
+
+
+def _partitions(target: Target, predicted: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Phases, slow and fast, lightly and strongly pressed: where most errors of a model would differ, each ``(G, S)``.
+
+    Args:
+      target: the measurements.
+      predicted: position and force, if there is one, of one side, ``(G, S, 2)``.
+    """
+    position = predicted[..., 0]
+    motion = np.abs(np.diff(position, axis=1, prepend=position[:, :1]))
+    sizes = (motion, *np.moveaxis(predicted[..., 1:], -1, 0))
+    halves = (np.where(x > np.median(x[target.mask]), 1, 0) for x in sizes)
+    return target.phase, *(np.where(target.mask, half, -1) for half in halves)
+
+
+def _grouped(values: np.ndarray, partition: np.ndarray) -> list[np.ndarray]:
+    """The numbers among values ``(G, S)`` of each group of a partition, where it has any."""
+    groups = [values[(partition == k) & np.isfinite(values)] for k in range(partition.max() + 1)]
+    return [group for group in groups if len(group)]
+
+
+def _is_white(scores: np.ndarray, beyond: float, partitions: Sequence[np.ndarray]) -> bool:
+    """Whether a signal's normal scores are white in time and alike in all groups, as far as its excess is concerned.
+
+    In doubt they are not: what may be there, and too few samples can't tell, counts as if it were.
+
+    Args:
+      scores: ``(G, S)``; NaN where there are none.
+      beyond: share of the mean square that is beyond the noise that was said.
+      partitions: from :func:`_partitions`.
+    """
+    count = int(np.isfinite(scores).sum())
+    lags = [np.nansum(scores[:, k:] * scores[:, :-k]) / count for k in range(1, _LAGS + 1)]
+    if _at_most(float(np.mean(np.square(lags))), 1 / count, _LAGS) > _IN_TIME * beyond:
+        return False
+    for partition in partitions:
+        groups = _grouped(scores, partition)
+        differing = sum(len(values) * (np.mean(values**2) - 1) ** 2 for values in groups) / count
+        if _at_most(float(differing), 2 * len(groups) / count, len(groups)) > _BETWEEN_GROUPS * beyond:
+            return False
+    return True
+
+
+def _some_group_as_said(values: np.ndarray, partitions: Sequence[np.ndarray]) -> bool:
+    """Whether in some group a signal's residuals ÷ floor, ``(G, S)``, are just as was said, while others are not."""
+    sizes = np.abs(values)
+    everything = sizes[(partitions[0] >= 0) & np.isfinite(sizes)]
+    edges = np.unique([*np.quantile(everything, _QUANTILES), _WILD])
+    said = np.diff(np.r_[0.0, 2 * ndtr(edges) - 1, 1.0])
+
+    def counted(values: np.ndarray) -> np.ndarray:
+        return np.bincount(np.searchsorted(edges, values), minlength=len(said))
+
+    of_all = counted(everything) / len(everything)
+    evidence = np.log(np.maximum(of_all, _LEAST_SHARE) / np.maximum(said, _LEAST_SHARE))
+    counts = [counted(group) for partition in partitions for group in _grouped(sizes, partition)]
+    return any(count @ evidence < -_LIKELIER for count in counts if count.sum() >= _LEAST_SAMPLES)
+
+
+def _at_most(square: float, of_noise: float, terms: int) -> float:
+    """How large the root of a mean of so many squares may be in truth, if noise alone makes it ``of_noise``."""
+    return float(np.sqrt(max(0.0, square - of_noise) + 2 * of_noise * np.sqrt(2 / terms)))

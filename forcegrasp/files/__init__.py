@@ -1,0 +1,1 @@
+"""Reading and writing files: bounded, strict and whole or not at all."""

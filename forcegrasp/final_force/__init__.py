@@ -1,0 +1,1 @@
+"""Tables of final forces: which law they follow, and what may cause it."""

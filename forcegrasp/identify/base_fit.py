@@ -1,0 +1,135 @@
+"""Fits the base model from several starts, and says whether to believe it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from forcegrasp.identify.fit import Fit, Simulators, fit_exactly, fit_once
+from forcegrasp.identify.initial_guess import guess
+from forcegrasp.identify.problem import Problem
+from forcegrasp.identify.target import Target
+from forcegrasp.short_repr import ShortRepr
+
+#: Number of starts; and of those at most, where fewer than two of them end in the best place found.
+STARTS, MOST_STARTS = 3, 6
+# The further starts see this many grasps of each object: enough to tell whether there is another optimum.
+_GRASPS_PER_OBJECT = 2
+# Starts end in the same place if their costs agree to this share, or to this much per residual.
+_SAME_SHARE, _SAME_COST = 0.01, 0.002
+# Where an effect is missing the ground is rough: starts agree if their costs beyond the noise do to this share.
+_SAME_BEYOND = 0.2
+# Largest slope at an optimum, in standard errors of the parameter; those of a noisy simulator never vanish.
+_FLAT = 5.0
+
+
+@dataclass(frozen=True, repr=False)
+class BaseFit(ShortRepr):
+    """The best of several fits, with the gate that a diagnosis must pass."""
+
+    fit: Fit
+    errors: tuple[float, ...]  #: rms residual ÷ noise where each start ended
+    converged: bool
+    reason: str = ""  #: why it is not, in words
+
+
+def fit_base(
+    target: Target,
+    problem: Problem,
+    simulators: Simulators,
+    rng: np.random.Generator,
+    progress: Callable[[str], None] = lambda text: None,
+) -> BaseFit:
+    """Fits from the nominal parameters, and then looks from random places inside the bounds for a better optimum."""
+    first = fit_once(target, problem, simulators, guess(target, problem))
+    progress(f"base model, start 1 of {STARTS}: {rms_error(first, target):.2f} × noise")
+    few = _few_grasps(target)
+    small = _Subset(target, problem, few, first)
+    ends = [small.fit(small.known)]
+    while len(ends) < STARTS or (len(ends) < MOST_STARTS and not _agree(ends, small.target)):
+        ends.append(small.fit(_elsewhere(small.problem, guess(small.target, small.problem), rng)))
+        most = STARTS if len(ends) <= STARTS else MOST_STARTS
+        progress(f"base model, start {len(ends)} of {most}: {rms_error(ends[-1], small.target):.2f} × noise")
+    best = min(ends, key=lambda f: f.cost)
+    errors = tuple(rms_error(f, small.target) for f in ends)
+    if ends[0].cost - best.cost > _same(best, small.target):  # another start found a better place
+        first = fit_once(target, problem, simulators, small.enlarge(best))
+    if not _agree(ends, small.target):
+        spread = ", ".join(f"{error:.2f}" for error in errors)
+        return BaseFit(first, errors, False, f"the starts end in different places (errors of {spread} × noise)")
+    checked = check_gradient(first, target, errors)
+    if checked.converged:
+        return checked
+    # the cheap model's slopes may lead no further where the model itself still falls
+    further = check_gradient(fit_exactly(target, problem, simulators, first.vector), target, errors)
+    if further.converged or simulators.cheap is simulators.exact:
+        return further
+    return check_gradient(fit_exactly(target, problem, Simulators(problem, exact=True), first.vector), target, errors)
+
+
+def _same(best: Fit, target: Target) -> float:
+    """Difference of two costs that mean the same place."""
+    return max(_SAME_SHARE * best.cost, _SAME_COST * target.readings)
+
+
+def _agree(ends: Sequence[Fit], target: Target) -> bool:
+    """Whether two fits at least ended in the best place."""
+    best = min(ends, key=lambda f: f.cost)
+    tolerance = max(_same(best, target), _SAME_BEYOND * (best.cost - target.readings))
+    return sum(f.cost - best.cost <= tolerance for f in ends) >= 2
+
+
+def check_gradient(fit: Fit, target: Target, errors: tuple[float, ...] = ()) -> BaseFit:
+    """The part of the gate that one fit can pass or not: its error must be level where it ended."""
+    if fit.gradient > _FLAT * max(1.0, rms_error(fit, target)):
+        reason = f"the error still falls where the fit ended (slope of {fit.gradient:.1f} standard errors)"
+        return BaseFit(fit, errors, False, reason)
+    return BaseFit(fit, errors, True)
+
+
+def rms_error(fit: Fit, target: Target) -> float:
+    """Root mean square of a fit's residuals ÷ noise."""
+    return float(np.sqrt(fit.cost / target.readings))
+
+
+def _elsewhere(problem: Problem, felt: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """A random place inside the bounds; but objects stay where the fingers felt them, or there is nothing to fit."""
+    anywhere = problem.low + rng.uniform(0.2, 0.8, len(felt)) * (problem.high - problem.low)
+    geometry = np.array([e.effect < 0 and e.parameter in ("radius_m", "offset_m") for e in problem.entries])
+    return np.where(geometry, felt, anywhere)
+
+
+def _few_grasps(target: Target) -> np.ndarray:
+    """The first grasps of each object."""
+    seen: dict[str, int] = {}
+    chosen = []
+    for index, grasp in enumerate(target.grasps):
+        seen[grasp.object] = seen.get(grasp.object, 0) + 1
+        if seen[grasp.object] <= _GRASPS_PER_OBJECT:
+            chosen.append(index)
+    return np.array(chosen)
+
+
+class _Subset:
+    """The same problem on some of its grasps, with the cheap model corrected as in a fit of all of them."""
+
+    def __init__(self, target: Target, problem: Problem, keep: np.ndarray, fitted: Fit) -> None:
+        self.target = target.subset(keep)
+        self.problem = Problem(problem.gripper, self.target.grasps, problem.effects)
+        self._simulators = Simulators(self.problem)
+        self._correction = fitted.correction[keep][:, : self._simulators.exact.mask.shape[1]]
+        self._full, self._fitted = problem, fitted
+        names = [e.name for e in problem.entries]
+        self._places = [names.index(e.name) for e in self.problem.entries]
+        self.known = fitted.vector[self._places]
+
+    def fit(self, start: np.ndarray) -> Fit:
+        return fit_once(self.target, self.problem, self._simulators, start, self._correction, rounds=0)
+
+    def enlarge(self, fit: Fit) -> np.ndarray:
+        """Coordinates for the whole problem: what these grasps don't fix stays as it was."""
+        vector = self._fitted.vector.copy()
+        vector[self._places] = fit.vector
+        return vector

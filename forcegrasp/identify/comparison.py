@@ -1,0 +1,132 @@
+"""Where a model fails: its error per signal and phase, against the floor that sensor noise sets."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from forcegrasp.identify.cross_validation import rms
+from forcegrasp.identify.target import PHASES, Target, contacts
+from forcegrasp.short_repr import ShortRepr
+
+#: What a residual is held against, in reports and where nothing explains it.
+COVARIATES = ("time_since_contact_s", "velocity_m_s", "direction", "force_n", "command_m", "position_m", "time_s")
+_BINS = 12
+
+
+@dataclass(frozen=True)
+class Cell:
+    """The error of one signal in one phase."""
+
+    signal: str
+    phase: str
+    samples: int
+    rms: float  #: in the signal's unit
+    ratio: float  #: rms ÷ sensor noise
+    bias: float  #: mean of measured − predicted, in the signal's unit
+    unit: str
+
+
+@dataclass(frozen=True, repr=False)
+class Comparison(ShortRepr):
+    """A model against a measurement set."""
+
+    target: Target
+    predicted: np.ndarray  #: ``(G, S, C)``
+    residual: np.ndarray  #: (measured − predicted) ÷ noise, ``(G, S, C)``
+    heldout: np.ndarray  #: the same for grasps held out of the fit; NaN where there are none
+    floor: float  #: error ÷ noise that a perfect model would leave
+
+    def summary(self) -> str:
+        return f"error {self.floor_ratio():.2f} × noise, a perfect model {self.floor:.2f}"
+
+    def cells(self) -> list[Cell]:
+        """One cell for each signal and phase that occurs."""
+        found = []
+        for k, (signal, unit) in enumerate(zip(self.target.names, self.target.units, strict=True)):
+            for index, phase in enumerate(PHASES):
+                inside = self.residual[..., k][self.target.phase == index]
+                if len(inside):
+                    ratio, sigma = float(np.sqrt(np.mean(inside**2))), self.target.sigma[k]
+                    bias = float(inside.mean() * sigma)
+                    found.append(Cell(signal, phase, len(inside), ratio * sigma, ratio, bias, unit))
+        return found
+
+    def by_grasp(self) -> np.ndarray:
+        """rms residual ÷ noise of each grasp, ``(G,)``."""
+        squares = np.sum(self.residual**2, axis=(1, 2))
+        return np.sqrt(squares / (self.residual.shape[-1] * self.target.mask.sum(axis=1)))
+
+    def by_grasp_and_phase(self) -> np.ndarray:
+        """rms residual ÷ noise, ``(G, phases)``; NaN where a grasp has no such phase."""
+        grid = np.full((len(self.target.grasps), len(PHASES)), np.nan)
+        for index in range(len(PHASES)):
+            inside = self.target.phase == index
+            counts = inside.sum(axis=1)
+            squares = np.sum(self.residual**2 * inside[:, :, None], axis=(1, 2))
+            grid[counts > 0, index] = np.sqrt(squares[counts > 0] / (self.residual.shape[-1] * counts[counts > 0]))
+        return grid
+
+    def floor_ratio(self) -> float:
+        """Held-out rms residual ÷ sensor noise; of the grasps themselves where none were held out."""
+        value = rms(self.heldout, self.target)
+        return value if np.isfinite(value) else rms(self.residual, self.target)
+
+    def covariates(self) -> dict[str, np.ndarray]:
+        """What the residual may depend on, see :data:`COVARIATES`; NaN where a sample has none.
+
+        Each is ``(G, S, motors)`` or, of what goes with a force, ``(G, S, channels)``; none is empty.
+        Positions and forces are the predicted ones: the noise of the measured ones is in the residual, too.
+        """
+        target = self.target
+        inside = target.mask[..., None]
+        position = np.where(inside, self.predicted[..., target.positions], np.nan)
+        force = np.where(inside, self.predicted[..., target.forces], np.nan)
+        motors = {
+            name: np.full(position.shape, np.nan) for name in ("velocity_m_s", "direction", "command_m", "time_s")
+        }
+        since = np.full((*target.mask.shape, force.shape[-1] or position.shape[-1]), np.nan)
+        for index, grasp in enumerate(target.grasps):
+            n, time = len(grasp.time_s), grasp.time_s - grasp.time_s[0]
+            velocity = np.gradient(grasp.position_m, time, axis=0) if n > 1 else np.zeros(grasp.position_m.shape)
+            slow = 4 * target.sigma[0] / max(np.median(np.diff(time)), 1e-9) if n > 1 else 0.0
+            touched = np.maximum.accumulate(contacts(grasp, target.sigma, target.gripper))
+            first = time[np.argmax(touched, axis=0)]
+            since[index, :n] = np.where(touched, time[:, None] - first, np.nan)
+            motors["velocity_m_s"][index, :n] = velocity
+            motors["direction"][index, :n] = np.where(np.abs(velocity) < slow, 0.0, np.sign(velocity))
+            motors["command_m"][index, :n] = grasp.command_m
+            motors["time_s"][index, :n] = time[:, None]
+        found = motors | {"time_since_contact_s": since, "position_m": position, "force_n": force}
+        return {name: found[name] for name in COVARIATES if found[name].size}
+
+    def explanations(self) -> list[tuple[str, str, float]]:
+        """Covariate, signal kind and the share of the residual's variance that its bins explain, largest first."""
+        shares = []
+        for name, values in self.covariates().items():
+            for kind, part in self.target.kinds.items():
+                residual = self.residual[..., part]
+                share = _binned_share(of_width(values, residual.shape[-1]), residual, self.target.mask)
+                shares.append((name, kind, share))
+        return sorted(shares, key=lambda s: -s[2])
+
+
+def of_width(values: np.ndarray, width: int) -> np.ndarray:
+    """A covariate, ``(G, S, motors or channels)``, for so many signals: where they don't pair off, the mean for all."""
+    if values.shape[-1] == width:
+        return values
+    return np.repeat(values.mean(axis=-1, keepdims=True), width, axis=-1)
+
+
+def _binned_share(values: np.ndarray, residual: np.ndarray, mask: np.ndarray) -> float:
+    """Share of the residual's mean square that the means of equally filled bins explain."""
+    chosen = mask[..., None] & np.isfinite(values)
+    x, y = values[chosen], residual[chosen]
+    total = np.sum(residual[np.broadcast_to(mask[..., None], residual.shape)] ** 2)
+    if len(x) < 5 * _BINS or total == 0:
+        return 0.0
+    edges = np.unique(np.quantile(x, np.linspace(0, 1, _BINS + 1)))
+    bins = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, max(0, len(edges) - 2))
+    sums, counts = np.bincount(bins, weights=y), np.bincount(bins)
+    return float(np.sum(sums[counts > 0] ** 2 / counts[counts > 0]) / total)

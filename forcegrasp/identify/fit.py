@@ -1,0 +1,235 @@
+"""Fits parameters to measured grasps by bounded least squares, residuals divided by the sensor noise."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from forcegrasp.identify.predict import predict
+from forcegrasp.identify.problem import Problem
+from forcegrasp.identify.target import Target
+from forcegrasp.replay.replay import Replay
+from forcegrasp.short_repr import ShortRepr, counted
+
+# Slopes are measured anew after so many steps; in between they follow the values (Broyden 1965), if they are few.
+_SLOPES_LAST, _FEW = 3, 16
+# Step of the finite differences in a problem's coordinates: far above the chaos of the contacts, within the bend.
+_STEP = 0.02
+# Relative change of the cost at which a fit ends, one that only ranks, and the most evaluations until then.
+_TOLERANCE, _ROUGH, _EVALUATIONS = 1e-4, 1e-3, 15
+
+
+class Simulators:
+    """The replays that a fit needs: the model itself, and a cheap one where the gripper has a fast tier.
+
+    Slopes come from the cheap one, and values too, corrected by the difference of the two at a nearby point; so few
+    evaluations of the model itself are needed, and what is fitted in the end is the model itself.
+
+    Args:
+      problem: whose grasps are simulated.
+      exact: never use the cheap one.
+    """
+
+    def __init__(self, problem: Problem, exact: bool = False) -> None:
+        gripper, grasps = problem.gripper, problem.grasps
+        self.exact = Replay(gripper, grasps)
+        self.cheap = self.exact if exact or gripper.fast == "none" else Replay(gripper, grasps, tier="fitting")
+
+
+@dataclass(frozen=True, repr=False)
+class Fit(ShortRepr):
+    """Fitted parameters with all that an evidence needs. N residuals (G · S · C), p entries."""
+
+    problem: Problem
+    vector: np.ndarray  #: the problem's coordinates, ``(p,)``
+    predicted: np.ndarray  #: signals, ``(G, S, C)``
+    residual: np.ndarray  #: (measured − predicted) ÷ noise, ``(G, S, C)``
+    jacobian: np.ndarray  #: d predicted ÷ noise over coordinates, ``(G, S, C, p)``
+    correction: np.ndarray  #: exact minus cheap prediction, ``(G, S, C)``
+    gradient: float  #: largest |slope| of the cost along one coordinate, in its own standard error; 0 at an optimum
+    evaluations: int
+
+    def summary(self) -> str:
+        return f"{counted(len(self.vector), 'parameter')}, sum of squared residuals {self.cost:.4g}"
+
+    @property
+    def cost(self) -> float:
+        """Sum of squared residuals, in units of the noise."""
+        return float(np.sum(self.residual**2))
+
+    @property
+    def values(self) -> np.ndarray:
+        """Parameters in their own units, ``(p,)``."""
+        return self.problem.values(self.vector)
+
+    def covariance(self) -> np.ndarray:
+        """Covariance of the coordinates, ``(p, p)``, if the noise is white; see :mod:`.intervals`."""
+        flat = self.jacobian.reshape(-1, len(self.problem))
+        return np.linalg.pinv(flat.T @ flat, rcond=1e-12)
+
+
+def fit_once(
+    target: Target,
+    problem: Problem,
+    simulators: Simulators,
+    start: np.ndarray,
+    correction: np.ndarray | float | None = None,
+    rounds: int = 2,
+    free: np.ndarray | None = None,
+    known_slopes: np.ndarray | None = None,
+) -> Fit:
+    """Fits from one start.
+
+    Args:
+      target: the measurements.
+      problem: what may be changed.
+      simulators: of the problem's grasps.
+      start: coordinates to start from, ``(p,)``.
+      correction: exact minus cheap prediction near the start; found there if not given.
+      rounds: how often the correction is renewed; with 0 it stays as given, and the fit is a rough one.
+      free: which coordinates may change, ``(p,)``; all by default.
+      known_slopes: of the first k coordinates from an earlier fit nearby, ``(G, S, C, k)``; they are kept, which spares
+        most of the simulations.
+    """
+    local = _Local(target, problem, simulators.cheap, simulators.cheap, known_slopes)
+    vector = np.clip(start, problem.low + 1e-9, problem.high - 1e-9)
+    free = np.ones(len(problem), bool) if free is None else free
+    one_model = simulators.exact is simulators.cheap
+    if correction is None:
+        correction = 0.0 if one_model else _difference(problem, simulators, vector)
+    total = 0
+    for _ in range(max(1, rounds) if free.any() else 0):
+        vector, count = _descend(local, vector, correction, free, _TOLERANCE if rounds else _ROUGH)
+        total += count
+        if one_model or rounds == 0:
+            break
+        renewed = _difference(problem, simulators, vector)
+        change = np.sqrt(np.mean(((renewed - correction) / target.sigma)[target.mask] ** 2))
+        correction = renewed
+        if change < 0.02:
+            break
+    return _finish(local, vector, local.value(vector) + correction, correction, free, total)
+
+
+def fit_exactly(target: Target, problem: Problem, simulators: Simulators, start: np.ndarray) -> Fit:
+    """Fits the model itself, near an optimum, with slopes from the cheap one.
+
+    For effects with memory, such as play: where the two models part ways, no correction brings them together.
+    """
+    local = _Local(target, problem, simulators.exact, simulators.cheap, None)
+    free = np.ones(len(problem), bool)
+    start = np.clip(start, problem.low + 1e-9, problem.high - 1e-9)
+    vector, total = _descend(local, start, 0.0, free, _TOLERANCE)
+    exact = local.value(vector)
+    cheap = exact if simulators.exact is simulators.cheap else predict(simulators.cheap, [problem.case(vector)])[0]
+    return _finish(local, vector, exact, exact - cheap, free, total)
+
+
+def _descend(
+    local: _Local, start: np.ndarray, shift: np.ndarray | float, free: np.ndarray, tolerance: float
+) -> tuple[np.ndarray, int]:
+    """Goes to the next optimum in the free coordinates; also returns the number of evaluations."""
+
+    def whole(part: np.ndarray) -> np.ndarray:
+        vector = start.copy()
+        vector[free] = part
+        return vector
+
+    problem = local.problem
+    solution = least_squares(
+        lambda part: -local.target.residual(local.value(whole(part)) + shift).ravel(),
+        start[free],
+        # scipy is not annotated: its type is guessed from its default, a string
+        jac=lambda part: local.slopes(whole(part)).reshape(-1, len(problem))[:, free],  # pyright: ignore[reportArgumentType]
+        bounds=(problem.low[free], problem.high[free]),
+        x_scale="jac",
+        ftol=tolerance,
+        xtol=1e-6,
+        gtol=1e-10,
+        max_nfev=_EVALUATIONS,
+    )
+    return whole(solution.x), solution.nfev
+
+
+def _finish(local: _Local, vector: np.ndarray, predicted: np.ndarray, correction, free: np.ndarray, total: int) -> Fit:
+    problem = local.problem
+    jacobian = local.slopes(vector, anew=True)
+    residual = local.target.residual(predicted)
+    flat = jacobian.reshape(-1, len(problem))
+    slope = flat.T @ residual.ravel() / np.maximum(np.linalg.norm(flat, axis=0), 1e-12)
+    blocked = ~free | ((vector <= problem.low + 1e-6) & (slope < 0)) | ((vector >= problem.high - 1e-6) & (slope > 0))
+    steepest = float(np.abs(slope[~blocked]).max(initial=0))
+    correction = np.broadcast_to(correction, predicted.shape)
+    return Fit(problem, vector, predicted, residual, jacobian, correction, steepest, total)
+
+
+def _difference(problem: Problem, simulators: Simulators, vector: np.ndarray) -> np.ndarray:
+    case = [problem.case(vector)]
+    return predict(simulators.exact, case)[0] - predict(simulators.cheap, case)[0]
+
+
+class _Local:
+    """Values and slopes of a prediction, with as few simulations as will do.
+
+    Args:
+      target: the measurements.
+      problem: what may be changed.
+      values: simulates the values.
+      slopes: simulates the slopes.
+      known: slopes of the first coordinates, which are not to be found again, ``(G, S, C, k)``.
+    """
+
+    def __init__(
+        self, target: Target, problem: Problem, values: Replay, slopes: Replay, known: np.ndarray | None
+    ) -> None:
+        self.target, self.problem = target, problem
+        self._values, self._slopes, self._known = values, slopes, known
+        self._value: tuple[np.ndarray, np.ndarray] | None = None  # the last point, and the signals there
+        self._slope: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None  # point, signals, slopes
+        self._age = 0
+
+    def value(self, x: np.ndarray) -> np.ndarray:
+        """Predicted signals, ``(G, S, C)``."""
+        if self._value is None or not np.array_equal(self._value[0], x):
+            self._value = (x.copy(), predict(self._values, [self.problem.case(x)])[0])
+        return self._value[1]
+
+    def slopes(self, x: np.ndarray, anew: bool = False) -> np.ndarray:
+        """Slopes of the signals ÷ noise over the coordinates, ``(G, S, C, p)``."""
+        value = self.value(x)
+        if self._slope is not None and np.array_equal(self._slope[0], x) and not (anew and self._age):
+            return self._slope[2]
+        if self._slope is None or anew or self._age >= _SLOPES_LAST or len(x) > _FEW:
+            self._age, slopes = 0, self._measured(x, value)
+        else:
+            self._age += 1
+            before, signals, slopes = self._slope
+            step = x - before
+            surprise = np.where(self.target.mask[..., None], (value - signals) / self.target.sigma, 0) - slopes @ step
+            slopes = slopes + surprise[..., None] * (step / (step @ step))
+        self._slope = (x.copy(), value, slopes)
+        return slopes
+
+    def _measured(self, x: np.ndarray, value: np.ndarray) -> np.ndarray:
+        """One-sided differences, all in one simulation."""
+        problem, target = self.problem, self.target
+        count = 0 if self._known is None else self._known.shape[-1]
+        groups = [group for group in problem.columns() if min(group) >= count]
+        step = np.where(x + _STEP > problem.high, -_STEP, _STEP)
+        step = np.where(np.abs(problem.high - problem.low) < 2 * _STEP, (problem.high - problem.low) / 4, step)
+        moved = [x + step * np.isin(np.arange(len(x)), group) for group in groups]
+        same = self._values is self._slopes
+        signals = predict(self._slopes, [problem.case(v) for v in (moved if same else [x, *moved])])
+        signals, base = (signals, value) if same else (signals[1:], signals[0])
+        slopes = np.zeros((*value.shape, len(problem)))
+        for change, group in zip(signals - base, groups, strict=True):
+            for index in group:
+                members = problem.entries[index].members
+                slopes[members, :, :, index] = change[members] / step[index]
+        slopes /= target.sigma[:, None]
+        slopes[~target.mask] = 0
+        if count:
+            slopes[..., :count] = self._known
+        return slopes

@@ -1,0 +1,112 @@
+"""Intervals of fitted parameters, and warnings that they deserve."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.sparse.csgraph import connected_components
+
+from forcegrasp.identify.fit import Fit
+
+#: Half width of a 95 % interval in standard errors.
+Z95 = 1.96
+# Share of the range between its bounds up to which a parameter is at one.
+_AT_BOUND = 1e-3
+# Correlation of two parameters above which data don't tell them apart.
+_CONFOUNDED = 0.98
+
+
+def standard_errors(fit: Fit, numerical: Sequence[np.ndarray] = ()) -> np.ndarray:
+    """Standard errors of the fitted coordinates, ``(p,)``.
+
+    The larger of two figures: white noise of the known size, and the scatter from grasp to grasp, which also sees
+    residuals that are correlated in time. The model's own numerical error adds what it would shift the parameters by.
+
+    Args:
+      fit: the fit.
+      numerical: from :func:`~forcegrasp.identify.noise_floor.numerical_error`, each ``(G, S, C)``.
+    """
+    inverse = fit.covariance()
+    slopes = np.einsum("gskp,gsk->gp", fit.jacobian, fit.residual, optimize=True)
+    count, p = slopes.shape
+    freedom = count / max(1, count - min(p, count - 1))
+    by_grasp = inverse @ (slopes.T @ slopes * min(freedom, 4.0)) @ inverse
+    flat = fit.jacobian.reshape(-1, p)
+    shifts = [inverse @ (flat.T @ n.ravel()) for n in numerical]
+    variance = np.maximum(np.diag(inverse), np.diag(by_grasp)) + sum((s**2 for s in shifts), np.zeros(p))
+    return np.sqrt(np.maximum(variance, 0.0))
+
+
+def intervals(fit: Fit, errors: np.ndarray) -> list[tuple[float, float, float]]:
+    """Value and 95 % interval of each parameter in its own unit, cut at its bounds."""
+    found = []
+    for entry, x, error in zip(fit.problem.entries, fit.vector, errors, strict=True):
+        found.append((entry.value(x), entry.value(x - Z95 * error), entry.value(x + Z95 * error)))
+    return found
+
+
+def reached_bound(value: float, low: float, high: float, logarithmic: bool, null: float = float("nan")) -> float | None:
+    """The bound at which a fitted value ended; None if at neither, or where an effect is simply not there.
+
+    Args:
+      value: the parameter, in its own unit.
+      low: its lower bound.
+      high: its upper bound.
+      logarithmic: whether it is fitted by its logarithm.
+      null: where an effect's parameter does nothing.
+    """
+    x, least, most = np.log((max(value, low), low, high)) if logarithmic else (value, low, high)
+    margin = _AT_BOUND * (most - least)
+    for bound, near in ((low, x - least < margin), (high, most - x < margin)):
+        if near and bound != null:
+            return bound
+    return None
+
+
+def warnings(fit: Fit, errors: np.ndarray) -> list[str]:
+    """A line for each parameter at a bound, one for all that the data hardly fix, one for all that are confounded."""
+    entries, width = fit.problem.entries, fit.problem.high - fit.problem.low
+    lines = []
+    for entry, value in zip(entries, fit.values, strict=True):
+        bound = reached_bound(float(value), entry.low, entry.high, entry.logarithmic, entry.null)
+        if bound is not None:
+            lines.append(f"{entry.name} ended at its bound {bound:g} {entry.unit}: widen it or doubt the model")
+    loose = [entry.name for entry, wide in zip(entries, Z95 * errors > 0.5 * width, strict=True) if wide]
+    if loose:
+        lines.append(f"{listed(loose)} {'is' if len(loose) == 1 else 'are'} hardly fixed by these data")
+    together = _confounded(fit)
+    if together:
+        lines.append(f"{'; '.join(together)}: only together are they fixed")
+    return lines
+
+
+def _confounded(fit: Fit) -> list[str]:
+    """Groups of parameters of which each can be replaced by others of its group, in words; alike ones are one group."""
+    covariance = fit.covariance()
+    sigma = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+    correlation = covariance / np.outer(sigma, sigma)
+    linked = np.abs(correlation) > _CONFOUNDED
+    count, group = connected_components(linked, directed=False)
+    found: dict[tuple[str, ...], list[tuple[list[str], float]]] = {}
+    for members in (np.flatnonzero(group == k) for k in range(count)):
+        if len(members) > 1:
+            inside = np.triu(np.where(linked, correlation, 0.0)[np.ix_(members, members)], k=1).ravel()
+            entries = [fit.problem.entries[i] for i in members]
+            strongest = float(inside[np.argmax(np.abs(inside))])
+            found.setdefault(tuple(e.parameter for e in entries), []).append(([e.name for e in entries], strongest))
+    told = []
+    for parameters, alike in found.items():
+        names, strongest = alike[0][0], max((c for _, c in alike), key=abs)
+        if len(alike) == 1:
+            told.append(f"{listed(names)} are confounded (correlation {strongest:.3f})")
+        else:
+            several = f"in {len(alike)} objects or grasps (correlation up to {strongest:.3f})"
+            told.append(f"{listed(parameters)} are confounded {several}")
+    return told
+
+
+def listed(names: Sequence[str], word: str = "and") -> str:
+    """a, b and c."""
+    *first, last = names
+    return f"{', '.join(first)} {word} {last}" if first else last

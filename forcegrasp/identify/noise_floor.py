@@ -1,0 +1,89 @@
+"""The error that even a perfect model leaves, and whether there is more."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from forcegrasp.identify.cross_validation import rms
+from forcegrasp.identify.fit import Fit
+from forcegrasp.identify.predict import predict
+from forcegrasp.identify.target import PHASES, Target
+from forcegrasp.replay.replay import Replay
+
+# Room for what the estimate of the floor misses: in all, and in a single signal and phase.
+_ROOM, _ROOM_IN_CELL = 1.03, 1.15
+# A residual beyond this many σ, and three times the numerical error there, is no noise; a few may be mishaps.
+_OUTLIER, _MISHAPS = 5.0, 3
+# Cells with fewer samples say nothing.
+_LEAST_SAMPLES = 40
+
+
+def numerical_error(fit: Fit, target: Target) -> tuple[np.ndarray, ...]:
+    """How far the prediction moves with half the physics step, and with the other collision code, ÷ noise.
+
+    Each ``(G, S, C)``. The fit must be one of the model itself, no rough one.
+    """
+    gripper, grasps, case = fit.problem.gripper, fit.problem.grasps, [fit.problem.case(fit.vector)]
+    others = (Replay(gripper, grasps, step_factor=0.5), Replay(gripper, grasps, other_collisions=True))
+    return tuple(
+        np.where(target.mask[..., None], (predict(o, case)[0] - fit.predicted) / target.sigma, 0.0) for o in others
+    )
+
+
+def beyond_fit(fit: Fit, numerical: Sequence[np.ndarray]) -> tuple[np.ndarray, ...]:
+    """What of the numerical errors no fitted parameter makes up for, each ``(G, S, C)``."""
+    slopes = fit.jacobian.reshape(-1, len(fit.problem))
+    left = []
+    for one in numerical:
+        shift = np.linalg.lstsq(slopes, one.ravel(), rcond=None)[0]
+        left.append(one - (slopes @ shift).reshape(one.shape))
+    return tuple(left)
+
+
+def numerical_floor(numerical: Sequence[np.ndarray], target: Target, where: np.ndarray | None = None) -> float:
+    """rms residual ÷ noise that sensor noise and the model's own numerical error leave.
+
+    Args:
+      numerical: from :func:`beyond_fit`, each ``(G, S, C)``.
+      target: the measurements.
+      where: choice of samples and signals, ``(G, S, C)``.
+    """
+    half, other = (rms(n, target, where) for n in numerical)
+    # Halving the step shows about half of what the step costs in all.
+    return float(np.sqrt(1 + 4 * half**2 + other**2))
+
+
+def excess(residual: np.ndarray, numerical: Sequence[np.ndarray], target: Target) -> str:
+    """Where residuals show more than sensor noise and numerical error; empty if nowhere.
+
+    Args:
+      residual: in units of the noise, ``(G, S, C)``.
+      numerical: as for :func:`numerical_floor`.
+      target: the measurements.
+    """
+    error, floor = rms(residual, target), numerical_floor(numerical, target)
+    if error > floor * _ROOM:
+        return f"{error:.2f} × noise in all, {floor:.2f} is the floor"
+    for name, where in cells(target):
+        error, floor = rms(residual, target, where), numerical_floor(numerical, target, where)
+        if error > floor * _ROOM_IN_CELL:
+            return f"{name}: {error:.2f} × noise, {floor:.2f} is the floor"
+    far = np.abs(residual) > _OUTLIER + 3 * (2 * np.abs(numerical[0]) + np.abs(numerical[1]))
+    if far.sum() > max(_MISHAPS, 2e-4 * target.readings):
+        return f"{far.sum()} readings are more than {_OUTLIER:g} σ off"
+    return ""
+
+
+def cells(target: Target) -> list[tuple[str, np.ndarray]]:
+    """Positions and forces in each phase that has samples enough: name and mask ``(G, S, C)``."""
+    found = []
+    for index, phase in enumerate(PHASES):
+        inside = target.phase == index
+        if inside.sum() >= _LEAST_SAMPLES:
+            for kind, part in target.kinds.items():
+                where = np.zeros(target.signals.shape, bool)
+                where[..., part] = inside[:, :, None]
+                found.append((f"{kind}s, {phase.replace('_', ' ')}", where))
+    return found

@@ -1,0 +1,81 @@
+"""What a model says the measured grasps should have looked like."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from forcegrasp.effects import Effect
+from forcegrasp.replay.replay import EffectOn, Motion, Replay, join
+from forcegrasp.short_repr import ShortRepr
+
+
+@dataclass(frozen=True, repr=False)
+class Applied(ShortRepr):
+    """An effect with one set of parameters, on all grasps. ``values``: ``(parameters,)``."""
+
+    effect: type[Effect]
+    variant: str
+    values: np.ndarray
+
+
+@dataclass(frozen=True, repr=False)
+class Case(ShortRepr):
+    """A whole model of a set: base parameters of each grasp, and effects."""
+
+    base: dict[str, np.ndarray]  #: name → ``(G,)``
+    effects: tuple[Applied, ...] = field(default=())
+
+    def simulation_key(self) -> bytes:
+        """Equal for cases that differ in nothing but sensors: they share one simulation."""
+        parts = [value.tobytes() for name, value in sorted(self.base.items()) if name != "force_scale"]
+        for one in self.effects:
+            if not one.effect.reads_only(one.variant):
+                parts.append(f"{one.effect.name}/{one.variant}/".encode() + one.values.tobytes())
+        return b"|".join(parts)
+
+
+def predict(replay: Replay, cases: Sequence[Case]) -> np.ndarray:
+    """Predicted signals of all cases, ``(cases, G, S, C)``; everything that must be simulated is simulated at once.
+
+    The replay remembers how the first case of each call moved: the next call often asks for that one again.
+    """
+    keys, count = [case.simulation_key() for case in cases], len(replay.grasps)
+    first = dict(zip(reversed(keys), reversed(cases), strict=True))  # of cases that share a simulation
+    known = [key for key in first if key in replay.remembered]
+    fresh = [key for key in first if key not in replay.remembered]
+    motions = [replay.remembered[key] for key in known]
+    if fresh:
+        motions.append(_simulate(replay, [first[key] for key in fresh]))
+    motion = join(motions)
+    place = {key: np.arange(count) + n * count for n, key in enumerate([*known, *fresh])}
+    replay.remember(keys[0], motion, place[keys[0]])
+    rows = np.concatenate([place[key] for key in keys])
+    scale = np.concatenate([case.base["force_scale"] for case in cases])
+    readings = replay.read(motion, rows, scale, _spread(cases, count, lambda e: e.effect.reads()))
+    signals = np.concatenate([readings.position, readings.force], axis=-1)
+    return signals.reshape(len(cases), count, *signals.shape[1:])
+
+
+def _simulate(replay: Replay, cases: Sequence[Case]) -> Motion:
+    """All grasps of one case after those of the other."""
+    count = len(replay.grasps)
+    base = {name: np.concatenate([c.base[name] for c in cases]) for name in cases[0].base if name != "force_scale"}
+    effects = _spread(cases, count, lambda e: not e.effect.reads_only(e.variant))
+    return replay.simulate(np.tile(np.arange(count), len(cases)), base, effects)
+
+
+def _spread(cases: Sequence[Case], count: int, acts: Callable[[Applied], bool]) -> list[EffectOn]:
+    """Effects of all cases, each kind once, on the rows of the cases that have it, as far as it acts here."""
+    kinds: dict[tuple[type[Effect], str], list[tuple[int, np.ndarray]]] = {}
+    for index, case in enumerate(cases):
+        for one in case.effects:
+            if acts(one):
+                kinds.setdefault((one.effect, one.variant), []).append((index, one.values))
+    spread = []
+    for (effect, variant), places in kinds.items():
+        rows = np.concatenate([np.arange(count) + index * count for index, _ in places])
+        spread.append(EffectOn(effect, variant, rows, np.repeat([values for _, values in places], count, axis=0)))
+    return spread

@@ -1,0 +1,134 @@
+"""The parameters that a fit may change, as one vector."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from forcegrasp.effects import Effect
+from forcegrasp.identify.predict import Applied, Case
+from forcegrasp.measure.schema import MeasuredGrasp
+from forcegrasp.physics.gripper import Gripper
+from forcegrasp.short_repr import ShortRepr
+
+
+@dataclass(frozen=True, repr=False)
+class Entry(ShortRepr):
+    """One number that a fit may change."""
+
+    name: str  #: for people: "rho_m of sponge", "backlash.gap_m"
+    parameter: str
+    effect: int  #: index into the problem's effects; −1 for a base parameter
+    members: np.ndarray  #: which grasps it concerns, ``(G,)``
+    start: float
+    low: float
+    high: float
+    unit: str
+    logarithmic: bool
+    scale: float  #: a change of this size is worth noticing, in its own unit; 1 for logarithms
+    null: float = float("nan")  #: where an effect's parameter does nothing; base parameters have no such value
+
+    def coordinate(self, value: float) -> float:
+        """The fit's own coordinate of a value; differences of 1 are large."""
+        if self.logarithmic:
+            return float(np.log(np.clip(value, self.low, self.high)))
+        return float(np.clip(value, self.low, self.high) / self.scale)
+
+    def value(self, coordinate: float) -> float:
+        """The inverse of :meth:`coordinate`."""
+        if self.logarithmic:  # of a parameter that nothing fixes, an interval's end is beyond all numbers
+            coordinate = np.exp(np.clip(coordinate, np.log(self.low), np.log(self.high)))
+        return float(np.clip(coordinate * self.scale, self.low, self.high))
+
+
+class Problem:
+    """Base parameters of a gripper on given grasps, and chosen effects.
+
+    Per-object parameters have one entry for each object; a radius or an offset has one only where the set does not
+    give it.
+
+    Args:
+      gripper: the model under test.
+      grasps: the measured grasps.
+      effects: each with its variant.
+    """
+
+    def __init__(
+        self,
+        gripper: Gripper,
+        grasps: Sequence[MeasuredGrasp],
+        effects: Sequence[tuple[type[Effect], str]] = (),
+    ) -> None:
+        self.gripper, self.grasps, self.effects = gripper, tuple(grasps), tuple(effects)
+        self._given = {
+            "radius_m": np.array([np.nan if g.radius_m is None else g.radius_m for g in grasps]),
+            "offset_m": np.array([np.nan if g.offset_m is None else g.offset_m for g in grasps]),
+        }
+        self.entries = [*self._base_entries(), *self._effect_entries()]
+        self.low = np.array([e.coordinate(e.low) for e in self.entries])
+        self.high = np.array([e.coordinate(e.high) for e in self.entries])
+
+    def __len__(self) -> int:
+        return len(self.entries)
+
+    def _base_entries(self) -> list[Entry]:
+        objects = np.array([g.object for g in self.grasps])
+        entries = []
+        for parameter in self.gripper.parameters.values():
+            free = np.isnan(self._given.get(parameter.name, np.full(len(self.grasps), np.nan)))
+            if parameter.scope == "gripper":
+                groups = {parameter.name: free}
+            elif parameter.scope == "object":
+                groups = {f"{parameter.name} of {o}": free & (objects == o) for o in dict.fromkeys(objects)}
+            else:
+                groups = {
+                    f"{parameter.name} of grasp {g.name}": free & (np.arange(len(self.grasps)) == i)
+                    for i, g in enumerate(self.grasps)
+                }
+            scale = 1.0 if parameter.logarithmic else (abs(parameter.nominal) or (parameter.high - parameter.low) / 10)
+            for name, members in groups.items():
+                if members.any():
+                    bounds = (parameter.nominal, parameter.low, parameter.high, parameter.unit)
+                    entries.append(Entry(name, parameter.name, -1, members, *bounds, parameter.logarithmic, scale))
+        return entries
+
+    def _effect_entries(self) -> list[Entry]:
+        entries = []
+        for index, (effect, _) in enumerate(self.effects):
+            for p in effect.parameters:
+                scale = 1.0 if p.logarithmic else abs(p.typical)
+                bounds = (p.typical, p.low, p.high, p.unit)
+                everyone = np.ones(len(self.grasps), bool)
+                name, kind = f"{effect.name}.{p.name}", (p.logarithmic, scale, p.null)
+                entries.append(Entry(name, p.name, index, everyone, *bounds, *kind))
+        return entries
+
+    def start(self) -> np.ndarray:
+        """Nominal base parameters and typical effects, ``(entries,)``."""
+        return np.array([e.coordinate(e.start) for e in self.entries])
+
+    def values(self, vector: np.ndarray) -> np.ndarray:
+        """Parameters in their own units, ``(entries,)``."""
+        return np.array([entry.value(x) for entry, x in zip(self.entries, vector, strict=True)])
+
+    def case(self, vector: np.ndarray) -> Case:
+        """The model that a vector stands for."""
+        base = {name: given.copy() for name, given in self._given.items()}
+        base |= {name: np.full(len(self.grasps), np.nan) for name in self.gripper.parameters if name not in base}
+        numbers: list[list[float]] = [[] for _ in self.effects]
+        for entry, value in zip(self.entries, self.values(vector), strict=True):
+            if entry.effect < 0:
+                base[entry.parameter][entry.members] = value
+            else:
+                numbers[entry.effect].append(value)
+        applied = [Applied(e, variant, np.array(v)) for (e, variant), v in zip(self.effects, numbers, strict=True)]
+        return Case(base, tuple(applied))
+
+    def columns(self) -> list[list[int]]:
+        """Entries that can be varied together, for no grasp follows two of them: one simulation gives all of them."""
+        groups: dict[tuple[str, int], list[int]] = {}
+        for index, entry in enumerate(self.entries):
+            groups.setdefault((entry.parameter, entry.effect), []).append(index)
+        return list(groups.values())

@@ -1,0 +1,1 @@
+"""Measured grasps simulated again, plans of grasps, and sets recorded from the simulator."""

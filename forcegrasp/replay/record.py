@@ -1,0 +1,150 @@
+"""Makes a measurement set from the simulator: planned grasps, sensor noise, and effects if any are asked for."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from forcegrasp.effects import Effect
+from forcegrasp.effects.for_gripper import effect_of
+from forcegrasp.errors import ConfigError, closest
+from forcegrasp.measure.schema import MeasuredGrasp, MeasurementSet, columns_of, fingerprint_of_set
+from forcegrasp.physics.gripper import Gripper
+from forcegrasp.physics.gripper_file import default_gripper
+from forcegrasp.physics.gripper_parts import BaseParameter
+from forcegrasp.physics.sensors import rounding_steps, with_noise
+from forcegrasp.replay.plans import PERIOD_S, SAMPLES, make_plan
+from forcegrasp.replay.replay import EffectOn, Replay
+from forcegrasp.short_repr import ShortRepr
+
+# Objects' radii, as shares of half the opening: both fingers reach them, and they fit in.
+_RADII = (0.4, 0.75)
+# Objects differ from the nominal one by up to this factor, either way.
+_OBJECT_FACTOR = 2.0
+
+
+@dataclasses.dataclass(frozen=True, repr=False)
+class Recorded(ShortRepr):
+    """A set, and the truth that its files don't tell."""
+
+    measured: MeasurementSet
+    base: dict[str, np.ndarray]  #: true base parameters of each grasp, ``(G,)``
+
+
+def record(
+    gripper: Gripper,
+    plan: str,
+    *,
+    grasps: int,
+    objects: int,
+    effects: Sequence[tuple[type[Effect], str, np.ndarray]],
+    known: dict[str, float],
+    off_nominal: float,
+    position_std_m: float,
+    force_std_n: float,
+    seed: int,
+) -> Recorded:
+    """Simulates a measurement set.
+
+    Args:
+      gripper: what is simulated.
+      plan: a name out of :data:`~forcegrasp.replay.plans.PLANS`.
+      grasps: how many.
+      objects: number of objects that are grasped in turn; their parameters are drawn.
+      effects: each with its variant and its parameters.
+      known: base parameters of the gripper that are not drawn.
+      off_nominal: largest share by which the other ones differ from nominal.
+      position_std_m: noise of the positions, m or rad.
+      force_std_n: noise of the forces.
+      seed: of everything random.
+    """
+    rng = np.random.default_rng(seed)
+    parameters = gripper.parameters.values()
+    of_gripper = {
+        p.name: known.get(p.name, _clip(p, p.nominal * (1 + off_nominal * rng.uniform(-1, 1))))
+        for p in parameters
+        if p.scope == "gripper"
+    }
+    of_objects = {p.name: _draw(p, objects, rng) for p in parameters if p.scope == "object" and p.name != "radius_m"}
+    radii = rng.uniform(*_RADII, objects) * (gripper.opening.opening_m[-1] / 2)
+    planned = make_plan(plan, radii, grasps, gripper, rng)
+    thing = np.array([p.object for p in planned])
+    base = {name: np.full(grasps, value) for name, value in of_gripper.items()}
+    base |= {name: values[thing] for name, values in of_objects.items()}
+    base |= {"radius_m": radii[thing], "offset_m": np.array([p.offset_m for p in planned])}
+    time, rest = np.arange(SAMPLES) * PERIOD_S, np.full((SAMPLES, len(gripper.motors)), gripper.stroke)
+    unloaded = np.zeros((SAMPLES, len(gripper.forces)))
+    bare = [
+        MeasuredGrasp(
+            f"g{index:03}", f"object_{p.object + 1}", "simulated", float(radii[p.object]), p.offset_m, None,
+            time, p.command_m, rest, unloaded, None, columns=columns_of(gripper),
+        )
+        for index, p in enumerate(planned)
+    ]  # fmt: skip
+    rows = np.arange(grasps)
+    replay = Replay(gripper, bare, encoders_known=False)
+    on = [
+        EffectOn(effect, variant, rows, np.repeat(values[None], grasps, axis=0)) for effect, variant, values in effects
+    ]
+    motion = replay.simulate(
+        rows,
+        {n: v for n, v in base.items() if n != "force_scale"},
+        [e for e in on if not e.effect.reads_only(e.variant)],
+    )
+    readings = replay.read(motion, rows, base["force_scale"], [e for e in on if e.effect.reads()])
+    steps = rounding_steps((effect, values) for effect, _, values in effects)
+    position = with_noise(readings.position, position_std_m, rng.standard_normal(readings.position.shape), steps[0])
+    force = with_noise(readings.force, force_std_n, rng.standard_normal(readings.force.shape), steps[1])
+    full = tuple(dataclasses.replace(g, position_m=position[i], force_n=force[i]) for i, g in enumerate(bare))
+    name = gripper.path.stem if gripper.is_shipped else str(gripper.path.resolve())
+    noise = (position_std_m or None, force_std_n or None)  # a set without noise does not give any
+    fingerprint = fingerprint_of_set(name, *noise, full)
+    source = f"simulated by forcegrasp record, plan {plan}, seed {seed}"
+    measured = MeasurementSet(Path(), "recorded", name, source, "none: simulated", *noise, full, fingerprint)
+    return Recorded(measured, base)
+
+
+def parse_effect(text: str, gripper: Gripper | None = None) -> tuple[type[Effect], str, np.ndarray]:
+    """Reads ``NAME [VARIANT] [PARAMETER=VALUE ...]``; what is not given is typical of the gripper (the paper's).
+
+    Raises:
+      ConfigError: if the gripper has no such effect, variant or parameter, or a value is out of bounds.
+    """
+    name, *words = text.split() or [""]
+    effect, variant = effect_of(name, gripper or default_gripper()), ""
+    values = dict(zip((p.name for p in effect.parameters), effect.typical_values(), strict=True))
+    bounds = {p.name: p for p in effect.parameters}
+    for word in words:
+        key, equals, number = word.partition("=")
+        if not equals and key in effect.variants:
+            variant = key
+        elif not equals or key not in bounds:
+            raise ConfigError(
+                f"effects: {name} has no {key!r}{closest(key, [*bounds, *filter(None, effect.variants)])}"
+            )
+        else:
+            values[key] = _number(name, bounds[key], number)
+    return effect, variant or effect.variants[0], np.array([values[p.name] for p in effect.parameters])
+
+
+def _number(name: str, parameter, text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError as error:
+        raise ConfigError(f"effects: {name} {parameter.name}={text}: must be a number in {parameter.unit}") from error
+    if not (parameter.low <= value <= parameter.high or value == parameter.null):
+        limits = f"[{parameter.low:g}, {parameter.high:g}]"
+        raise ConfigError(f"effects: {name} {parameter.name}={text}: must lie in {limits} {parameter.unit}")
+    return value
+
+
+def _draw(parameter: BaseParameter, count: int, rng: np.random.Generator) -> np.ndarray:
+    factor = _OBJECT_FACTOR ** rng.uniform(-1, 1, count)
+    return np.array([_clip(parameter, parameter.nominal * f) for f in factor])
+
+
+def _clip(parameter: BaseParameter, value: float) -> float:
+    return float(np.clip(value, parameter.low, parameter.high))

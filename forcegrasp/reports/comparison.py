@@ -1,0 +1,278 @@
+"""A comparison as JSON, as a table for the terminal, and as sections of a report."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from rich import box
+from rich.table import Table as Printed
+from rich.text import Text as Plain
+
+from forcegrasp.identify.comparison import Cell, Comparison
+from forcegrasp.identify.cross_validation import rms
+from forcegrasp.identify.target import PHASES, Target
+from forcegrasp.reports import figures
+from forcegrasp.reports.html import Picture, Section, Table, Text
+
+# Error ÷ floor up to which a model is as good as the data can tell.
+_AT_FLOOR = 1.03
+# Error ÷ noise beyond which a cell is marked.
+_MARKED = 2.0
+# What the residual is drawn against.
+_DRAWN = ("time_since_contact_s", "velocity_m_s", "direction", "force_n", "command_m")
+_WORST = 3
+# Share of the error below which what it goes with is no news.
+_WORTH_TELLING = 0.05
+
+
+def amount(value: float, unit: str) -> str:
+    """A small length, angle or force with its unit."""
+    shown, factor = {"m": ("µm", 1e6), "rad": ("mrad", 1e3), "N": ("mN", 1e3)}.get(unit, (unit, 1.0))
+    return f"{factor * value:.3g} {shown}" if abs(factor * value) < 1000 else f"{factor * value:.0f} {shown}"
+
+
+def value_text(value: float, digits: int, at_bound: bool) -> str:
+    """A fitted value, marked where it ended at its bound."""
+    return f"{value:.{digits}g}" + (" (at its bound)" if at_bound else "")
+
+
+def words(name: str) -> str:
+    """A phase's or signal's name in words."""
+    return figures.NAMES.get(name, name.replace("_", " "))
+
+
+def noise_sentence(target: Target) -> str:
+    """The sensor noise that errors are divided by, and where it is from."""
+    first = {f"{kind}s": part.start for kind, part in target.kinds.items()}
+    sigma, quantum, units = target.sensor_sigma, target.quantum, target.units
+    noise = f"sensor noise: {', '.join(f'{kind} {amount(float(sigma[k]), units[k])}' for kind, k in first.items())}"
+    steps = [f"{kind} {amount(float(quantum[k]), units[k])}" for kind, k in first.items() if quantum[k]]
+    if steps:
+        noise += f" (and readings come in steps: {', '.join(steps)}; that adds to the noise)"
+    if target.sigma_known:
+        return f"{noise}, as given with the set"
+    return (
+        f"{noise}; not both are given in meta.yaml, so what is missing was estimated from the data. Noise that is slow"
+        " looks like motion: the estimate is a lower bound, and so is the floor"
+    )
+
+
+def compare_json(comparison: Comparison, name: str, model: str, notes: list[str]) -> dict[str, Any]:
+    """All figures in plain types."""
+    cells, target = comparison.cells(), comparison.target
+    held = {}
+    for k, (signal, unit) in enumerate(zip(target.names, target.units, strict=True)):
+        ratio = rms(comparison.heldout, target, np.arange(len(target.names)) == k)
+        held[signal] = {f"rms_{unit.lower()}": ratio * target.sigma[k], "ratio": ratio}
+    return {
+        "set": name,
+        "model": model,
+        "signals": {signal: _signal_json(comparison, k) for k, signal in enumerate(target.names)},
+        "phases": {
+            phase: {cell.signal: _cell_json(cell) for cell in cells if cell.phase == phase}
+            for phase in PHASES
+            if any(cell.phase == phase for cell in cells)
+        },
+        "floor_ratio": comparison.floor_ratio(),
+        "floor": comparison.floor,
+        "heldout": held,
+        "noise_given": target.sigma_known,
+        "grasps": {g.name: float(e) for g, e in zip(target.grasps, comparison.by_grasp(), strict=True)},
+        "explained_by": [
+            {"covariate": covariate, "signal": kind, "share": share}
+            for covariate, kind, share in comparison.explanations()
+        ],
+        "notes": notes,
+    }
+
+
+def _signal_json(comparison: Comparison, k: int) -> dict[str, Any]:
+    target, unit = comparison.target, comparison.target.units[k].lower()
+    inside, sigma = comparison.residual[..., k][target.mask], float(target.sigma[k])
+    ratio = float(np.sqrt(np.mean(inside**2)))
+    return {
+        f"rms_{unit}": ratio * sigma,
+        "ratio": ratio,
+        f"bias_{unit}": float(inside.mean()) * sigma,
+        f"noise_{unit}": sigma,
+        "samples": len(inside),
+    }
+
+
+def _cell_json(cell: Cell) -> dict[str, Any]:
+    unit = cell.unit.lower()
+    return {f"rms_{unit}": cell.rms, "ratio": cell.ratio, f"bias_{unit}": cell.bias, "samples": cell.samples}
+
+
+def at_floor(error: float, floor: float) -> bool:
+    """Whether a model is as good as the data can tell."""
+    return error <= max(floor, 1.02) * _AT_FLOOR
+
+
+def worst_cell(cells: list[Cell]) -> Cell:
+    """The signal and phase with the largest error ÷ noise; a handful of samples does not count."""
+    many = [cell for cell in cells if cell.samples >= 40]
+    return max(many or cells, key=lambda cell: cell.ratio)
+
+
+def answer(comparison: Comparison) -> str:
+    """Where the model fails, in two sentences."""
+    value, floor, cell = comparison.floor_ratio(), comparison.floor, worst_cell(comparison.cells())
+    if comparison.heldout is comparison.residual:
+        where = "on this set, to which the model was not fitted,"
+    elif np.isfinite(comparison.heldout).any():
+        where = "on held-out grasps"
+    else:
+        where = "on the grasps that it was fitted to (too few to hold any out)"
+    total = f"The model's error {where} is {value:.2f} × the sensor noise; up to {floor:.2f} is noise."
+    if at_floor(value, floor):
+        return f"{total} These measurements show no failure of the model."
+    return (
+        f"{total} It is largest in {words(cell.phase)}, {words(cell.signal)}: {amount(cell.rms, cell.unit)},"
+        f" {cell.ratio:.1f} × noise."
+    )
+
+
+def printed(comparison: Comparison) -> Printed:
+    """Error per phase and signal, for the terminal."""
+    table = Printed("phase", box=box.SIMPLE_HEAD, padding=(0, 1))
+    names, units = comparison.target.names, comparison.target.units
+    for signal in names:
+        table.add_column(words(signal), no_wrap=True)
+    cells = {(cell.phase, cell.signal): cell for cell in comparison.cells()}
+    for phase in PHASES:
+        row = [cells.get((phase, signal)) for signal in names]
+        if any(row):
+            table.add_row(words(phase), *(_printed_cell(cell) for cell in row))
+    totals = [_signal_json(comparison, k) for k in range(len(names))]
+    table.add_section()
+    table.add_row(
+        "all",
+        *(f"{amount(t[f'rms_{u.lower()}'], u)} {t['ratio']:.1f}×" for t, u in zip(totals, units, strict=True)),
+    )
+    return table
+
+
+def _printed_cell(cell: Cell | None) -> Plain:
+    if cell is None:
+        return Plain("–")
+    return Plain(f"{amount(cell.rms, cell.unit)} {cell.ratio:.1f}×", "bold" if cell.ratio > _MARKED else "")
+
+
+def details(comparison: Comparison) -> list[str]:
+    """Lines below the table: worst grasps, what the error goes with, and the noise."""
+    errors, target = comparison.by_grasp(), comparison.target
+    worst = [
+        f"{target.grasps[i].name} on {target.grasps[i].object} ({errors[i]:.1f} ×)" for i in worst_grasps(comparison)
+    ]
+    lines = [f"worst grasps: {', '.join(worst)}"]
+    name, kind, share = comparison.explanations()[0]
+    if share >= _WORTH_TELLING and not at_floor(comparison.floor_ratio(), comparison.floor):
+        lines.append(f"{share:.0%} of the {kind} error goes with {covariate_words(name)}")
+    return [*lines, noise_sentence(target)]
+
+
+def covariate_words(name: str) -> str:
+    """A covariate in words."""
+    return figures.AXES[name][0].split(" [")[0]
+
+
+def worst_grasps(comparison: Comparison) -> list[int]:
+    """Indices of the grasps with the largest errors, worst first."""
+    return [int(i) for i in np.argsort(-comparison.by_grasp())[:_WORST]]
+
+
+def sections(comparison: Comparison, notes: list[str]) -> list[Section]:
+    """What the answer rests on."""
+    target = comparison.target
+    found = [
+        _by_signal_and_phase(comparison),
+        Section(
+            "Error by grasp and phase",
+            [
+                Picture(
+                    figures.heat_map(
+                        comparison.by_grasp_and_phase(), [f"{g.name} · {g.object}" for g in target.grasps], PHASES
+                    ),
+                    "Error ÷ sensor noise of each grasp (rows) in each phase, all signals together. 1 is the noise."
+                    + (" The worst forty are shown." if len(target.grasps) > 40 else ""),
+                )
+            ],
+        ),
+        _worst(comparison),
+        dependence_section(comparison),
+    ]
+    if notes:
+        found.append(Section("To bear in mind", [Text(note) for note in notes]))
+    return found
+
+
+def _by_signal_and_phase(comparison: Comparison) -> Section:
+    cells, names = comparison.cells(), comparison.target.names
+    grid = np.full((len(PHASES), len(names)), np.nan)
+    for cell in cells:
+        grid[PHASES.index(cell.phase), names.index(cell.signal)] = cell.ratio
+    rows = [
+        (
+            words(c.signal),
+            words(c.phase),
+            str(c.samples),
+            amount(c.rms, c.unit),
+            f"{c.ratio:.2f}",
+            amount(c.bias, c.unit),
+        )
+        for c in cells
+    ]
+    head = ("signal", "phase", "samples", "rms error", "÷ noise", "mean of measured − model")
+    shown = ~np.all(np.isnan(grid), axis=1)
+    phases = [words(phase) for phase, there in zip(PHASES, shown, strict=True) if there]
+    return Section(
+        "Error by signal and phase",
+        [
+            Picture(
+                figures.heat_map(grid[shown], phases, [words(s) for s in names]),
+                "Error ÷ sensor noise. Free: no finger touches; first contact: one finger, or both for less than 0.2 s;"
+                " both: both press; hold: both press and the command rests; release: opening, until 0.2 s after.",
+            ),
+            Table(head, rows, frozenset(i for i, cell in enumerate(cells) if cell.ratio > _MARKED)),
+            Text(f"S{noise_sentence(comparison.target)[1:]}."),
+            Text(
+                f"Held-out error {comparison.floor_ratio():.3f} × noise. Floor {comparison.floor:.3f} × noise: sensor"
+                " noise, and what the simulation's own step and collision code add."
+            ),
+        ],
+    )
+
+
+def _worst(comparison: Comparison) -> Section:
+    target, errors = comparison.target, comparison.by_grasp()
+    blocks: list = []
+    for index in worst_grasps(comparison):
+        grasp = target.grasps[index]
+        blocks.append(
+            Picture(
+                figures.overlay(target, index, comparison.predicted[index]),
+                f"Grasp {grasp.name} on {grasp.object}: error {errors[index]:.2f} × noise. Dots are measured, lines are"
+                " the model's; below, measured − model ÷ noise, with a band of ± 2.",
+            )
+        )
+    return Section("The worst grasps", blocks)
+
+
+def dependence_section(comparison: Comparison, title: str = "What the error goes with") -> Section:
+    """Residuals against what they may depend on."""
+    values = {name: value for name, value in comparison.covariates().items() if name in _DRAWN}
+    shares = [(n, kind, share) for n, kind, share in comparison.explanations() if share >= 0.01][:8]
+    rows = [(covariate_words(name), kind, f"{share:.0%}") for name, kind, share in shares]
+    blocks: list = [
+        Picture(
+            figures.dependence(values, comparison.residual, comparison.target),
+            "Measured − model ÷ noise, of both fingers: single samples (grey), and the median and the middle 80 % of"
+            " equally filled bins (green). Grey band: ± 1. A model that lacks nothing lies flat on 0.",
+        )
+    ]
+    if rows:
+        head = ("goes with", "signals", "share of the mean square error that it explains")
+        blocks.append(Table(head, rows))
+    return Section(title, blocks)

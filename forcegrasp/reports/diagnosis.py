@@ -1,0 +1,278 @@
+"""A diagnosis as JSON, as lines for the terminal, and as sections of a report."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from rich import box
+from rich.table import Table as Printed
+from rich.text import Text as Plain
+
+from forcegrasp.diagnosis.advice import Advice
+from forcegrasp.diagnosis.search import Candidate, Diagnosis, Step
+from forcegrasp.effects import Effect
+from forcegrasp.effects.for_gripper import effect_of
+from forcegrasp.identify.fit import Fit
+from forcegrasp.identify.intervals import listed, reached_bound
+from forcegrasp.identify.target import PHASES
+from forcegrasp.reports import figures
+from forcegrasp.reports.comparison import dependence_section, noise_sentence, value_text, words, worst_cell
+from forcegrasp.reports.diagnosis_words import lacks, left_sentence, noise_words, preference
+from forcegrasp.reports.findings import (
+    candidate_json,
+    candidate_parameters,
+    final_warnings,
+    found_parameters,
+    found_steps,
+    no_trace,
+    noise_json,
+    ranking,
+    remaining,
+    where,
+)
+from forcegrasp.reports.fit import ADVICE, steps_picture, symptom_picture
+from forcegrasp.reports.html import Picture, Section, Table, Text
+
+_PRINTED = 5
+
+
+def diagnosis_json(diagnosis: Diagnosis, advice: Advice | None, tried: Sequence[type[Effect]], name: str) -> dict:
+    """The diagnosis in plain types."""
+    return {
+        "set": name,
+        "verdict": diagnosis.verdict,
+        "effects": list(diagnosis.effects),
+        "preferred": list(diagnosis.preferred),
+        "explained_share": diagnosis.explained,
+        "steps": [_step_json(step, diagnosis) for step in diagnosis.steps],
+        "ranking": ranking(diagnosis),
+        "no_trace": no_trace(diagnosis, tried),
+        "parameters": {
+            effect: {p: dict(zip(("value", "low", "high", "unit"), entry, strict=True)) for p, entry in found.items()}
+            for effect, found in found_parameters(diagnosis).items()
+        },
+        "error_before": diagnosis.error_before,
+        "error_after": diagnosis.error_after,
+        "floor_ratio": diagnosis.error_after,
+        "floor": diagnosis.floor,
+        "next_grasp": None if advice is None else {
+            "grasp": advice.grasp,
+            "tells_apart": list(advice.rivals),
+            "differences": dict(advice.differences),
+            "object": advice.object,
+        },
+        "where": where(diagnosis),
+        "reason": diagnosis.base.reason,
+        "noise_given": diagnosis.target.sigma_known,
+        "noise": noise_json(diagnosis),
+        "warnings": final_warnings(diagnosis),
+    }  # fmt: skip
+
+
+def _step_json(step: Step, diagnosis: Diagnosis) -> dict[str, Any]:
+    return {
+        "verdict": step.verdict,
+        "effects": list(step.effects),
+        "preferred_because": preference(step),
+        "error_before": step.error_before,
+        "error_after": step.error_after,
+        "ranking": [candidate_json(c, diagnosis) for c in step.candidates],
+    }
+
+
+def answer(diagnosis: Diagnosis) -> str:
+    """The verdict in words."""
+    d, cell, noise = diagnosis, worst_cell(remaining(diagnosis).cells()), noise_words(diagnosis)
+    found = listed(d.preferred) if d.preferred else ""
+    place = f"{words(cell.signal)}, {words(cell.phase)} ({cell.ratio:.1f} × noise)"
+    if d.verdict in ("effect", "one_of"):
+        fall = f"With {found} the error on held-out grasps falls from {d.error_before:.2f} to {d.error_after:.2f} ×"
+        rest = f"What is left is largest in {place}." if d.left else noise
+        return f"{lacks(d)} {fall} the sensor noise; up to {d.floor:.2f} is noise. {rest}".rstrip()
+    if d.verdict == "explained":
+        of_noise = f"the error on held-out grasps is {d.error_before:.2f} × the sensor noise"
+        if noise:
+            return f"The model explains these data: they show no missing effect; {of_noise}. {noise}"
+        return (
+            f"The model explains these data: {of_noise}, and up to {d.floor:.2f} is noise and the simulation's own"
+            " error. They show no missing effect."
+        )
+    if d.verdict == "unknown":
+        best = f"{found} would only take it down to {d.error_after:.2f} ×" if found else "no effect explains it"
+        return (
+            f"Something is missing, and it is none of the effects I know: the error on held-out grasps is"
+            f" {d.error_before:.2f} × the sensor noise, and {best}. Look at {place}."
+        )
+    return f"No diagnosis, for the base model is not fitted: {d.base.reason}. To do: {ADVICE}."
+
+
+def printed(diagnosis: Diagnosis) -> Printed | None:
+    """The best effects of each step, for the terminal."""
+    if not any(step.candidates or step.effects for step in diagnosis.steps):
+        return None
+    table = Printed("", "effect", "gain", "p", "error, × noise", "parameters", box=box.SIMPLE_HEAD)
+    for number, step in enumerate(diagnosis.steps, 1):
+        if step.effects and not step.candidates:
+            fall = f"{step.error_before:.2f} → {step.error_after:.2f}"
+            table.add_row(*(Plain(cell, "bold") for cell in (str(number), step.effects[0], "", "", fall, "")))
+        for place, candidate in enumerate(step.candidates[:_PRINTED]):
+            name, gain, p, values = _texts(candidate, diagnosis)
+            cells = ("" if place else str(number), name, gain, p, _error_text(step, candidate), values)
+            chosen = candidate.effect.name in step.effects
+            table.add_row(*(Plain(cell, "bold" if chosen else "") for cell in cells))
+    return table
+
+
+def _error_text(step: Step, candidate: Candidate) -> str:
+    return f"{step.error_before:.2f} → {candidate.error_after:.2f}"
+
+
+def _texts(candidate: Candidate, diagnosis: Diagnosis) -> tuple[str, str, str, str]:
+    """Effect, gain, p, parameters."""
+    found = candidate_parameters(candidate, diagnosis)
+    values = ", ".join(
+        f"{p.name} {_value(candidate.effect, p.name, found[p.name], 3)}{'' if p.unit == '1' else f' {p.unit}'}"
+        for p in candidate.effect.parameters
+    )
+    name = f"{candidate.effect.name} {candidate.variant}".strip()
+    return name, f"{candidate.heldout_gain:+.0f}", f"{candidate.p_family:.2g}", values
+
+
+def _value(effect: type[Effect], name: str, value: float, digits: int) -> str:
+    p = next(p for p in effect.parameters if p.name == name)
+    return value_text(value, digits, reached_bound(value, p.low, p.high, p.logarithmic, p.null) is not None)
+
+
+def lines(diagnosis: Diagnosis, advice: Advice | None) -> list[str]:
+    """What stands below the table: symptoms, rivals, what is left, and what to record next."""
+    told = []
+    for step, _ in found_steps(diagnosis):
+        effect = effect_of(step.effects[0], diagnosis.target.gripper)
+        told.append(f"{effect.name}: {effect.symptom}")
+        told += [f"  {text}" for text in _final_texts(diagnosis, effect)]
+        told += [f"  it could also be: {listed(step.effects[1:], 'or')}"] if len(step.effects) > 1 else []
+    if diagnosis.verdict in ("unknown", "effect", "one_of"):
+        told.append(left_sentence(diagnosis))
+    if advice is not None:
+        told.append(advice.sentence())
+    return [*told, noise_sentence(diagnosis.target), *(f"warning: {warning}" for warning in final_warnings(diagnosis))]
+
+
+def _final_texts(diagnosis: Diagnosis, effect: type[Effect]) -> list[str]:
+    """Each parameter of an effect in the final model, with its interval."""
+    return [
+        f"{name} {_value(effect, name, value, 4)}{'' if unit == '1' else f' {unit}'} (95 %: {low:.4g} to {high:.4g})"
+        for name, (value, low, high, unit) in found_parameters(diagnosis).get(effect.name, {}).items()
+    ]
+
+
+def sections(diagnosis: Diagnosis, advice: Advice | None, tried: Sequence[type[Effect]]) -> list[Section]:
+    """What the answer rests on."""
+    found = [_step_section(n, *pair, diagnosis) for n, pair in enumerate(found_steps(diagnosis), 1)]
+    if advice is not None:
+        found.append(_advice_section(diagnosis, advice))
+    attempts = [_tried_section(diagnosis, tried)] if diagnosis.steps else []
+    left = _left_sections(diagnosis)
+    return [*found, *attempts, *left] if diagnosis.effects else [*left, *found, *attempts]
+
+
+def _step_section(number: int, step: Step, before: Fit, diagnosis: Diagnosis) -> Section:
+    effect = effect_of(step.effects[0], diagnosis.target.gripper)
+    if step.candidates:
+        seen = symptom_picture(diagnosis.target, before, step.candidates[0].fit, effect)
+    else:
+        seen = steps_picture(diagnosis.target)
+    fall = f"Held-out error {step.error_before:.2f} → {step.error_after:.2f} × noise."
+    blocks: list = [
+        Text(f"Symptom: {effect.symptom}. {fall}", strong=True),
+        seen,
+    ]
+    rows = [
+        (name, _value(effect, name, value, 4), f"{low:.4g} to {high:.4g}", "" if unit == "1" else unit)
+        for name, (value, low, high, unit) in found_parameters(diagnosis).get(effect.name, {}).items()
+    ]
+    if rows:
+        blocks.append(Table((f"parameter of {effect.name}", "value", "95 % interval", "unit"), rows))
+    alone = len(step.candidates) <= 1
+    blocks.append(Text("What else it could be:" + (" no other effect comes near." if alone else ""), strong=True))
+    blocks += [_candidates_table(step, diagnosis)] if step.candidates else []
+    if len(step.effects) > 1:
+        blocks.append(Text(f"{listed(step.effects, 'and')} can't be told apart by these data."))
+    blocks.append(Text(f"Looks like {listed(effect.look_alikes, 'and')}. What separates them: {effect.separates}."
+                       if effect.look_alikes else f"What is its own: {effect.separates}."))  # fmt: skip
+    return Section(f"{number}. {' or '.join(step.effects)}", blocks)
+
+
+def _candidates_table(step: Step, diagnosis: Diagnosis) -> Table:
+    values = "parameters (of effects in the final model: there; of others: as fitted in this step)"
+    head = ("effect", "held-out gain", "p (family-wise)", "error ÷ noise", values)
+    rows = []
+    for c in step.candidates:
+        name, gain, p, values = _texts(c, diagnosis)
+        rows.append((name, gain, p, _error_text(step, c), values))
+    marked = frozenset(i for i, c in enumerate(step.candidates) if c.effect.name in step.effects)
+    return Table(head, rows, marked)
+
+
+def _advice_section(diagnosis: Diagnosis, advice: Advice) -> Section:
+    ordered = sorted(advice.differences.items(), key=lambda item: -item[1])
+    one, other = advice.rivals
+    return Section(
+        "What to record next",
+        [
+            Text(f"{advice.sentence()[0].upper()}{advice.sentence()[1:]}.", strong=True),
+            Picture(
+                figures.rivals(diagnosis.target, advice.time_s, advice.command_m, advice.predicted, advice.rivals),
+                f"What {one} and {other} predict of the grasp “{advice.grasp}” on {advice.object}.",
+            ),
+            Table(
+                ("grasp", f"difference of {one} and {other} ÷ noise, rms"),
+                [(grasp, f"{apart:.2f}") for grasp, apart in ordered],
+                frozenset({0}),
+            ),
+        ],
+    )
+
+
+def _tried_section(diagnosis: Diagnosis, tried: Sequence[type[Effect]]) -> Section:
+    rows = []
+    for row in ranking(diagnosis):
+        gain, p, after = (row[key] for key in ("heldout_gain", "p_family", "floor_ratio_after"))
+        texts = ("not refitted", "", "") if gain is None else (f"{gain:+.0f}", f"{p:.2g}", f"{after:.2f}")
+        rows.append((row["effect"], effect_of(row["effect"], diagnosis.target.gripper).stage, *texts))
+    silent = no_trace(diagnosis, tried)
+    blocks: list = [
+        Table(("effect", "acts on", "held-out gain", "p (family-wise)", "error ÷ noise with it"), rows),
+        Text(
+            "Of the first step, best first. The gain is the change of the log-likelihood of grasps held out of the fit;"
+            " p is the probability that the best of all effects does as well on sensor noise alone. Effects whose"
+            " signature explains much less than the best one's are not refitted."
+        ),
+    ]
+    if silent:
+        blocks.append(Text(f"Leave no trace in these grasps, so nothing can be said about them: {', '.join(silent)}."))
+    return Section("All effects that were tried", blocks)
+
+
+def _left_sections(diagnosis: Diagnosis) -> list[Section]:
+    left, target = remaining(diagnosis), diagnosis.target
+    worst = int(np.argmax(left.by_grasp()))
+    grasp = target.grasps[worst]
+    model = "the base model" if not diagnosis.fit.problem.effects else "the final model"
+    sentence = left_sentence(diagnosis)
+    blocks: list = [
+        Text(f"{sentence[0].upper()}{sentence[1:]}."),
+        Picture(
+            figures.heat_map(left.by_grasp_and_phase(), [f"{g.name} · {g.object}" for g in target.grasps], PHASES),
+            f"Error of {model} ÷ sensor noise, of each grasp in each phase. 1 is the noise.",
+        ),
+        Picture(
+            figures.overlay(target, worst, left.predicted[worst]),
+            f"Grasp {grasp.name} on {grasp.object}, the worst under {model}: error {left.by_grasp()[worst]:.2f} ×"
+            " noise. Dots are measured, lines are the model's.",
+        ),
+        Text(f"S{noise_sentence(target)[1:]}."),
+    ]
+    return [Section("What is left", blocks), dependence_section(left, "What the rest goes with")]

@@ -1,0 +1,91 @@
+"""Sentences about a diagnosis: what the model lacks, how much is left, and what the noise turned out to be."""
+
+from __future__ import annotations
+
+from forcegrasp.diagnosis.search import Diagnosis, Step
+from forcegrasp.diagnosis.verdict import EXPLAINED_FAR, MUCH
+from forcegrasp.identify.intervals import listed
+from forcegrasp.reports.comparison import covariate_words, words
+from forcegrasp.reports.findings import found_steps, where
+
+
+def lacks(diagnosis: Diagnosis) -> str:
+    """The effects that were found, what else they could be, and how much they leave, in one sentence."""
+    steps = [step for step, _ in found_steps(diagnosis)]
+    if len(steps) == 1 and len(steps[0].effects) > 1:
+        names = f"{listed(steps[0].effects, 'or')}: {_undecided(steps[0])}"
+    else:
+        names = listed([_with_rivals(step) for step in steps])
+    return f"The model lacks {names}{_but(diagnosis)}."
+
+
+def _with_rivals(step: Step) -> str:
+    first, *rivals = step.effects
+    return f"{first} (or {listed(rivals, 'or')}: {_undecided(step)})" if rivals else first
+
+
+def _undecided(step: Step) -> str:
+    return f"these data can't tell which, and {step.effects[0]} is preferred, for {preference(step)}"
+
+
+def preference(step: Step) -> str:
+    """Why the first of the effects that can't be told apart is preferred; empty if there is one only."""
+    if len(step.effects) < 2:
+        return ""
+    first, *others = (len(candidate.effect.parameters) for candidate in step.candidates[: len(step.effects)])
+    if all(first < other for other in others):
+        return "it has fewer parameters"
+    if all(first == other for other in others):
+        return "its held-out gain is larger"
+    return "it has fewer parameters or a larger held-out gain"
+
+
+def _but(diagnosis: Diagnosis) -> str:
+    d = diagnosis
+    if not d.left or (d.error_after <= MUCH * d.floor and d.explained >= EXPLAINED_FAR):
+        return ""
+    return (
+        f"; but that is not all, for {d.error_after:.2f} × the sensor noise is left on held-out grasps where"
+        f" {d.floor:.2f} would be noise ({d.explained:.0%} of the mean square beyond it is explained)"
+    )
+
+
+def left_sentence(diagnosis: Diagnosis) -> str:
+    """Where the rest of the error is, in words."""
+    rest = where(diagnosis)
+    place = f"{words(rest['signal'])}, {words(rest['phase'])}: {rest['ratio']:.1f} × noise"
+    if not diagnosis.left:
+        return f"what is left is noise; it is largest in {place}"
+    name, share = next(iter(rest["explained_by"].items()))
+    goes = f", of which {share:.0%} goes with {covariate_words(name)}" if share > 0.05 else ""
+    return (
+        f"what is left is largest in {place}{goes}; a better model could explain {rest['explainable']:.0%} of the"
+        " remaining mean square error at most"
+    )
+
+
+def noise_words(diagnosis: Diagnosis) -> str:
+    """What the noise is and what to do about it, if it is not what was said; empty otherwise."""
+    noise, said = diagnosis.noise, "given" if diagnosis.target.sigma_known else "estimated"
+    if noise is None:
+        return ""
+    told, names = [], diagnosis.target.names
+    for kind, part in diagnosis.target.kinds.items():
+        times = noise.times[part]
+        if all(noise.unlike[part]) and max(times) < 1.15 * min(times):
+            told.append(_scatter(f"{kind}s", float((times**2).mean() ** 0.5), any(noise.heavy_tails[part])))
+            continue
+        signals = range(part.start, part.stop)
+        told += [_scatter(words(names[k]), noise.times[k], noise.heavy_tails[k]) for k in signals if noise.unlike[k]]
+    sizes = f"{', '.join(told)} the noise that was {said}"
+    again = "give position_std_m and force_std_n as they are in meta.yaml, and diagnose again: a small effect may show"
+    if not noise.stronger:
+        return f"But the noise is smaller than that: {sizes}. What is smaller than the noise can't be seen; {again}."
+    return (
+        f"But the noise is not what was {said}: {sizes}. The residuals are white in time and alike in all phases, which"
+        f" no missing effect makes. To do: {again}."
+    )
+
+
+def _scatter(what: str, times: float, heavy: bool) -> str:
+    return f"{what} scatter by {times:.2g} ×" + (" (with heavy tails)" if heavy else "")
