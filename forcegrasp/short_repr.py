@@ -39,9 +39,9 @@ def some(names: Iterable[str], most: int = 3) -> str:
     return ", ".join(names[:most]) + more
 
 
-def counted(number: int, thing: str) -> str:
-    """A number of things: ``1 grasp``, ``2 grasps``."""
-    return f"{number} {thing}{'' if number == 1 else 's'}"
+def counted(number: int, noun: str) -> str:
+    """A number with its noun: ``1 grasp``, ``2 grasps``."""
+    return f"{number} {noun}{'' if number == 1 else 's'}"
 
 
 def _brief(value: Any) -> str:

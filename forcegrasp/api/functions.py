@@ -66,11 +66,11 @@ def compare(
       ConfigError: if the model can't be read, is of another gripper, or is given for a table of final forces.
     """
     validate(CompareConfig(seed=seed))
-    loaded, tell = _open(data, progress)
+    loaded, show = _open(data, progress)
     if measuring.is_table(loaded):
         return _analyse(loaded, "compare", model=model)
-    given, loaded = (None, loaded) if model is None else _beside(model, loaded, tell)
-    comparison, used, notes = workflow.compare(loaded, given, seed, tell)
+    given, loaded = (None, loaded) if model is None else _beside(model, loaded, show)
+    comparison, used, notes = workflow.compare(loaded, given, seed, show)
     name = "" if model is None else _name(model)
     return CompareResult(loaded, comparison, used, name, (*notes, *used.warnings))
 
@@ -90,9 +90,9 @@ def fit(data: AnySet, *, out: str | Path | None = None, seed: int = 0, progress:
     """
     validate(FitConfig(seed=seed))
     path = _file(out)
-    loaded, tell = _open(data, progress)
+    loaded, show = _open(data, progress)
     grasps = measuring.refuse_table(loaded, "fit")
-    target, _, base = workflow.fit_model(grasps, seed, tell)
+    target, _, base = workflow.fit_model(grasps, seed, show)
     return _written(FitResult(grasps, target, base, measuring.base_model(base, target, grasps), path))
 
 
@@ -121,12 +121,12 @@ def diagnose(
     validate(DiagnoseConfig(seed=seed))
     only = (effects,) if isinstance(effects, str) else tuple(effects)
     measuring.check_effects("effects", only)
-    loaded, tell = _open(data, progress)
+    loaded, show = _open(data, progress)
     if measuring.is_table(loaded):
         return _analyse(loaded, "diagnosis", model=model, effects=only)
     tried = diagnosis_workflow.chosen_effects(loaded.gripper, only)
-    given, loaded = (None, loaded) if model is None else _beside(model, loaded, tell)
-    diagnosis, _ = diagnosis_workflow.diagnose_set(loaded, given, [effect.name for effect in tried], seed, tell)
+    given, loaded = (None, loaded) if model is None else _beside(model, loaded, show)
+    diagnosis, _ = diagnosis_workflow.diagnose_set(loaded, given, [effect.name for effect in tried], seed, show)
     return DiagnoseResult(loaded, diagnosis, advise(diagnosis), tuple(tried), only, given is None)
 
 
@@ -154,12 +154,12 @@ def add(
     """
     measuring.check_effects("effect", [effect])
     path = _file(out)
-    loaded, tell = _open(data, progress)
+    loaded, show = _open(data, progress)
     grasps = measuring.refuse_table(loaded, "add")
     measuring.refuse_one_grasp(grasps)
     (chosen,) = diagnosis_workflow.chosen_effects(grasps.gripper, [effect])
-    given, grasps = _beside(model, grasps, tell)
-    added = diagnosis_workflow.add_effect(grasps, given, chosen, tell)
+    given, grasps = _beside(model, grasps, show)
+    added = diagnosis_workflow.add_effect(grasps, given, chosen, show)
     measuring.refuse_useless(added, chosen, "forcegrasp.diagnose")
     return _written(AddResult(grasps, added, chosen, path))
 
@@ -189,22 +189,22 @@ def report(result: ModelResult | TableResult, out: str | Path | None = None) -> 
 def _open(data: AnySet, progress: Progress | None) -> tuple[Loaded[MeasurementSet] | Loaded[FinalForceTable], Progress]:
     """The set, and what is told about the work; first what is odd about it."""
     loaded = data if isinstance(data, Loaded) else load(data)
-    tell = progress or _nothing
+    show = progress or _nothing
     for warning in loaded.warnings:
-        tell(f"warning: {warning}")
-    return loaded, tell
+        show(f"warning: {warning}")
+    return loaded, show
 
 
 def _nothing(line: str) -> None:
     """Tells nobody."""
 
 
-def _beside(model: AnyModel, loaded: Loaded[MeasurementSet], tell: Progress) -> tuple[Model, Loaded[MeasurementSet]]:
+def _beside(model: AnyModel, loaded: Loaded[MeasurementSet], show: Progress) -> tuple[Model, Loaded[MeasurementSet]]:
     """The model, and the set, with a warning if the model was fitted to another one."""
     given = _model(model)
     warned = workflow.warn_of_other_set(loaded, given, _name(model))
     for warning in warned.warnings[len(loaded.warnings) :]:
-        tell(f"warning: {warning}")
+        show(f"warning: {warning}")
     return given, warned
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from forcegrasp.cli.options import compose, help_text
-from forcegrasp.cli.results import default_out, narrator, need, print_table
+from forcegrasp.cli.results import default_out, need, print_table, progress_printer
 
 PURPOSE = "add an effect to a model, fit it again, and see the error fall"
 NOTES = """
@@ -49,7 +49,7 @@ def main(arguments: list[str]) -> int:
     (effect,) = diagnosis_workflow.chosen_effects(loaded.gripper, [config.effect])
     model, loaded = take_model(old, loaded)
     tell_warnings(loaded)
-    added = diagnosis_workflow.add_effect(loaded, model, effect, narrator())
+    added = diagnosis_workflow.add_effect(loaded, model, effect, progress_printer())
     refuse_useless(added, effect, f"forcegrasp diagnose data={data} model={old}")
     lead = fit_report.add_answer(added, effect)
     print_table(fit_report.printed_fall(added, effect))

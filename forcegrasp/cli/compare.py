@@ -6,7 +6,7 @@ import dataclasses
 from pathlib import Path
 
 from forcegrasp.cli.options import compose, help_text
-from forcegrasp.cli.results import default_out, narrator, need, print_table
+from forcegrasp.cli.results import default_out, need, print_table, progress_printer
 
 PURPOSE = "show where a model fails on measured grasps, in units and as a multiple of the sensor noise"
 NOTES = """
@@ -45,7 +45,7 @@ def main(arguments: list[str]) -> int:
         return 0
     model, loaded = take_model(Path(config.model), loaded) if config.model else (None, loaded)
     tell_warnings(loaded)
-    comparison, used, notes = workflow.compare(loaded, model, config.seed, narrator())
+    comparison, used, notes = workflow.compare(loaded, model, config.seed, progress_printer())
     notes, name = [*notes, *used.warnings], config.model or "base model, fitted to this set"
     lead = comparison_report.answer(comparison)
     print_table(comparison_report.printed(comparison))

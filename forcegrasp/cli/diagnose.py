@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from forcegrasp.cli.options import compose, help_text
-from forcegrasp.cli.results import default_out, narrator, need, print_table
+from forcegrasp.cli.results import default_out, need, print_table, progress_printer
 
 PURPOSE = "find out which physical effect a model lacks, and which grasp to record next"
 NOTES = """
@@ -56,7 +56,9 @@ def main(arguments: list[str]) -> int:
     tried = diagnosis_workflow.chosen_effects(loaded.gripper, config.effects)
     model, loaded = take_model(Path(config.model), loaded) if config.model else (None, loaded)
     tell_warnings(loaded)
-    diagnosis, _ = diagnosis_workflow.diagnose_set(loaded, model, [e.name for e in tried], config.seed, narrator())
+    diagnosis, _ = diagnosis_workflow.diagnose_set(
+        loaded, model, [e.name for e in tried], config.seed, progress_printer()
+    )
     advice = advise(diagnosis)
     lead, table = diagnosis_report.answer(diagnosis), diagnosis_report.printed(diagnosis)
     if config.effects:

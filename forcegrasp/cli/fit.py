@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from forcegrasp.cli.options import compose, help_text
-from forcegrasp.cli.results import default_out, narrator, need, print_table
+from forcegrasp.cli.results import default_out, need, print_table, progress_printer
 
 PURPOSE = "fit a gripper's base model to measured grasps and write it as a file"
 NOTES = """
@@ -37,7 +37,7 @@ def main(arguments: list[str]) -> int:
     path = check_file(folder / "model.yaml" if not config.out else need(config.out, "out", "model.yaml"))
     loaded = refuse_table(workflow.load(data), "fit")
     tell_warnings(loaded)
-    target, _, base = workflow.fit_model(loaded, config.seed, narrator())
+    target, _, base = workflow.fit_model(loaded, config.seed, progress_printer())
     model = base_model(base, target, loaded)
     lead = fit_report.fit_answer(base, target)
     print_table(fit_report.printed_parameters(model))

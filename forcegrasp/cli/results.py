@@ -34,14 +34,14 @@ def need(value: str, option: str, example: str) -> Path:
     return Path(value)
 
 
-def narrator() -> Callable[[str], None]:
+def progress_printer() -> Callable[[str], None]:
     """Prints what is going on, with the seconds since the start."""
     start = time.monotonic()
 
-    def tell(text: str) -> None:
+    def show(text: str) -> None:
         print(f"  [{time.monotonic() - start:4.0f} s] {text}", flush=True)
 
-    return tell
+    return show
 
 
 def print_table(table: Table) -> None:

@@ -31,13 +31,13 @@ LEAST_SHARE = 0.25
 # Refitted per step: signatures only rank.
 _REFITTED = 5
 # Of these the best ones are fitted to the end.
-_SETTLED = 3
+_REFINED = 3
 # A signature this much worse than the best is not refitted.
-_HOPELESS = 0.2
+_MIN_GAIN_RATIO = 0.2
 # A refit gains at most about twice what a signature promises.
-_UNSEEN = 0.5
+_MAX_GAIN_FACTOR = 0.5
 # A signature of an earlier round is simulated anew if it gains this share of what makes its effect worth a fit.
-_STALE = 0.3
+_RESIMULATE_RATIO = 0.3
 # An error of so many times the noise leaves nothing to look for.
 _ALL_FITTED = 1.05
 # Effects whose signatures are that parallel can't be told apart, whatever the likelihood says.
@@ -211,7 +211,9 @@ def _look_further(
     signatures.simulate(fit, new)
     groups = signatures.scores(fit, background, effects)
     null = null_gains(groups, rng)
-    stale = {g[0].effect for g in groups if g[0].gain > _STALE * _bar(groups, null, fit, target)} - set(new)
+    stale = {
+        g[0].effect for g in groups if g[0].gain > _RESIMULATE_RATIO * _refit_threshold(groups, null, fit, target)
+    } - set(new)
     if stale:
         signatures.simulate(fit, stale)
         groups = signatures.scores(fit, background, effects)
@@ -219,32 +221,34 @@ def _look_further(
     held = heldout_residual(fit, target, folds)
     start = _Round(target, fit, simulators, background, folds, held)
     error = rms(held, target)
-    least = _bar(groups, null, fit, target)
+    least = _refit_threshold(groups, null, fit, target)
     hopeful = [s for s in ranked if s.gain > least][:_REFITTED]
     candidates = start.refit(hopeful, null, progress)
     best: dict[str, Candidate] = {}
     for candidate in sorted(candidates, key=lambda c: -c.heldout_gain):
         best.setdefault(candidate.effect.name, candidate)  # of several variants the best one
-    ordered = start.settle(tuple(best.values()), progress)
+    ordered = start.refine_on_reference_tier(tuple(best.values()), progress)
     least_gain = LEAST_GAIN if excess(held, numerical, target) else LEAST_GAIN_AT_FLOOR
-    if not ordered or not _convincing(ordered[0], least_gain):
+    if not ordered or not _is_significant(ordered[0], least_gain):
         return Step("none", (), ordered, tuple(ranked), error, error)
     winner = ordered[0]
     # of those that can't be told apart the simplest comes first
-    equal = sorted([winner, *(c for c in ordered[1:] if _equal(winner, c))], key=lambda c: len(c.effect.parameters))
+    equal = sorted(
+        [winner, *(c for c in ordered[1:] if _indistinguishable(winner, c))], key=lambda c: len(c.effect.parameters)
+    )
     ordered, winner = (*equal, *(c for c in ordered if c not in equal)), equal[0]
     names = tuple(c.effect.name for c in equal)
     verdict = "effect" if len(names) == 1 else "one_of"
     return Step(verdict, names, ordered, tuple(ranked), error, winner.error_after)
 
 
-def _bar(groups: Sequence[Sequence[Score]], null: np.ndarray, fit: Fit, target: Target) -> float:
+def _refit_threshold(groups: Sequence[Sequence[Score]], null: np.ndarray, fit: Fit, target: Target) -> float:
     """What a signature must gain for its effect to be worth a fit."""
     if not groups:
         return np.inf
     beyond = float(np.sum(fit.residual**2) - target.readings)
     best = max(group[0].gain for group in groups)
-    return max(float(np.quantile(null, 1 - ALARM)), _HOPELESS * best, _UNSEEN * LEAST_SHARE * beyond)
+    return max(float(np.quantile(null, 1 - ALARM)), _MIN_GAIN_RATIO * best, _MAX_GAIN_FACTOR * LEAST_SHARE * beyond)
 
 
 @dataclass(frozen=True, eq=False)
@@ -267,15 +271,17 @@ class _Round:
             candidates.append(self._judge(score.effect, score.variant, one.fit, p_family, score.signature))
         return candidates
 
-    def settle(self, ordered: Sequence[Candidate], progress: Callable[[str], None]) -> tuple[Candidate, ...]:
-        """Fits the best one, and what comes near it, with the model itself: rough fits may stop short of an optimum."""
-        near = [c for c in ordered if c is ordered[0] or _equal(ordered[0], c)][:_SETTLED]
-        settled = []
+    def refine_on_reference_tier(
+        self, ordered: Sequence[Candidate], progress: Callable[[str], None]
+    ) -> tuple[Candidate, ...]:
+        """Fits the best one, and those indistinguishable from it, on the reference tier: rough fits may stop short."""
+        near = [c for c in ordered if c is ordered[0] or _indistinguishable(ordered[0], c)][:_REFINED]
+        refined = []
         for c in near:
             progress(f"fitting {c.effect.name} {c.variant} to the end")
-            settled.append(self._judge(c.effect, c.variant, self._to_the_end(c.fit), c.p_family, c.signature))
-        settled.sort(key=lambda c: -c.heldout_gain)
-        return (*settled, *(c for c in ordered if c not in near))
+            refined.append(self._judge(c.effect, c.variant, self._to_the_end(c.fit), c.p_family, c.signature))
+        refined.sort(key=lambda c: -c.heldout_gain)
+        return (*refined, *(c for c in ordered if c not in near))
 
     def _to_the_end(self, rough: Fit) -> Fit:
         problem = rough.problem
@@ -301,7 +307,7 @@ class _Round:
         return Candidate(effect, variant, refit, p_family, gains, error, share, fall, signature)
 
 
-def _convincing(candidate: Candidate, least_gain: float) -> bool:
+def _is_significant(candidate: Candidate, least_gain: float) -> bool:
     gains = candidate.gains[np.isfinite(candidate.gains)]
     spread = gains.std(ddof=1) * np.sqrt(len(gains)) if len(gains) > 1 else np.inf
     return (
@@ -312,7 +318,7 @@ def _convincing(candidate: Candidate, least_gain: float) -> bool:
     )
 
 
-def _equal(winner: Candidate, other: Candidate) -> bool:
+def _indistinguishable(winner: Candidate, other: Candidate) -> bool:
     lead = winner.gains - other.gains
     lead = lead[np.isfinite(lead)]
     error = lead.std(ddof=1) * np.sqrt(len(lead)) if len(lead) > 1 else np.inf

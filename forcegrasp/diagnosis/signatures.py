@@ -105,7 +105,7 @@ class Signatures:
 def best_sizes(
     scores: Sequence[Score], fit: Fit, target: Target, simulators: Simulators, background: Background
 ) -> list[Score]:
-    """The same effects with their first parameters at the sizes that leave least, and what these gain.
+    """The same effects with their first parameters at the sizes that minimise the residual, and what these gain.
 
     A signature is straight, and thresholds are not: several sizes around the one it promises are simulated, those of
     all effects at once.

@@ -11,7 +11,7 @@ from forcegrasp.physics import default_gripper
 from forcegrasp.physics.completion import complete
 
 #: Figure → what it is. All of shape ``(n,)``, one per episode.
-FIGURES = {
+METRICS = {
     "force_reward_normalised": "Σ_t of r_force, authors' form (150 at best)",
     "force_reward_paper": "Σ_t of r_force, paper's form (150 at best)",
     "force_reward_measured": "Σ_t of r_force, authors' form, of what the sensors say before noise, as a robot has it",
@@ -36,7 +36,7 @@ def summarise(rollout: TensorDictBase, sensors: SensorConfig, period_s: float | 
       period_s: seconds per step; the paper's by default.
 
     Returns:
-      One tensor ``(n,)`` per entry of :data:`FIGURES`.
+      One tensor ``(n,)`` per entry of :data:`METRICS`.
     """
     sensors, period_s = complete(sensors, default_gripper()), period_s or default_gripper().period_s
     after = rollout.get("next")

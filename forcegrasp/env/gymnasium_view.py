@@ -79,11 +79,11 @@ class GraspGymnasiumEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             return None
         if self._state is None:
             raise gymnasium.error.ResetNeeded("call reset() before render()")
-        parameters, fingers, thing = (
+        parameters, fingers, offset = (
             self._state.get(key)[0].double().numpy()
             for key in ("grasp_parameters", "joint_position", "object_position")
         )
-        return self._renderer.draw(parameters, fingers, float(thing[0]))
+        return self._renderer.draw(parameters, fingers, float(offset[0]))
 
     def close(self) -> None:
         """Ends the process that draws."""

@@ -14,7 +14,7 @@ from rich.progress import track
 from tensordict import TensorDictBase
 
 from forcegrasp.config import EvaluateConfig, RewardConfig
-from forcegrasp.env.episodes import FIGURES, summarise
+from forcegrasp.env.episodes import METRICS, summarise
 from forcegrasp.evaluate.colours import policy_colours
 from forcegrasp.evaluate.contestants import gripper_of, load_contestants
 from forcegrasp.evaluate.grids import Grid, kappa_grid, object_grid, read_objects
@@ -137,12 +137,12 @@ def _describe(figures: dict[str, dict[str, np.ndarray]], baseline: str, seed: in
 
 
 def _write_trials(path: Path, grid: Grid, figures: dict[str, dict[str, np.ndarray]]) -> None:
-    columns = ["policy", "cell", "kappa", "b2", "radius_m", "offset_m", "goal_force_n", *FIGURES]
+    columns = ["policy", "cell", "kappa", "b2", "radius_m", "offset_m", "goal_force_n", *METRICS]
     cells = np.repeat(grid.cells, grid.trials)
     with open(path, "w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file)
         writer.writerow(columns)
         for name, values in figures.items():
-            per_trial = np.stack([values[figure].reshape(-1) for figure in FIGURES], axis=1)
+            per_trial = np.stack([values[figure].reshape(-1) for figure in METRICS], axis=1)
             for cell, grasp, row in zip(cells, grid.grasps.as_array(), per_trial, strict=True):
                 writer.writerow([name, cell, *(f"{x:.9g}" for x in grasp), *(f"{x:.6g}" for x in row)])

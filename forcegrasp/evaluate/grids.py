@@ -66,14 +66,14 @@ def object_grid(
     gripper = gripper or default_gripper()
     grasp = complete(grasp, gripper)
     rng, parts = np.random.default_rng(seed), []
-    for thing in objects:
-        radius = np.full(trials, thing.diameter_m / 2)
+    for item in objects:
+        radius = np.full(trials, item.diameter_m / 2)
         share, side = rng.uniform(0.5, 1, trials), rng.choice([-1, 1], trials)
         lowest, highest = offset_limits_m(gripper, radius, grasp.deformation_m)
         offset = np.where(side < 0, lowest, highest) * share
-        b2, goal = rng.uniform(*grasp.b2, size=trials), rng.uniform(*thing.goal_force_n, trials)
-        parts.append(GraspParameters(np.full(trials, thing.kappa), b2, radius, offset, goal))
-    return Grid("object", [thing.name for thing in objects], GraspParameters.concatenate(parts))
+        b2, goal = rng.uniform(*grasp.b2, size=trials), rng.uniform(*item.goal_force_n, trials)
+        parts.append(GraspParameters(np.full(trials, item.kappa), b2, radius, offset, goal))
+    return Grid("object", [item.name for item in objects], GraspParameters.concatenate(parts))
 
 
 def read_objects(name: str, grasp: GraspConfig, gripper: Gripper | None = None) -> list[GraspedObject]:

@@ -12,7 +12,7 @@ from rich.table import Table
 
 _MEASURED = ("force_reward_measured", "normalised form, of measured forces", 1)
 #: Figures that are shown: name, heading, digits. The first ones, _BY_CELL, also cell by cell.
-FIGURES = (
+METRICS = (
     ("force_reward_normalised", "force reward, normalised form", 1),
     ("force_reward_paper", "force reward, paper's form", 1),
     _MEASURED,
@@ -79,8 +79,8 @@ def sheets(report: dict) -> Iterator[Sheet]:
     policies = report["policies"]
     names = list(policies)
     # without a model the sensors say what is true
-    shown = [figure for figure in FIGURES if figure != _MEASURED or report["model"]]
-    first = [figure for figure in shown if figure in FIGURES[:_BY_CELL]]
+    shown = [figure for figure in METRICS if figure != _MEASURED or report["model"]]
+    first = [figure for figure in shown if figure in METRICS[:_BY_CELL]]
     yield Sheet(
         f"mean ± standard deviation; interquartile mean [its 95 % interval]; episodes of {report['steps']} steps",
         ["figure", *names],

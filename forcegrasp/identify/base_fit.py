@@ -49,7 +49,7 @@ def fit_base(
     small = _Subset(target, problem, few, first)
     ends = [small.fit(small.known)]
     while len(ends) < STARTS or (len(ends) < MOST_STARTS and not _agree(ends, small.target)):
-        ends.append(small.fit(_elsewhere(small.problem, guess(small.target, small.problem), rng)))
+        ends.append(small.fit(_random_start(small.problem, guess(small.target, small.problem), rng)))
         most = STARTS if len(ends) <= STARTS else MOST_STARTS
         progress(f"base model, start {len(ends)} of {most}: {rms_error(ends[-1], small.target):.2f} × noise")
     best = min(ends, key=lambda f: f.cost)
@@ -82,7 +82,7 @@ def _agree(ends: Sequence[Fit], target: Target) -> bool:
 
 
 def check_gradient(fit: Fit, target: Target, errors: tuple[float, ...] = ()) -> BaseFit:
-    """The part of the gate that one fit can pass or not: its error must be level where it ended."""
+    """The part of the gate that one fit can pass or not: projected gradient of at most 5 standard errors."""
     if fit.gradient > _FLAT * max(1.0, rms_error(fit, target)):
         reason = f"the error still falls where the fit ended (slope of {fit.gradient:.1f} standard errors)"
         return BaseFit(fit, errors, False, reason)
@@ -94,11 +94,11 @@ def rms_error(fit: Fit, target: Target) -> float:
     return float(np.sqrt(fit.cost / target.readings))
 
 
-def _elsewhere(problem: Problem, felt: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """A random place inside the bounds; but objects stay where the fingers felt them, or there is nothing to fit."""
-    anywhere = problem.low + rng.uniform(0.2, 0.8, len(felt)) * (problem.high - problem.low)
+def _random_start(problem: Problem, contact_estimate: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """A random place inside the bounds; but objects stay where contacts put them, or there is nothing to fit."""
+    anywhere = problem.low + rng.uniform(0.2, 0.8, len(contact_estimate)) * (problem.high - problem.low)
     geometry = np.array([e.effect < 0 and e.parameter in ("radius_m", "offset_m") for e in problem.entries])
-    return np.where(geometry, felt, anywhere)
+    return np.where(geometry, contact_estimate, anywhere)
 
 
 def _few_grasps(target: Target) -> np.ndarray:

@@ -15,7 +15,7 @@ from forcegrasp.short_repr import ShortRepr, counted
 
 # Slopes are measured anew after so many steps; in between they follow the values (Broyden 1965), if they are few.
 _SLOPES_LAST, _FEW = 3, 16
-# Step of the finite differences in a problem's coordinates: far above the chaos of the contacts, within the bend.
+# Step of the finite differences in a problem's coordinates: above contact noise, within the linear range.
 _STEP = 0.02
 # Relative change of the cost at which a fit ends, one that only ranks, and the most evaluations until then.
 _TOLERANCE, _ROUGH, _EVALUATIONS = 1e-4, 1e-3, 15

@@ -1,4 +1,4 @@
-"""Where objects are and how wide, as far as the fingers felt it: a start for fits of sets that do not say."""
+"""Where objects are and how wide, as far as contacts show: a start for fits of sets that do not say."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ def guess(target: Target, problem: Problem) -> np.ndarray:
             offsets[index] = (pads[first, finger] - radii[index]) * (1 if finger else -1)
     vector = problem.start()
     for place, entry in enumerate(problem.entries):
-        felt = {"radius_m": radii, "offset_m": offsets}.get(entry.parameter)
-        if entry.effect < 0 and felt is not None and np.isfinite(felt[entry.members]).any():
-            vector[place] = entry.coordinate(float(np.nanmedian(felt[entry.members])))
+        estimate = {"radius_m": radii, "offset_m": offsets}.get(entry.parameter)
+        if entry.effect < 0 and estimate is not None and np.isfinite(estimate[entry.members]).any():
+            vector[place] = entry.coordinate(float(np.nanmedian(estimate[entry.members])))
     return vector
 
 

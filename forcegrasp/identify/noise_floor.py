@@ -15,7 +15,7 @@ from forcegrasp.replay.replay import Replay
 # Room for what the estimate of the floor misses: in all, and in a single signal and phase.
 _ROOM, _ROOM_IN_CELL = 1.03, 1.15
 # A residual beyond this many σ, and three times the numerical error there, is no noise; a few may be mishaps.
-_OUTLIER, _MISHAPS = 5.0, 3
+_OUTLIER, _MAX_OUTLIERS = 5.0, 3
 # Cells with fewer samples say nothing.
 _LEAST_SAMPLES = 40
 
@@ -71,7 +71,7 @@ def excess(residual: np.ndarray, numerical: Sequence[np.ndarray], target: Target
         if error > floor * _ROOM_IN_CELL:
             return f"{name}: {error:.2f} × noise, {floor:.2f} is the floor"
     far = np.abs(residual) > _OUTLIER + 3 * (2 * np.abs(numerical[0]) + np.abs(numerical[1]))
-    if far.sum() > max(_MISHAPS, 2e-4 * target.readings):
+    if far.sum() > max(_MAX_OUTLIERS, 2e-4 * target.readings):
         return f"{far.sum()} readings are more than {_OUTLIER:g} σ off"
     return ""
 

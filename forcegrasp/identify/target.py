@@ -18,7 +18,7 @@ PHASES = ("free", "first_contact", "both", "hold", "release")
 # Rounding to steps smaller than this many σ is hidden by the noise.
 _QUANTUM = 1.0
 # A command that has not changed for this long is held; contact is young, or just lost, for this long. Seconds.
-_HELD_S, _YOUNG_S = 0.3, 0.2
+_HELD_S, _TRANSITION_S = 0.3, 0.2
 # Without a force sensor: a motor that moves by less than this share of its largest command step hardly moves.
 _STALL = 0.1
 
@@ -193,9 +193,9 @@ def find_phases(grasp: MeasuredGrasp, sigma: np.ndarray, gripper: Gripper) -> np
         opening[index] = last > 0
     phase = np.where(both & held, PHASES.index("hold"), PHASES.index("both"))
     since_both = _time_since_start(time, both)
-    phase[any_touch & (~both | (since_both < _YOUNG_S))] = PHASES.index("first_contact")
+    phase[any_touch & (~both | (since_both < _TRANSITION_S))] = PHASES.index("first_contact")
     phase[~any_touch] = PHASES.index("free")
-    recently = _time_since_end(time, any_touch) < _YOUNG_S
+    recently = _time_since_end(time, any_touch) < _TRANSITION_S
     leaving = opening & ((any_touch & ~(both & held)) | (~any_touch & recently))
     phase[leaving] = PHASES.index("release")
     return phase

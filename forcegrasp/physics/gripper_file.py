@@ -107,9 +107,9 @@ def _of_first_format(path: Path, raw: dict[str, Any]) -> dict[str, Any]:
 
 
 def _parse(path: Path, raw: dict[str, Any]) -> Gripper:
-    thing = raw["object"]
-    _demand(path, "object.", thing, {"joint", "geom", "axis"})
-    if thing["axis"] not in ("x", "y", "z"):
+    grasped = raw["object"]
+    _demand(path, "object.", grasped, {"joint", "geom", "axis"})
+    if grasped["axis"] not in ("x", "y", "z"):
         raise ConfigError(f"{path}: object.axis: must be x, y or z")
     if raw.get("fast", "none") not in ("none", "sphere"):
         raise ConfigError(f"{path}: fast: must be none or sphere")
@@ -146,9 +146,9 @@ def _parse(path: Path, raw: dict[str, Any]) -> Gripper:
         motors=motors,
         fingers=(sides[0], sides[1]),
         force=force,
-        object_joint=_text(path, "object.joint", thing["joint"]),
-        object_geom=_text(path, "object.geom", thing["geom"]),
-        axis="xyz".index(thing["axis"]),
+        object_joint=_text(path, "object.joint", grasped["joint"]),
+        object_geom=_text(path, "object.geom", grasped["geom"]),
+        axis="xyz".index(grasped["axis"]),
         period_s=_positive(path, "control.period_s", control.get("period_s", _PERIOD_S)),
         max_step=_positive(path, "control.max_step", control.get("max_step", strokes[0] * _STEP)),
         parameters=parameters,

@@ -95,14 +95,14 @@ def make_plan(
     widest = float(gripper.opening.opening_m[-1]) / 2
     planned = []
     for index in range(grasps):
-        turn, thing = divmod(index, len(radii_m))
-        radius = radii_m[thing]
+        turn, object_index = divmod(index, len(radii_m))
+        radius = radii_m[object_index]
         speed, depth = (1.0, 1.0) if simple else (rng.uniform(0.8, 1.25), rng.uniform(0.5, 1.0))
         room = min(widest - radius, radius / 3, widest / 8)
-        off_centre = (turn + thing) % 2 == 1 and not simple
+        off_centre = (turn + object_index) % 2 == 1 and not simple
         offset = rng.uniform(0.3, 0.8) * room * rng.choice([-1, 1]) if off_centre else 0.0
         offset = float(np.clip(offset, *offset_limits_m(gripper, radius, 0.0)))
-        kind, contact = kinds[(turn + thing) % len(kinds)], float(gripper.contact_position(radius))
+        kind, contact = kinds[(turn + object_index) % len(kinds)], float(gripper.contact_position(radius))
         command = make_command(kind, contact, gripper.stroke, depth * deepest, speed, len(gripper.motors))
-        planned.append(PlannedGrasp(thing, kind, offset, command))
+        planned.append(PlannedGrasp(object_index, kind, offset, command))
     return planned

@@ -71,10 +71,10 @@ def record(
     of_objects = {p.name: _draw(p, objects, rng) for p in parameters if p.scope == "object" and p.name != "radius_m"}
     radii = rng.uniform(*_RADII, objects) * (gripper.opening.opening_m[-1] / 2)
     planned = make_plan(plan, radii, grasps, gripper, rng)
-    thing = np.array([p.object for p in planned])
+    object_index = np.array([p.object for p in planned])
     base = {name: np.full(grasps, value) for name, value in of_gripper.items()}
-    base |= {name: values[thing] for name, values in of_objects.items()}
-    base |= {"radius_m": radii[thing], "offset_m": np.array([p.offset_m for p in planned])}
+    base |= {name: values[object_index] for name, values in of_objects.items()}
+    base |= {"radius_m": radii[object_index], "offset_m": np.array([p.offset_m for p in planned])}
     time, rest = np.arange(SAMPLES) * PERIOD_S, np.full((SAMPLES, len(gripper.motors)), gripper.stroke)
     unloaded = np.zeros((SAMPLES, len(gripper.forces)))
     bare = [

@@ -5,7 +5,7 @@ from __future__ import annotations
 import shlex
 
 from forcegrasp.config import TrainConfig
-from forcegrasp.env.episodes import FIGURES
+from forcegrasp.env.episodes import METRICS
 from forcegrasp.runs.provenance import experiment
 from forcegrasp.runs.run_dir import RunDir
 
@@ -70,7 +70,7 @@ def evaluate_command(run: RunDir, config: TrainConfig) -> str:
 
 def card(run: RunDir, config: TrainConfig) -> str:
     """What this run is, how to go on with it and what the names mean, as Markdown."""
-    meanings = "\n".join(f"* `{name}`: {meaning}" for name, meaning in FIGURES.items())
+    meanings = "\n".join(f"* `{name}`: {meaning}" for name, meaning in METRICS.items())
     simulator = f"the model `{config.model}`, kept as `{run.model_path}`" if config.model else "the nominal gripper"
     title = f"{experiment(run.path) or 'training'}, seed {config.seed}" + (config.model and f", model {config.model}")
     return f"""# {title}

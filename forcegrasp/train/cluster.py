@@ -84,7 +84,7 @@ def reserve(config: TrainConfig) -> dict[str, Any]:
 
 
 @contextmanager
-def told_plainly() -> Iterator[None]:
+def translate_ray_errors() -> Iterator[None]:
     """Turns an error of a worker into what it would be in this process, and the loss of a worker into a line.
 
     Raises:

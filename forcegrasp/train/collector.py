@@ -28,7 +28,7 @@ from forcegrasp.train import cluster
 
 
 class GraspCollector(Collector):
-    """Endless batches of whole episodes, each from a fresh reset; between batches it can be told the next one's terms.
+    """Endless batches of whole episodes, each from a fresh reset; curriculum and weights are set between batches.
 
     Batches don't share state, which is what makes a resumed run bit-identical.
 
@@ -129,7 +129,7 @@ def make_collector(
     states = [torch.get_rng_state()]
     for worker in range(1, config.collector.workers):
         states.append(torch.Generator().manual_seed(worker_seed(config.seed, worker)).get_state())
-    with cluster.told_plainly():
+    with cluster.translate_ray_errors():
         return RayCollector(
             [functools.partial(_worker_env, config, model, worker, state) for worker, state in enumerate(states)],
             policy,
@@ -168,7 +168,7 @@ def collecting(collector: GraspCollector | RayCollector) -> Iterator[Iterator[Te
         if isinstance(collector, GraspCollector):
             yield iter(collector)
         else:
-            with cluster.told_plainly():
+            with cluster.translate_ray_errors():
                 yield iter(collector)
     finally:
         collector.shutdown()

@@ -306,11 +306,11 @@ def test_refining_finds_a_large_threshold(fitted, threshold):
     assert 1 <= len(refined) == len(told) <= len(scores)
     best = min(refined, key=lambda r: r.fit.cost)
     assert best.score.variant == zone.variants[0]
-    settled = fit_exactly(target, best.fit.problem, fitted.simulators, best.fit.vector)
-    assert settled.values[-1] == pytest.approx(0.4, rel=0.05)
-    assert rms_error(settled, target) < 1.1 < rms_error(fit, target)
+    refined = fit_exactly(target, best.fit.problem, fitted.simulators, best.fit.vector)
+    assert refined.values[-1] == pytest.approx(0.4, rel=0.05)
+    assert rms_error(refined, target) < 1.1 < rms_error(fit, target)
     promised = max(s.gain for s in sized)
-    assert promised > 0.5 * (fit.cost - settled.cost)  # what `refine` goes by when it leaves effects out
+    assert promised > 0.5 * (fit.cost - refined.cost)  # what `refine` goes by when it leaves effects out
 
 
 def test_signatures_are_simulated_when_asked_for_and_kept(fitted, threshold, monkeypatch):

@@ -47,7 +47,7 @@ def test_what_convinces(made_up, changed, taken):
     gains = changed.get("gains")
     if gains is not None and len(gains) == 4 and gains.std() > 1:
         assert gains.std(ddof=1) == pytest.approx(10)
-    assert diagnose._convincing(candidate(made_up, **changed), 0.02) == taken
+    assert diagnose._is_significant(candidate(made_up, **changed), 0.02) == taken
 
 
 @pytest.mark.parametrize(("ahead", "equal"), [(4.9, True), (5.1, False)])
@@ -57,7 +57,7 @@ def test_a_lead_within_its_standard_error_decides_nothing(made_up, ahead, equal)
     assert lead.std(ddof=1) == pytest.approx(10)
     winner = candidate(made_up, gains=100 + lead, signature=np.array([1.0, 0.0]))
     other = candidate(made_up, gains=np.full(4, 100.0), signature=np.array([0.0, 1.0]))
-    assert diagnose._equal(winner, other) == equal
+    assert diagnose._indistinguishable(winner, other) == equal
 
 
 # --- all steps -----------------------------------------------------------------------------------------------------

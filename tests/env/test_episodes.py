@@ -8,7 +8,7 @@ import torch
 from tensordict import TensorDict
 
 from forcegrasp.config import SensorConfig
-from forcegrasp.env.episodes import FIGURES, summarise
+from forcegrasp.env.episodes import METRICS, summarise
 
 # A wide band, which random forces meet now and then.
 SENSORS = SensorConfig(contact_threshold_n=0.05, force_std_n=0.15)
@@ -61,7 +61,7 @@ def _slow(rollout: TensorDict, sensors: SensorConfig, period: float) -> dict[str
     position = position.astype(float)
     terms = {key: value.double().numpy()[..., 0] for key, value in after["reward_terms"].items()}
     n, steps = force.shape[:2]
-    figures: dict[str, list[float]] = {name: [] for name in FIGURES}
+    figures: dict[str, list[float]] = {name: [] for name in METRICS}
     for i in range(n):
         had = [False, False]
         first = both = reached = steps
@@ -98,7 +98,7 @@ def _slow(rollout: TensorDict, sensors: SensorConfig, period: float) -> dict[str
 def test_figures_equal_a_loop_over_steps(n, steps, period):
     rollout = _random_rollout(n, steps, seed=steps)
     found, expected = summarise(rollout, SENSORS, period), _slow(rollout, SENSORS, period)
-    assert found.keys() == FIGURES.keys()
+    assert found.keys() == METRICS.keys()
     for name, values in expected.items():
         assert found[name].shape == (n,), name
         np.testing.assert_allclose(found[name], values, rtol=1e-5, atol=1e-5, err_msg=name)

@@ -14,7 +14,7 @@ from PIL import Image
 from rich.console import Console
 
 from forcegrasp.config import ActionConfig, EvaluateConfig, GraspConfig, PhysicsConfig, TrainConfig, validate
-from forcegrasp.env.episodes import FIGURES, summarise
+from forcegrasp.env.episodes import METRICS, summarise
 from forcegrasp.errors import CheckpointError, ConfigError
 from forcegrasp.evaluate.compare_policies import evaluate
 from forcegrasp.evaluate.contestants import load_contestants
@@ -96,7 +96,7 @@ def test_report_is_what_was_written(compared):
     assert report["cells"] == ["0", "0.5", "1"]
     assert list(report["policies"]) == ["force_pi", "close"]
     assert (report["seed"], report["trials"], report["physics"]) == (5, 4, "fast")
-    assert all(set(FIGURES) == set(figures) for figures in report["policies"].values())
+    assert all(set(METRICS) == set(figures) for figures in report["policies"].values())
 
 
 def test_one_row_per_trial_and_the_same_grasps_for_both(trials):
@@ -111,7 +111,7 @@ def test_one_row_per_trial_and_the_same_grasps_for_both(trials):
     np.testing.assert_allclose(grasps["close"], expected, rtol=1e-8)
 
 
-@pytest.mark.parametrize("figure", FIGURES)
+@pytest.mark.parametrize("figure", METRICS)
 def test_means_follow_from_the_trials(compared, trials, figure):
     for name, figures in compared[0]["policies"].items():
         values = np.array([row[figure] for row in trials if row["policy"] == name])

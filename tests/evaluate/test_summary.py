@@ -11,7 +11,7 @@ import pytest
 from matplotlib.figure import Figure
 from rich.console import Console
 
-from forcegrasp.env.episodes import FIGURES
+from forcegrasp.env.episodes import METRICS
 from forcegrasp.evaluate.contestants import Contestant
 from forcegrasp.evaluate.page import write_page
 from forcegrasp.evaluate.statistics import Bootstrap
@@ -26,7 +26,7 @@ def made_up(rewards: dict[str, float], baseline: str = "force_pi", **facts: str)
     rng, bootstrap = np.random.default_rng(0), Bootstrap(2, 20, 0)
     policies: dict[str, dict] = {}
     for name, mean in rewards.items():
-        values = {figure: rng.normal(100, 5, (2, 20)) for figure in FIGURES}
+        values = {figure: rng.normal(100, 5, (2, 20)) for figure in METRICS}
         values["force_reward_normalised"] += mean - values["force_reward_normalised"].mean()
         policies[name] = {figure: bootstrap.describe(value) for figure, value in values.items()}
         if name != baseline in rewards:

@@ -170,12 +170,12 @@ def test_starts_a_cluster_of_this_machine_or_joins_one(tiny, monkeypatch):
 def test_errors_of_workers_are_told_as_ones_own():
     errors = pytest.importorskip("ray.exceptions")
     diverged = errors.RayTaskError("next", "a long traceback", PhysicsError("grasp 3 diverged")).as_instanceof_cause()
-    with pytest.raises(PhysicsError, match=r"^grasp 3 diverged$"), cluster.told_plainly():
+    with pytest.raises(PhysicsError, match=r"^grasp 3 diverged$"), cluster.translate_ray_errors():
         raise diverged
     fault = errors.RayTaskError("next", "a long traceback", KeyError("x")).as_instanceof_cause()
-    with pytest.raises(KeyError), cluster.told_plainly():
+    with pytest.raises(KeyError), cluster.translate_ray_errors():
         raise fault
-    with pytest.raises(ForcegraspError, match="a worker or the Ray cluster is gone"), cluster.told_plainly():
+    with pytest.raises(ForcegraspError, match="a worker or the Ray cluster is gone"), cluster.translate_ray_errors():
         raise errors.ActorDiedError
 
 

@@ -12,7 +12,7 @@ import pytest
 from PIL import Image
 from tensorboard.plugins.custom_scalar import layout_pb2
 
-from forcegrasp.env.episodes import FIGURES
+from forcegrasp.env.episodes import METRICS
 from forcegrasp.runs.run_dir import RunDir
 from forcegrasp.train.board import CHARTS, OVERVIEW, tag
 from forcegrasp.train.logging import TrainingLog
@@ -101,7 +101,7 @@ def test_the_card_tells_how_to_go_on_and_what_the_names_mean(run, config):
     text = event.tensor_proto.string_val[0].decode()
     assert text.startswith(f"# ib, seed {config.seed}\n")
     assert f"resume={run.path}" in text
-    for name in FIGURES:
+    for name in METRICS:
         assert f"`{name}`" in text
 
 
