@@ -10,6 +10,7 @@ import pytest
 
 from forcegrasp.api import results
 from forcegrasp.diagnosis import advice
+from forcegrasp.diagnosis import workflow as diagnosis_workflow
 from forcegrasp.identify import noise_floor as floor
 from forcegrasp.identify import workflow
 from tests.compare.conftest import made_up as made_up  # a fixture
@@ -49,7 +50,8 @@ def work(made_up, monkeypatch, tmp_path) -> SimpleNamespace:
         "diagnose_set": (diagnosis, None),
         "add_effect": made_up.added,
     }.items():
-        monkeypatch.setattr(workflow, name, returns(name, value))
+        home = workflow if hasattr(workflow, name) else diagnosis_workflow
+        monkeypatch.setattr(home, name, returns(name, value))
     monkeypatch.setattr(advice, "advise", lambda diagnosis: made_up.advice)
     monkeypatch.setattr("forcegrasp.api.functions.advise", lambda diagnosis: made_up.advice)
     for module in (floor, results):

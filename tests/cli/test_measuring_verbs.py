@@ -132,14 +132,16 @@ def test_compare_writes_the_base_model_beside_the_report_and_suggests_it(folder,
 @pytest.mark.parametrize("verb", ["compare", "diagnose", "add"])
 @pytest.mark.parametrize("other", [True, False])
 def test_a_model_of_other_measurements_is_used_with_a_warning(verb, other, folder, capsys, monkeypatch):
+    from forcegrasp.diagnosis import workflow as diagnosis_workflow
     from forcegrasp.errors import ConfigError
     from forcegrasp.identify import workflow
 
     def stop(loaded, model, *rest):
         raise ConfigError(f"with {model.data['set']} and {len(loaded.warnings)} warnings")
 
-    for name in ("compare", "diagnose_set", "add_effect"):
-        monkeypatch.setattr(workflow, name, stop)
+    monkeypatch.setattr(workflow, "compare", stop)
+    for name in ("diagnose_set", "add_effect"):
+        monkeypatch.setattr(diagnosis_workflow, name, stop)
     if other:
         text = (folder / "model.yaml").read_text()
         (folder / "model.yaml").write_text(text.replace("fingerprint: ", "fingerprint: 0").replace("my_set", "hers"))
@@ -205,7 +207,7 @@ def test_a_table_of_final_forces(folder, capsys):
 
 
 def test_an_effect_that_does_not_help_is_not_added(folder, capsys, monkeypatch):
-    from forcegrasp.identify import workflow
+    from forcegrasp.diagnosis import workflow
 
     def useless(*arguments):
         return SimpleNamespace(error_before=1.0, error_after=0.996)

@@ -105,6 +105,7 @@ class BegunError(Exception):
 
 def begun(monkeypatch, verb: str, **values: Any) -> dict[str, Any]:
     """What a verb sets out to compute: the arguments of the first expensive step, and where it would write."""
+    from forcegrasp.diagnosis import workflow as diagnosis_workflow
     from forcegrasp.identify import workflow
 
     def told(value: Any) -> Any:
@@ -132,8 +133,9 @@ def begun(monkeypatch, verb: str, **values: Any) -> dict[str, Any]:
     monkeypatch.setattr("forcegrasp.cli.measuring.check_folder", lambda path: reached.setdefault("folder", path))
     monkeypatch.setattr("forcegrasp.cli.measuring.check_file", lambda path: reached.setdefault("file", path))
     monkeypatch.setattr("time.strftime", lambda *_: "NOW")
-    for name in ("fit_base", "diagnose", "add_effect"):
-        monkeypatch.setattr(workflow, name, stop)
+    monkeypatch.setattr(workflow, "fit_base", stop)
+    for name in ("diagnose", "add_effect"):
+        monkeypatch.setattr(diagnosis_workflow, name, stop)
     if verb == "diagnose":
         monkeypatch.setattr(workflow, "fit_model", fitted)
     if verb != "add":
