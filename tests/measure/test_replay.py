@@ -11,9 +11,10 @@ import pytest
 
 from forcegrasp.effects import Effect, catalogue, get_effect
 from forcegrasp.errors import PhysicsError
-from forcegrasp.measure import MeasuredGrasp, replay
+from forcegrasp.measure import MeasuredGrasp
 from forcegrasp.physics.gripper_file import load_gripper
 from forcegrasp.physics.plant import Plant, write_base
+from forcegrasp.replay import replay
 from forcegrasp.replay.replay import EffectOn, Replay, start_position
 
 TIAGO = load_gripper("tiago")
