@@ -154,8 +154,8 @@ def diagnose(grippers: list[str], sets: int, plain: int, grasps: int, folder: Pa
 def diagnose_one(gripper: str, hidden: str, seed: int, grasps: int) -> dict[str, Any]:
     """Records one set, with an effect of typical size, and diagnoses it; the diagnosis is told nothing."""
     from forcegrasp.config import RecordConfig
-    from forcegrasp.diagnosis.workflow import diagnose_set
-    from forcegrasp.identify.workflow import Loaded
+    from forcegrasp.diagnosis.diagnose_set import diagnose_set
+    from forcegrasp.identify.loading import Loaded
     from forcegrasp.physics import load_gripper
     from forcegrasp.physics.completion import complete
     from forcegrasp.replay.record import parse_effect, record

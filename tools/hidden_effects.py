@@ -76,8 +76,9 @@ def right_names(job: Job) -> set[str]:
 def run_job(job: Job) -> dict:
     """Records and diagnoses one set."""
     from forcegrasp.cli.measuring import refuse_table
-    from forcegrasp.diagnosis import workflow as diagnosis_workflow
-    from forcegrasp.identify import workflow
+    from forcegrasp.diagnosis.diagnose_set import diagnose_set
+    from forcegrasp.identify.fitted_model import model_of
+    from forcegrasp.identify.loading import load
     from forcegrasp.replay import replay
     from tests.independent.rig import record
 
@@ -86,10 +87,10 @@ def run_job(job: Job) -> dict:
     try:
         truth = record(folder / "set", dict.fromkeys(job.hidden, job.size), job.seed, job.grasps, contact=job.contact)
         started, busy = time.perf_counter(), time.process_time()
-        loaded = refuse_table(workflow.load(folder / "set"), "fit")
-        diagnosis, _ = diagnosis_workflow.diagnose_set(loaded, None, [], 0, lambda text: None)
+        loaded = refuse_table(load(folder / "set"), "fit")
+        diagnosis, _ = diagnose_set(loaded, None, [], 0, lambda text: None)
         seconds, processor = time.perf_counter() - started, time.process_time() - busy
-        model = workflow.model_of(diagnosis.fit, diagnosis.target, loaded, diagnosis.numerical)
+        model = model_of(diagnosis.fit, diagnosis.target, loaded, diagnosis.numerical)
     finally:
         shutil.rmtree(folder, ignore_errors=True)
     return {

@@ -11,8 +11,8 @@ from pathlib import Path
 from mujoco.batch import Batch
 
 from forcegrasp.cli.measuring import refuse_table
-from forcegrasp.diagnosis import workflow as diagnosis_workflow
-from forcegrasp.identify import workflow
+from forcegrasp.diagnosis.diagnose_set import diagnose_set
+from forcegrasp.identify.loading import load
 from forcegrasp.replay import replay
 from forcegrasp.replay.replay import Replay
 
@@ -69,9 +69,9 @@ def main() -> None:
     watch(Replay, "simulate", simulated)
     for name in ("step", "rollout"):
         watch(Batch, name, stepped)
-    loaded = refuse_table(workflow.load(arguments.set), "fit")
+    loaded = refuse_table(load(arguments.set), "fit")
     wall, processor = time.perf_counter(), time.process_time()
-    diagnosis, _ = diagnosis_workflow.diagnose_set(loaded, None, [], 0, lambda text: None)
+    diagnosis, _ = diagnose_set(loaded, None, [], 0, lambda text: None)
     wall, processor = time.perf_counter() - wall, time.process_time() - processor
     print(f"{diagnosis.verdict} {', '.join(diagnosis.effects)}: {wall:.0f} s, {processor:.0f} s of processor time")
     for name, seconds in sorted(spent.items(), key=lambda item: -item[1]):

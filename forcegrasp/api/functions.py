@@ -17,12 +17,13 @@ from forcegrasp.api.results import (
 from forcegrasp.cli import measuring
 from forcegrasp.cli.results import default_out
 from forcegrasp.config import CompareConfig, DiagnoseConfig, FitConfig, validate
-from forcegrasp.diagnosis import workflow as diagnosis_workflow
+from forcegrasp.diagnosis import add_effect, diagnose_set
 from forcegrasp.diagnosis.advice import advise
 from forcegrasp.errors import ConfigError
 from forcegrasp.final_force.analysis import analyse_table
-from forcegrasp.identify import workflow
-from forcegrasp.identify.workflow import Loaded, Progress
+from forcegrasp.identify import compare_set, fit_set, loading
+from forcegrasp.identify.loading import Loaded
+from forcegrasp.identify.progress import Progress
 from forcegrasp.measure import FinalForceTable, MeasurementSet
 from forcegrasp.models.model_file import Model, read_model, write_model
 from forcegrasp.short_repr import cut
@@ -46,7 +47,7 @@ def load(path: str | Path) -> Loaded[MeasurementSet] | Loaded[FinalForceTable]:
       MeasurementError: if the set can't be right: file, row, column and what to do.
       ConfigError: if its gripper is unknown.
     """
-    return workflow.load(path)
+    return loading.load(path)
 
 
 def compare(
@@ -70,7 +71,7 @@ def compare(
     if measuring.is_table(loaded):
         return _analyse(loaded, "compare", model=model)
     given, loaded = (None, loaded) if model is None else _beside(model, loaded, show)
-    comparison, used, notes = workflow.compare(loaded, given, seed, show)
+    comparison, used, notes = compare_set.compare(loaded, given, seed, show)
     name = "" if model is None else _name(model)
     return CompareResult(loaded, comparison, used, name, (*notes, *used.warnings))
 
@@ -92,7 +93,7 @@ def fit(data: AnySet, *, out: str | Path | None = None, seed: int = 0, progress:
     path = _file(out)
     loaded, show = _open(data, progress)
     grasps = measuring.refuse_table(loaded, "fit")
-    target, _, base = workflow.fit_model(grasps, seed, show)
+    target, _, base = fit_set.fit_model(grasps, seed, show)
     return _written(FitResult(grasps, target, base, measuring.base_model(base, target, grasps), path))
 
 
@@ -124,9 +125,9 @@ def diagnose(
     loaded, show = _open(data, progress)
     if measuring.is_table(loaded):
         return _analyse(loaded, "diagnosis", model=model, effects=only)
-    tried = diagnosis_workflow.chosen_effects(loaded.gripper, only)
+    tried = diagnose_set.chosen_effects(loaded.gripper, only)
     given, loaded = (None, loaded) if model is None else _beside(model, loaded, show)
-    diagnosis, _ = diagnosis_workflow.diagnose_set(loaded, given, [effect.name for effect in tried], seed, show)
+    diagnosis, _ = diagnose_set.diagnose_set(loaded, given, [effect.name for effect in tried], seed, show)
     return DiagnoseResult(loaded, diagnosis, advise(diagnosis), tuple(tried), only, given is None)
 
 
@@ -157,9 +158,9 @@ def add(
     loaded, show = _open(data, progress)
     grasps = measuring.refuse_table(loaded, "add")
     measuring.refuse_one_grasp(grasps)
-    (chosen,) = diagnosis_workflow.chosen_effects(grasps.gripper, [effect])
+    (chosen,) = diagnose_set.chosen_effects(grasps.gripper, [effect])
     given, grasps = _beside(model, grasps, show)
-    added = diagnosis_workflow.add_effect(grasps, given, chosen, show)
+    added = add_effect.add_effect(grasps, given, chosen, show)
     measuring.refuse_useless(added, chosen, "forcegrasp.diagnose")
     return _written(AddResult(grasps, added, chosen, path))
 
@@ -202,7 +203,7 @@ def _nothing(line: str) -> None:
 def _beside(model: AnyModel, loaded: Loaded[MeasurementSet], show: Progress) -> tuple[Model, Loaded[MeasurementSet]]:
     """The model, and the set, with a warning if the model was fitted to another one."""
     given = _model(model)
-    warned = workflow.warn_of_other_set(loaded, given, _name(model))
+    warned = loading.warn_of_other_set(loaded, given, _name(model))
     for warning in warned.warnings[len(loaded.warnings) :]:
         show(f"warning: {warning}")
     return given, warned

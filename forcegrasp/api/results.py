@@ -8,18 +8,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from forcegrasp.cli import measuring
+from forcegrasp.diagnosis.add_effect import Added
 from forcegrasp.diagnosis.advice import Advice
-from forcegrasp.diagnosis.search import Diagnosis
-from forcegrasp.diagnosis.workflow import Added
+from forcegrasp.diagnosis.result import Diagnosis
 from forcegrasp.effects import Effect
 from forcegrasp.final_force.analysis import TableAnalysis
-from forcegrasp.identify import workflow
 from forcegrasp.identify.base_fit import BaseFit
 from forcegrasp.identify.comparison import Comparison
 from forcegrasp.identify.cross_validation import rms
+from forcegrasp.identify.fitted_model import model_of
+from forcegrasp.identify.loading import Loaded
 from forcegrasp.identify.noise_floor import numerical_error
 from forcegrasp.identify.target import Target
-from forcegrasp.identify.workflow import Loaded
 from forcegrasp.measure import FinalForceTable, MeasurementSet
 from forcegrasp.models.model_file import Model
 from forcegrasp.reports import comparison as comparison_report
@@ -200,7 +200,7 @@ class DiagnoseResult(Result):
         if self.verdict not in ("effect", "one_of"):
             return self._base_model
         numerical = numerical_error(diagnosis.fit, diagnosis.target)
-        return workflow.model_of(diagnosis.fit, diagnosis.target, self.data, numerical)
+        return model_of(diagnosis.fit, diagnosis.target, self.data, numerical)
 
     @cached_property
     def _base_model(self) -> Model:

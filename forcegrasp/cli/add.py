@@ -36,20 +36,20 @@ def main(arguments: list[str]) -> int:
         tell_warnings,
         write_results,
     )
-    from forcegrasp.diagnosis import workflow as diagnosis_workflow
-    from forcegrasp.identify import workflow
+    from forcegrasp.diagnosis import add_effect, diagnose_set
+    from forcegrasp.identify import loading
     from forcegrasp.models.model_file import write_model
     from forcegrasp.reports import fit as fit_report
 
     check_effects("effect", [config.effect])
     folder = check_folder(default_out("add", ""))
     path = check_file(folder / "model.yaml" if not config.out else need(config.out, "out", "better.yaml"))
-    loaded = refuse_table(workflow.load(data), "add")
+    loaded = refuse_table(loading.load(data), "add")
     refuse_one_grasp(loaded)
-    (effect,) = diagnosis_workflow.chosen_effects(loaded.gripper, [config.effect])
+    (effect,) = diagnose_set.chosen_effects(loaded.gripper, [config.effect])
     model, loaded = take_model(old, loaded)
     tell_warnings(loaded)
-    added = diagnosis_workflow.add_effect(loaded, model, effect, progress_printer())
+    added = add_effect.add_effect(loaded, model, effect, progress_printer())
     refuse_useless(added, effect, f"forcegrasp diagnose data={data} model={old}")
     lead = fit_report.add_answer(added, effect)
     print_table(fit_report.printed_fall(added, effect))

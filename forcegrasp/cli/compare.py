@@ -34,18 +34,18 @@ def main(arguments: list[str]) -> int:
         tell_warnings,
         write_results,
     )
-    from forcegrasp.identify import workflow
+    from forcegrasp.identify import compare_set, loading
     from forcegrasp.models.model_file import write_model
     from forcegrasp.reports import comparison as comparison_report
 
     out = check_folder(default_out("compare", config.out))
-    loaded = workflow.load(data)
+    loaded = loading.load(data)
     if is_table(loaded):
         report_table(loaded, "compare", out, model=config.model)
         return 0
     model, loaded = take_model(Path(config.model), loaded) if config.model else (None, loaded)
     tell_warnings(loaded)
-    comparison, used, notes = workflow.compare(loaded, model, config.seed, progress_printer())
+    comparison, used, notes = compare_set.compare(loaded, model, config.seed, progress_printer())
     notes, name = [*notes, *used.warnings], config.model or "base model, fitted to this set"
     lead = comparison_report.answer(comparison)
     print_table(comparison_report.printed(comparison))

@@ -41,24 +41,23 @@ def main(arguments: list[str]) -> int:
         tell_warnings,
         write_results,
     )
-    from forcegrasp.diagnosis import workflow as diagnosis_workflow
+    from forcegrasp.diagnosis import diagnose_set
     from forcegrasp.diagnosis.advice import advise
-    from forcegrasp.identify import workflow
+    from forcegrasp.identify import loading
+    from forcegrasp.identify.fitted_model import model_of
     from forcegrasp.models.model_file import write_model
     from forcegrasp.reports import diagnosis as diagnosis_report
 
     check_effects("effects", config.effects)
     out = check_folder(default_out("diagnose", config.out))
-    loaded = workflow.load(data)
+    loaded = loading.load(data)
     if is_table(loaded):
         report_table(loaded, "diagnosis", out, model=config.model, effects=config.effects)
         return 0
-    tried = diagnosis_workflow.chosen_effects(loaded.gripper, config.effects)
+    tried = diagnose_set.chosen_effects(loaded.gripper, config.effects)
     model, loaded = take_model(Path(config.model), loaded) if config.model else (None, loaded)
     tell_warnings(loaded)
-    diagnosis, _ = diagnosis_workflow.diagnose_set(
-        loaded, model, [e.name for e in tried], config.seed, progress_printer()
-    )
+    diagnosis, _ = diagnose_set.diagnose_set(loaded, model, [e.name for e in tried], config.seed, progress_printer())
     advice = advise(diagnosis)
     lead, table = diagnosis_report.answer(diagnosis), diagnosis_report.printed(diagnosis)
     if config.effects:
@@ -72,7 +71,7 @@ def main(arguments: list[str]) -> int:
         print(f"wrote {known}: the base model, fitted to this set")
     if diagnosis.verdict in ("effect", "one_of"):
         print(f"add it: forcegrasp add data={data} model={known} effect={diagnosis.effects[0]} out=better.yaml")
-        better = workflow.model_of(diagnosis.fit, diagnosis.target, loaded, diagnosis.numerical)
+        better = model_of(diagnosis.fit, diagnosis.target, loaded, diagnosis.numerical)
         write_model(better, out / "model.yaml")
         print(f"or take the model with {', '.join(e.effect.name for e in better.effects)}: {out / 'model.yaml'}")
     write_results(

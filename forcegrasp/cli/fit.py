@@ -29,15 +29,15 @@ def main(arguments: list[str]) -> int:
         tell_warnings,
         write_results,
     )
-    from forcegrasp.identify import workflow
+    from forcegrasp.identify import fit_set, loading
     from forcegrasp.models.model_file import write_model
     from forcegrasp.reports import fit as fit_report
 
     folder = check_folder(default_out("fit", ""))
     path = check_file(folder / "model.yaml" if not config.out else need(config.out, "out", "model.yaml"))
-    loaded = refuse_table(workflow.load(data), "fit")
+    loaded = refuse_table(loading.load(data), "fit")
     tell_warnings(loaded)
-    target, _, base = workflow.fit_model(loaded, config.seed, progress_printer())
+    target, _, base = fit_set.fit_model(loaded, config.seed, progress_printer())
     model = base_model(base, target, loaded)
     lead = fit_report.fit_answer(base, target)
     print_table(fit_report.printed_parameters(model))

@@ -14,12 +14,12 @@ from forcegrasp.errors import ConfigError, closest
 if TYPE_CHECKING:
     from typing_extensions import TypeIs
 
-    from forcegrasp.diagnosis.workflow import Added
+    from forcegrasp.diagnosis.add_effect import Added
     from forcegrasp.effects import Effect
     from forcegrasp.final_force.analysis import TableAnalysis
     from forcegrasp.identify.base_fit import BaseFit
+    from forcegrasp.identify.loading import Loaded
     from forcegrasp.identify.target import Target
-    from forcegrasp.identify.workflow import Loaded
     from forcegrasp.measure import FinalForceTable, MeasurementSet
     from forcegrasp.models.model_file import Model
     from forcegrasp.reports.html import Section
@@ -59,7 +59,7 @@ def check_file(file: Path) -> Path:
 
 def take_model(path: Path, loaded: Loaded[MeasurementSet]) -> tuple[Model, Loaded[MeasurementSet]]:
     """Reads a model, and returns it and the set, with a warning if the model was fitted to another one."""
-    from forcegrasp.identify.workflow import warn_of_other_set
+    from forcegrasp.identify.loading import warn_of_other_set
     from forcegrasp.models.model_file import read_model
 
     model = read_model(path)
@@ -99,8 +99,8 @@ def write_files(
 
 def base_model(base: BaseFit, target: Target, loaded: Loaded[MeasurementSet]) -> Model:
     """A fitted base model, which says if it is not to be believed."""
+    from forcegrasp.identify.fitted_model import model_of
     from forcegrasp.identify.noise_floor import numerical_error
-    from forcegrasp.identify.workflow import model_of
 
     model = model_of(base.fit, target, loaded, numerical_error(base.fit, target))
     if base.converged:

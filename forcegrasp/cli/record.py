@@ -34,8 +34,8 @@ def main(arguments: list[str]) -> int:
     effects, known = [parse_effect(text, gripper) for text in config.effects], {}
     if model:
         known = {name: fitted.value for name, fitted in model.base.items()}
-        effects = [*((e.effect, e.variant, e.values) for e in model.effects), *effects]
-    names = [effect.name for effect, _, _ in effects]
+        effects = [*(e.setting for e in model.effects), *effects]
+    names = [one.effect.name for one in effects]
     for name in names:
         if names.count(name) > 1:
             raise ConfigError(f"effects: {name} is there twice")

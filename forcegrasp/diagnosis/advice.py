@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from forcegrasp.diagnosis.search import Candidate, Diagnosis
+from forcegrasp.diagnosis.result import Candidate, Diagnosis
 from forcegrasp.identify.predict import Case, predict
 from forcegrasp.measure.schema import MeasuredGrasp
 from forcegrasp.physics.sampling import offset_limits_m
@@ -43,7 +43,7 @@ def advise(diagnosis: Diagnosis) -> Advice | None:
         return None
     target, problem = diagnosis.target, rivals[0].fit.problem
     # the object that gives the largest forces shows most
-    forces = target.signals[..., target.forces]
+    forces = target.signals[..., target.axis.forces]
     strengths = [forces[i, target.mask[i]].mean() if forces.size else 0.0 for i in range(len(target.grasps))]
     model_grasp = int(np.argmax(strengths))
     cases = [r.fit.problem.case(r.fit.vector) for r in rivals]
@@ -80,6 +80,6 @@ def advise(diagnosis: Diagnosis) -> Advice | None:
 
 def _rivals(diagnosis: Diagnosis) -> tuple[Candidate, Candidate] | None:
     for step in reversed(diagnosis.steps):
-        if len(step.candidates) > 1 and (step.verdict != "none" or len(diagnosis.steps) == 1):
+        if len(step.candidates) > 1 and (step.effects or len(diagnosis.steps) == 1):
             return step.candidates[0], step.candidates[1]
     return None

@@ -73,7 +73,7 @@ def unlike_said(
     for k, signal in enumerate(one):
         values, floor = residual[..., k], numerical_floor(numerical, target, signal)
         scores, beyond = _normal_scores(values, _there(values, target)), 1 - (min(floor, core[k]) / times[k]) ** 2
-        groups = _partitions(target, predicted[..., target.side_of(k)])
+        groups = _partitions(target, predicted[..., target.axis.side_of(k)])
         if _is_white(scores, beyond, groups) and not _some_group_as_said(values / floor, groups):
             clean[..., k], unlike[k] = scores, True
     return None if excess(clean, numerical, target) else Noise(times, core, unlike)

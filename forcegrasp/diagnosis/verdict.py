@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from forcegrasp.identify.verdict import Verdict
+
 #: Effects must explain this share of the mean square beyond the noise to be the answer; below it is "unknown".
 EXPLAINED = 0.5
 #: Where more than so many times the floor is left, they must explain this share of it: a look-alike takes half.
@@ -23,7 +25,7 @@ def explained_share(before: float, after: float, noise: float = 1.0) -> float:
     return (before**2 - after**2) / max(before**2 - noise**2, 1e-9)
 
 
-def conclude(found: Sequence[str], before: float, after: float, floor: float, left: bool) -> str:
+def conclude(found: Sequence[Verdict], before: float, after: float, floor: float, left: bool) -> Verdict:
     """The verdict: that of the weakest step, if what was found explains enough.
 
     Args:
@@ -34,8 +36,8 @@ def conclude(found: Sequence[str], before: float, after: float, floor: float, le
       left: whether something is left that is neither.
     """
     if not found:
-        return "unknown" if left else "explained"
+        return Verdict.UNKNOWN if left else Verdict.EXPLAINED
     enough = EXPLAINED_FAR if after > FAR * floor else EXPLAINED
     if left and explained_share(before, after) < enough:
-        return "unknown"
-    return "one_of" if "one_of" in found else "effect"
+        return Verdict.UNKNOWN
+    return Verdict.ONE_OF if Verdict.ONE_OF in found else Verdict.EFFECT

@@ -97,7 +97,7 @@ def rms_error(fit: Fit, target: Target) -> float:
 def _random_start(problem: Problem, contact_estimate: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     """A random place inside the bounds; but objects stay where contacts put them, or there is nothing to fit."""
     anywhere = problem.low + rng.uniform(0.2, 0.8, len(contact_estimate)) * (problem.high - problem.low)
-    geometry = np.array([e.effect < 0 and e.parameter in ("radius_m", "offset_m") for e in problem.entries])
+    geometry = np.array([e.effect is None and e.parameter in ("radius_m", "offset_m") for e in problem.entries])
     return np.where(geometry, contact_estimate, anywhere)
 
 

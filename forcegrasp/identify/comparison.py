@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from forcegrasp.identify.cross_validation import rms
-from forcegrasp.identify.target import PHASES, Target, contacts
+from forcegrasp.identify.phases import PHASES, contacts
+from forcegrasp.identify.target import Target
 from forcegrasp.short_repr import ShortRepr
 
 #: What a residual is held against, in reports and where nothing explains it.
@@ -44,7 +45,7 @@ class Comparison(ShortRepr):
     def cells(self) -> list[Cell]:
         """One cell for each signal and phase that occurs."""
         found = []
-        for k, (signal, unit) in enumerate(zip(self.target.names, self.target.units, strict=True)):
+        for k, (signal, unit) in enumerate(zip(self.target.axis.names, self.target.axis.units, strict=True)):
             for index, phase in enumerate(PHASES):
                 inside = self.residual[..., k][self.target.phase == index]
                 if len(inside):
@@ -81,8 +82,8 @@ class Comparison(ShortRepr):
         """
         target = self.target
         inside = target.mask[..., None]
-        position = np.where(inside, self.predicted[..., target.positions], np.nan)
-        force = np.where(inside, self.predicted[..., target.forces], np.nan)
+        position = np.where(inside, self.predicted[..., target.axis.positions], np.nan)
+        force = np.where(inside, self.predicted[..., target.axis.forces], np.nan)
         motors = {
             name: np.full(position.shape, np.nan) for name in ("velocity_m_s", "direction", "command_m", "time_s")
         }
@@ -105,7 +106,7 @@ class Comparison(ShortRepr):
         """Covariate, signal kind and the share of the residual's variance that its bins explain, largest first."""
         shares = []
         for name, values in self.covariates().items():
-            for kind, part in self.target.kinds.items():
+            for kind, part in self.target.axis.kinds.items():
                 residual = self.residual[..., part]
                 share = _binned_share(of_width(values, residual.shape[-1]), residual, self.target.mask)
                 shares.append((name, kind, share))

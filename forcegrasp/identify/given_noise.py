@@ -8,7 +8,7 @@ import numpy as np
 
 from forcegrasp.errors import MeasurementError
 from forcegrasp.identify.rounding import find_step
-from forcegrasp.identify.target import third_differences
+from forcegrasp.identify.sensor_noise import third_differences
 from forcegrasp.measure.check_copies import is_noisy
 from forcegrasp.measure.folder import show
 from forcegrasp.measure.schema import MeasuredGrasp, MeasurementSet

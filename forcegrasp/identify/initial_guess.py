@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from forcegrasp.identify.phases import contacts
 from forcegrasp.identify.problem import Problem
-from forcegrasp.identify.target import Target, contacts
+from forcegrasp.identify.target import Target
 from forcegrasp.physics.gripper import Gripper
 
 
@@ -31,7 +32,7 @@ def guess(target: Target, problem: Problem) -> np.ndarray:
     vector = problem.start()
     for place, entry in enumerate(problem.entries):
         estimate = {"radius_m": radii, "offset_m": offsets}.get(entry.parameter)
-        if entry.effect < 0 and estimate is not None and np.isfinite(estimate[entry.members]).any():
+        if entry.effect is None and estimate is not None and np.isfinite(estimate[entry.members]).any():
             vector[place] = entry.coordinate(float(np.nanmedian(estimate[entry.members])))
     return vector
 

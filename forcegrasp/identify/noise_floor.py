@@ -8,8 +8,9 @@ import numpy as np
 
 from forcegrasp.identify.cross_validation import rms
 from forcegrasp.identify.fit import Fit
+from forcegrasp.identify.phases import PHASES
 from forcegrasp.identify.predict import predict
-from forcegrasp.identify.target import PHASES, Target
+from forcegrasp.identify.target import Target
 from forcegrasp.replay.replay import Replay
 
 # Room for what the estimate of the floor misses: in all, and in a single signal and phase.
@@ -82,7 +83,7 @@ def cells(target: Target) -> list[tuple[str, np.ndarray]]:
     for index, phase in enumerate(PHASES):
         inside = target.phase == index
         if inside.sum() >= _LEAST_SAMPLES:
-            for kind, part in target.kinds.items():
+            for kind, part in target.axis.kinds.items():
                 where = np.zeros(target.signals.shape, bool)
                 where[..., part] = inside[:, :, None]
                 found.append((f"{kind}s, {phase.replace('_', ' ')}", where))

@@ -8,17 +8,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from forcegrasp.effects import Effect
+from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.replay.replay import EffectOn, Motion, Replay, join
 from forcegrasp.short_repr import ShortRepr
-
-
-@dataclass(frozen=True, repr=False)
-class Applied(ShortRepr):
-    """An effect with one set of parameters, on all grasps. ``values``: ``(parameters,)``."""
-
-    effect: type[Effect]
-    variant: str
-    values: np.ndarray
 
 
 @dataclass(frozen=True, repr=False)
@@ -26,7 +18,7 @@ class Case(ShortRepr):
     """A whole model of a set: base parameters of each grasp, and effects."""
 
     base: dict[str, np.ndarray]  #: name → ``(G,)``
-    effects: tuple[Applied, ...] = field(default=())
+    effects: tuple[EffectSetting, ...] = field(default=())  #: each with the same values on all grasps
 
     def simulation_key(self) -> bytes:
         """Equal for cases that differ in nothing but sensors: they share one simulation."""
@@ -67,15 +59,15 @@ def _simulate(replay: Replay, cases: Sequence[Case]) -> Motion:
     return replay.simulate(np.tile(np.arange(count), len(cases)), base, effects)
 
 
-def _spread(cases: Sequence[Case], count: int, acts: Callable[[Applied], bool]) -> list[EffectOn]:
+def _spread(cases: Sequence[Case], count: int, acts: Callable[[EffectSetting], bool]) -> list[EffectOn]:
     """Effects of all cases, each kind once, on the rows of the cases that have it, as far as it acts here."""
     kinds: dict[tuple[type[Effect], str], list[tuple[int, np.ndarray]]] = {}
     for index, case in enumerate(cases):
         for one in case.effects:
             if acts(one):
-                kinds.setdefault((one.effect, one.variant), []).append((index, one.values))
+                kinds.setdefault(one.kind, []).append((index, one.values))
     spread = []
     for (effect, variant), places in kinds.items():
         rows = np.concatenate([np.arange(count) + index * count for index, _ in places])
-        spread.append(EffectOn(effect, variant, rows, np.repeat([values for _, values in places], count, axis=0)))
+        spread.append(EffectOn(effect, variant, np.repeat([values for _, values in places], count, axis=0), rows))
     return spread

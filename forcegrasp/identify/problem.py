@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from forcegrasp.effects import Effect
-from forcegrasp.identify.predict import Applied, Case
+from forcegrasp.effects.setting import EffectSetting
+from forcegrasp.identify.predict import Case
 from forcegrasp.measure.schema import MeasuredGrasp
 from forcegrasp.physics.gripper import Gripper
 from forcegrasp.short_repr import ShortRepr
@@ -20,7 +21,7 @@ class Entry(ShortRepr):
 
     name: str  #: for people: "rho_m of sponge", "backlash.gap_m"
     parameter: str
-    effect: int  #: index into the problem's effects; −1 for a base parameter
+    effect: int | None  #: index into the problem's effects; None for a base parameter
     members: np.ndarray  #: which grasps it concerns, ``(G,)``
     start: float
     low: float
@@ -52,14 +53,11 @@ class Problem:
     Args:
       gripper: the model under test.
       grasps: the measured grasps.
-      effects: each with its variant.
+      effects: those in the model, with the values that a fit starts from.
     """
 
     def __init__(
-        self,
-        gripper: Gripper,
-        grasps: Sequence[MeasuredGrasp],
-        effects: Sequence[tuple[type[Effect], str]] = (),
+        self, gripper: Gripper, grasps: Sequence[MeasuredGrasp], effects: Sequence[EffectSetting] = ()
     ) -> None:
         self.gripper, self.grasps, self.effects = gripper, tuple(grasps), tuple(effects)
         self._given = {
@@ -91,22 +89,22 @@ class Problem:
             for name, members in groups.items():
                 if members.any():
                     bounds = (parameter.nominal, parameter.low, parameter.high, parameter.unit)
-                    entries.append(Entry(name, parameter.name, -1, members, *bounds, parameter.logarithmic, scale))
+                    entries.append(Entry(name, parameter.name, None, members, *bounds, parameter.logarithmic, scale))
         return entries
 
     def _effect_entries(self) -> list[Entry]:
         entries = []
-        for index, (effect, _) in enumerate(self.effects):
-            for p in effect.parameters:
+        for index, one in enumerate(self.effects):
+            for p, value in zip(one.effect.parameters, one.values, strict=True):
                 scale = 1.0 if p.logarithmic else abs(p.typical)
-                bounds = (p.typical, p.low, p.high, p.unit)
+                bounds = (float(value), p.low, p.high, p.unit)
                 everyone = np.ones(len(self.grasps), bool)
-                name, kind = f"{effect.name}.{p.name}", (p.logarithmic, scale, p.null)
+                name, kind = f"{one.effect.name}.{p.name}", (p.logarithmic, scale, p.null)
                 entries.append(Entry(name, p.name, index, everyone, *bounds, *kind))
         return entries
 
     def start(self) -> np.ndarray:
-        """Nominal base parameters and typical effects, ``(entries,)``."""
+        """Nominal base parameters, and effects as they were given, ``(entries,)``."""
         return np.array([e.coordinate(e.start) for e in self.entries])
 
     def values(self, vector: np.ndarray) -> np.ndarray:
@@ -119,16 +117,16 @@ class Problem:
         base |= {name: np.full(len(self.grasps), np.nan) for name in self.gripper.parameters if name not in base}
         numbers: list[list[float]] = [[] for _ in self.effects]
         for entry, value in zip(self.entries, self.values(vector), strict=True):
-            if entry.effect < 0:
+            if entry.effect is None:
                 base[entry.parameter][entry.members] = value
             else:
                 numbers[entry.effect].append(value)
-        applied = [Applied(e, variant, np.array(v)) for (e, variant), v in zip(self.effects, numbers, strict=True)]
-        return Case(base, tuple(applied))
+        pairs = zip(self.effects, numbers, strict=True)
+        return Case(base, tuple(dataclasses.replace(one, values=np.array(values)) for one, values in pairs))
 
     def columns(self) -> list[list[int]]:
         """Entries that can be varied together, for no grasp follows two of them: one simulation gives all of them."""
-        groups: dict[tuple[str, int], list[int]] = {}
+        groups: dict[tuple[str, int | None], list[int]] = {}
         for index, entry in enumerate(self.entries):
             groups.setdefault((entry.parameter, entry.effect), []).append(index)
         return list(groups.values())

@@ -17,6 +17,7 @@ import yaml
 
 from forcegrasp.effects import Effect
 from forcegrasp.effects.for_gripper import effect_of
+from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.errors import ConfigError, closest
 from forcegrasp.files import plain_yaml
 from forcegrasp.files.whole_file import write_whole
@@ -59,6 +60,11 @@ class FoundEffect(ShortRepr):
     def values(self) -> np.ndarray:
         """The parameters in the order of the class, ``(parameters,)``."""
         return np.array([self.parameters[p.name].value for p in self.effect.parameters])
+
+    @property
+    def setting(self) -> EffectSetting:
+        """The effect as it was found, without its intervals."""
+        return EffectSetting(self.effect, self.variant, self.values)
 
 
 @dataclass(frozen=True, repr=False)

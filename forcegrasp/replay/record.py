@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from forcegrasp.effects import Effect
 from forcegrasp.effects.for_gripper import effect_of
+from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.errors import ConfigError, closest
 from forcegrasp.measure.schema import MeasuredGrasp, MeasurementSet, columns_of, fingerprint_of_set
 from forcegrasp.physics.gripper import Gripper
@@ -40,7 +40,7 @@ def record(
     *,
     grasps: int,
     objects: int,
-    effects: Sequence[tuple[type[Effect], str, np.ndarray]],
+    effects: Sequence[EffectSetting],
     known: dict[str, float],
     off_nominal: float,
     position_std_m: float,
@@ -54,7 +54,7 @@ def record(
       plan: a name out of :data:`~forcegrasp.replay.plans.PLANS`.
       grasps: how many.
       objects: number of objects that are grasped in turn; their parameters are drawn.
-      effects: each with its variant and its parameters.
+      effects: those that act.
       known: base parameters of the gripper that are not drawn.
       off_nominal: largest share by which the other ones differ from nominal.
       position_std_m: noise of the positions, m or rad.
@@ -86,16 +86,14 @@ def record(
     ]  # fmt: skip
     rows = np.arange(grasps)
     replay = Replay(gripper, bare, encoders_known=False)
-    on = [
-        EffectOn(effect, variant, rows, np.repeat(values[None], grasps, axis=0)) for effect, variant, values in effects
-    ]
+    on = [EffectOn(*one.kind, np.repeat(one.values[None], grasps, axis=0), rows) for one in effects]
     motion = replay.simulate(
         rows,
         {n: v for n, v in base.items() if n != "force_scale"},
         [e for e in on if not e.effect.reads_only(e.variant)],
     )
     readings = replay.read(motion, rows, base["force_scale"], [e for e in on if e.effect.reads()])
-    steps = rounding_steps((effect, values) for effect, _, values in effects)
+    steps = rounding_steps((one.effect, one.values) for one in effects)
     position = with_noise(readings.position, position_std_m, rng.standard_normal(readings.position.shape), steps[0])
     force = with_noise(readings.force, force_std_n, rng.standard_normal(readings.force.shape), steps[1])
     full = tuple(dataclasses.replace(g, position_m=position[i], force_n=force[i]) for i, g in enumerate(bare))
@@ -107,15 +105,15 @@ def record(
     return Recorded(measured, base)
 
 
-def parse_effect(text: str, gripper: Gripper | None = None) -> tuple[type[Effect], str, np.ndarray]:
+def parse_effect(text: str, gripper: Gripper | None = None) -> EffectSetting:
     """Reads ``NAME [VARIANT] [PARAMETER=VALUE ...]``; what is not given is typical of the gripper (the paper's).
 
     Raises:
       ConfigError: if the gripper has no such effect, variant or parameter, or a value is out of bounds.
     """
     name, *words = text.split() or [""]
-    effect, variant = effect_of(name, gripper or default_gripper()), ""
-    values = dict(zip((p.name for p in effect.parameters), effect.typical_values(), strict=True))
+    typical = EffectSetting.typical(effect_of(name, gripper or default_gripper()))
+    (effect, variant), values = typical.kind, typical.parameters
     bounds = {p.name: p for p in effect.parameters}
     for word in words:
         key, equals, number = word.partition("=")
@@ -127,7 +125,7 @@ def parse_effect(text: str, gripper: Gripper | None = None) -> tuple[type[Effect
             )
         else:
             values[key] = _number(name, bounds[key], number)
-    return effect, variant or effect.variants[0], np.array([values[p.name] for p in effect.parameters])
+    return EffectSetting(effect, variant, np.array(list(values.values())))
 
 
 def _number(name: str, parameter, text: str) -> float:

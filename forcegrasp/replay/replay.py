@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from forcegrasp.effects import Effect
+from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.errors import PhysicsError
 from forcegrasp.measure.schema import MeasuredGrasp
 from forcegrasp.physics.gripper import Gripper
@@ -25,14 +26,11 @@ _CHUNK = 8_000_000
 _REMEMBERED = 6
 
 
-@dataclass(frozen=True, repr=False)
-class EffectOn(ShortRepr):
-    """An effect on some rows. ``values``: ``(len(rows), parameters)``."""
+@dataclass(frozen=True, eq=False, repr=False)
+class EffectOn(EffectSetting):
+    """An effect on some of the rows that are simulated. ``values``: ``(len(rows), parameters)``."""
 
-    effect: type[Effect]
-    variant: str
     rows: np.ndarray
-    values: np.ndarray
 
 
 @dataclass(frozen=True, repr=False)
@@ -214,4 +212,4 @@ def start_position(grasp: MeasuredGrasp, stroke: float) -> np.ndarray:
 
 def _cut(effect: EffectOn, part: slice) -> EffectOn:
     inside = (effect.rows >= part.start) & (effect.rows < part.stop)
-    return EffectOn(effect.effect, effect.variant, effect.rows[inside] - part.start, effect.values[inside])
+    return EffectOn(*effect.kind, effect.values[inside], effect.rows[inside] - part.start)

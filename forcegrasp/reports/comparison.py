@@ -11,7 +11,8 @@ from rich.text import Text as Plain
 
 from forcegrasp.identify.comparison import Cell, Comparison
 from forcegrasp.identify.cross_validation import rms
-from forcegrasp.identify.target import PHASES, Target
+from forcegrasp.identify.phases import PHASES
+from forcegrasp.identify.target import Target
 from forcegrasp.reports import figures
 from forcegrasp.reports.html import Picture, Section, Table, Text
 
@@ -44,8 +45,8 @@ def words(name: str) -> str:
 
 def noise_sentence(target: Target) -> str:
     """The sensor noise that errors are divided by, and where it is from."""
-    first = {f"{kind}s": part.start for kind, part in target.kinds.items()}
-    sigma, quantum, units = target.sensor_sigma, target.quantum, target.units
+    first = {f"{kind}s": part.start for kind, part in target.axis.kinds.items()}
+    sigma, quantum, units = target.sensor_sigma, target.quantum, target.axis.units
     noise = f"sensor noise: {', '.join(f'{kind} {amount(float(sigma[k]), units[k])}' for kind, k in first.items())}"
     steps = [f"{kind} {amount(float(quantum[k]), units[k])}" for kind, k in first.items() if quantum[k]]
     if steps:
@@ -62,13 +63,13 @@ def compare_json(comparison: Comparison, name: str, model: str, notes: list[str]
     """All figures in plain types."""
     cells, target = comparison.cells(), comparison.target
     held = {}
-    for k, (signal, unit) in enumerate(zip(target.names, target.units, strict=True)):
-        ratio = rms(comparison.heldout, target, np.arange(len(target.names)) == k)
+    for k, (signal, unit) in enumerate(zip(target.axis.names, target.axis.units, strict=True)):
+        ratio = rms(comparison.heldout, target, np.arange(len(target.axis.names)) == k)
         held[signal] = {f"rms_{unit.lower()}": ratio * target.sigma[k], "ratio": ratio}
     return {
         "set": name,
         "model": model,
-        "signals": {signal: _signal_json(comparison, k) for k, signal in enumerate(target.names)},
+        "signals": {signal: _signal_json(comparison, k) for k, signal in enumerate(target.axis.names)},
         "phases": {
             phase: {cell.signal: _cell_json(cell) for cell in cells if cell.phase == phase}
             for phase in PHASES
@@ -88,7 +89,7 @@ def compare_json(comparison: Comparison, name: str, model: str, notes: list[str]
 
 
 def _signal_json(comparison: Comparison, k: int) -> dict[str, Any]:
-    target, unit = comparison.target, comparison.target.units[k].lower()
+    target, unit = comparison.target, comparison.target.axis.units[k].lower()
     inside, sigma = comparison.residual[..., k][target.mask], float(target.sigma[k])
     ratio = float(np.sqrt(np.mean(inside**2)))
     return {
@@ -137,7 +138,7 @@ def answer(comparison: Comparison) -> str:
 def printed(comparison: Comparison) -> Printed:
     """Error per phase and signal, for the terminal."""
     table = Printed("phase", box=box.SIMPLE_HEAD, padding=(0, 1))
-    names, units = comparison.target.names, comparison.target.units
+    names, units = comparison.target.axis.names, comparison.target.axis.units
     for signal in names:
         table.add_column(words(signal), no_wrap=True)
     cells = {(cell.phase, cell.signal): cell for cell in comparison.cells()}
@@ -209,7 +210,7 @@ def sections(comparison: Comparison, notes: list[str]) -> list[Section]:
 
 
 def _by_signal_and_phase(comparison: Comparison) -> Section:
-    cells, names = comparison.cells(), comparison.target.names
+    cells, names = comparison.cells(), comparison.target.axis.names
     grid = np.full((len(PHASES), len(names)), np.nan)
     for cell in cells:
         grid[PHASES.index(cell.phase), names.index(cell.signal)] = cell.ratio

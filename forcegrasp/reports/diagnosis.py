@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from typing import Any
 
@@ -11,12 +12,13 @@ from rich.table import Table as Printed
 from rich.text import Text as Plain
 
 from forcegrasp.diagnosis.advice import Advice
-from forcegrasp.diagnosis.search import Candidate, Diagnosis, Step
+from forcegrasp.diagnosis.result import NOTHING, Candidate, Diagnosis, Step
 from forcegrasp.effects import Effect
 from forcegrasp.effects.for_gripper import effect_of
 from forcegrasp.identify.fit import Fit
 from forcegrasp.identify.intervals import listed, reached_bound
-from forcegrasp.identify.target import PHASES
+from forcegrasp.identify.phases import PHASES
+from forcegrasp.identify.verdict import Verdict
 from forcegrasp.reports import figures
 from forcegrasp.reports.comparison import dependence_section, noise_sentence, value_text, words, worst_cell
 from forcegrasp.reports.diagnosis_words import lacks, left_sentence, noise_words, preference
@@ -50,7 +52,7 @@ def diagnosis_json(diagnosis: Diagnosis, advice: Advice | None, tried: Sequence[
         "ranking": ranking(diagnosis),
         "no_trace": no_trace(diagnosis, tried),
         "parameters": {
-            effect: {p: dict(zip(("value", "low", "high", "unit"), entry, strict=True)) for p, entry in found.items()}
+            effect: {name: dataclasses.asdict(fitted) for name, fitted in found.items()}
             for effect, found in found_parameters(diagnosis).items()
         },
         "error_before": diagnosis.error_before,
@@ -73,7 +75,7 @@ def diagnosis_json(diagnosis: Diagnosis, advice: Advice | None, tried: Sequence[
 
 def _step_json(step: Step, diagnosis: Diagnosis) -> dict[str, Any]:
     return {
-        "verdict": step.verdict,
+        "verdict": step.verdict or NOTHING,
         "effects": list(step.effects),
         "preferred_because": preference(step),
         "error_before": step.error_before,
@@ -87,11 +89,11 @@ def answer(diagnosis: Diagnosis) -> str:
     d, cell, noise = diagnosis, worst_cell(remaining(diagnosis).cells()), noise_words(diagnosis)
     found = listed(d.preferred) if d.preferred else ""
     place = f"{words(cell.signal)}, {words(cell.phase)} ({cell.ratio:.1f} × noise)"
-    if d.verdict in ("effect", "one_of"):
+    if d.verdict.names_effects:
         fall = f"With {found} the error on held-out grasps falls from {d.error_before:.2f} to {d.error_after:.2f} ×"
         rest = f"What is left is largest in {place}." if d.left else noise
         return f"{lacks(d)} {fall} the sensor noise; up to {d.floor:.2f} is noise. {rest}".rstrip()
-    if d.verdict == "explained":
+    if d.verdict is Verdict.EXPLAINED:
         of_noise = f"the error on held-out grasps is {d.error_before:.2f} × the sensor noise"
         if noise:
             return f"The model explains these data: they show no missing effect; {of_noise}. {noise}"
@@ -99,7 +101,7 @@ def answer(diagnosis: Diagnosis) -> str:
             f"The model explains these data: {of_noise}, and up to {d.floor:.2f} is noise and the simulation's own"
             " error. They show no missing effect."
         )
-    if d.verdict == "unknown":
+    if d.verdict is Verdict.UNKNOWN:
         best = f"{found} would only take it down to {d.error_after:.2f} ×" if found else "no effect explains it"
         return (
             f"Something is missing, and it is none of the effects I know: the error on held-out grasps is"
@@ -114,7 +116,7 @@ def printed(diagnosis: Diagnosis) -> Printed | None:
         return None
     table = Printed("", "effect", "gain", "p", "error, × noise", "parameters", box=box.SIMPLE_HEAD)
     for number, step in enumerate(diagnosis.steps, 1):
-        if step.effects and not step.candidates:
+        if step.is_counted:
             fall = f"{step.error_before:.2f} → {step.error_after:.2f}"
             table.add_row(*(Plain(cell, "bold") for cell in (str(number), step.effects[0], "", "", fall, "")))
         for place, candidate in enumerate(step.candidates[:_PRINTED]):
@@ -136,8 +138,7 @@ def _texts(candidate: Candidate, diagnosis: Diagnosis) -> tuple[str, str, str, s
         f"{p.name} {_value(candidate.effect, p.name, found[p.name], 3)}{'' if p.unit == '1' else f' {p.unit}'}"
         for p in candidate.effect.parameters
     )
-    name = f"{candidate.effect.name} {candidate.variant}".strip()
-    return name, f"{candidate.heldout_gain:+.0f}", f"{candidate.p_family:.2g}", values
+    return candidate.setting.title, f"{candidate.heldout_gain:+.0f}", f"{candidate.p_family:.2g}", values
 
 
 def _value(effect: type[Effect], name: str, value: float, digits: int) -> str:
@@ -153,7 +154,7 @@ def lines(diagnosis: Diagnosis, advice: Advice | None) -> list[str]:
         told.append(f"{effect.name}: {effect.symptom}")
         told += [f"  {text}" for text in _final_texts(diagnosis, effect)]
         told += [f"  it could also be: {listed(step.effects[1:], 'or')}"] if len(step.effects) > 1 else []
-    if diagnosis.verdict in ("unknown", "effect", "one_of"):
+    if diagnosis.verdict is Verdict.UNKNOWN or diagnosis.verdict.names_effects:
         told.append(left_sentence(diagnosis))
     if advice is not None:
         told.append(advice.sentence())
@@ -163,8 +164,9 @@ def lines(diagnosis: Diagnosis, advice: Advice | None) -> list[str]:
 def _final_texts(diagnosis: Diagnosis, effect: type[Effect]) -> list[str]:
     """Each parameter of an effect in the final model, with its interval."""
     return [
-        f"{name} {_value(effect, name, value, 4)}{'' if unit == '1' else f' {unit}'} (95 %: {low:.4g} to {high:.4g})"
-        for name, (value, low, high, unit) in found_parameters(diagnosis).get(effect.name, {}).items()
+        f"{name} {_value(effect, name, p.value, 4)}{'' if p.unit == '1' else f' {p.unit}'}"
+        f" (95 %: {p.low:.4g} to {p.high:.4g})"
+        for name, p in found_parameters(diagnosis).get(effect.name, {}).items()
     ]
 
 
@@ -180,18 +182,18 @@ def sections(diagnosis: Diagnosis, advice: Advice | None, tried: Sequence[type[E
 
 def _step_section(number: int, step: Step, before: Fit, diagnosis: Diagnosis) -> Section:
     effect = effect_of(step.effects[0], diagnosis.target.gripper)
-    if step.candidates:
-        seen = symptom_picture(diagnosis.target, before, step.candidates[0].fit, effect)
-    else:
+    if step.is_counted:
         seen = steps_picture(diagnosis.target)
+    else:
+        seen = symptom_picture(diagnosis.target, before, step.candidates[0].fit, effect)
     fall = f"Held-out error {step.error_before:.2f} → {step.error_after:.2f} × noise."
     blocks: list = [
         Text(f"Symptom: {effect.symptom}. {fall}", strong=True),
         seen,
     ]
     rows = [
-        (name, _value(effect, name, value, 4), f"{low:.4g} to {high:.4g}", "" if unit == "1" else unit)
-        for name, (value, low, high, unit) in found_parameters(diagnosis).get(effect.name, {}).items()
+        (name, _value(effect, name, p.value, 4), f"{p.low:.4g} to {p.high:.4g}", "" if p.unit == "1" else p.unit)
+        for name, p in found_parameters(diagnosis).get(effect.name, {}).items()
     ]
     if rows:
         blocks.append(Table((f"parameter of {effect.name}", "value", "95 % interval", "unit"), rows))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from forcegrasp.diagnosis.search import Diagnosis, Step
+from forcegrasp.diagnosis.result import Diagnosis, Step
 from forcegrasp.diagnosis.verdict import EXPLAINED_FAR, MUCH
 from forcegrasp.identify.intervals import listed
 from forcegrasp.reports.comparison import covariate_words, words
@@ -69,8 +69,8 @@ def noise_words(diagnosis: Diagnosis) -> str:
     noise, said = diagnosis.noise, "given" if diagnosis.target.sigma_known else "estimated"
     if noise is None:
         return ""
-    told, names = [], diagnosis.target.names
-    for kind, part in diagnosis.target.kinds.items():
+    told, names = [], diagnosis.target.axis.names
+    for kind, part in diagnosis.target.axis.kinds.items():
         times = noise.times[part]
         if all(noise.unlike[part]) and max(times) < 1.15 * min(times):
             told.append(_scatter(f"{kind}s", float((times**2).mean() ** 0.5), any(noise.heavy_tails[part])))

@@ -75,9 +75,9 @@ def overlay(target: Target, index: int, predicted: np.ndarray) -> Figure:
     measured = target.signals[index][keep]
     residual = (measured - predicted[keep]) / target.sigma
     figure = Figure(figsize=(9.5, 4.6), layout="constrained")
-    grid = figure.subplots(2, len(target.kinds), sharex=True, height_ratios=(2.2, 1), squeeze=False)
-    for column, (kind, part) in enumerate(target.kinds.items()):
-        unit, factor = SHOWN[target.units[part.start]]
+    grid = figure.subplots(2, len(target.axis.kinds), sharex=True, height_ratios=(2.2, 1), squeeze=False)
+    for column, (kind, part) in enumerate(target.axis.kinds.items()):
+        unit, factor = SHOWN[target.axis.units[part.start]]
         above, below = grid[:, column]
         for signal, colour in zip(range(part.start, part.stop), (LEFT, RIGHT), strict=False):
             if kind == "position":
@@ -105,7 +105,7 @@ def dependence(values: dict[str, np.ndarray], residual: np.ndarray, target: Targ
       residual: ``(G, S, C)``.
       target: the measurements.
     """
-    mask, kinds = target.mask, target.kinds
+    mask, kinds = target.mask, target.axis.kinds
     figure = Figure(figsize=(2.3 * len(values), 4.4), layout="constrained")
     grid = figure.subplots(len(kinds), len(values), sharey="row", squeeze=False)
     for column, (name, value) in enumerate(values.items()):
@@ -126,7 +126,7 @@ def dependence(values: dict[str, np.ndarray], residual: np.ndarray, target: Targ
             axes.axhspan(-1, 1, color="0.92", zorder=0)
             axes.axhline(0, color="0.5", lw=0.6)
             _finish(axes, f"{kind} residual ÷ noise" if column == 0 else "")
-        grid[-1, column].set_xlabel(label.replace("mm", SHOWN[target.units[0]][0]))
+        grid[-1, column].set_xlabel(label.replace("mm", SHOWN[target.axis.units[0]][0]))
     for row, part in enumerate(kinds.values()):  # a few wild points must not flatten the rest
         sizes = np.abs(residual[..., part][mask])
         sizes = sizes[np.isfinite(sizes)]
@@ -148,11 +148,11 @@ def symptom(target: Target, index: int, signal: int, without: np.ndarray, having
     """
     grasp = target.grasps[index]
     time, keep = grasp.time_s - grasp.time_s[0], _thin(len(grasp.time_s))
-    _, factor = SHOWN[target.units[signal]]
+    _, factor = SHOWN[target.axis.units[signal]]
     measured = target.signals[index][keep, signal]
     figure = Figure(figsize=(8.5, 4.8), layout="constrained")
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2.2, 1))
-    moves = signal < target.positions.stop
+    moves = signal < target.axis.positions.stop
     if moves:
         command = factor * grasp.command_m[keep, signal]
         above.step(time[keep], command, where="post", color="0.6", lw=0.8, ls=":", label="command")
@@ -182,11 +182,11 @@ def rivals(
       names: of the two.
     """
     apart = (predicted[0] - predicted[1]) / target.sigma
-    side = max(target.sides, key=lambda side: float(np.sum(apart[:, side] ** 2)))
+    side = max(target.axis.sides, key=lambda side: float(np.sum(apart[:, side] ** 2)))
     figure = Figure(figsize=(9.5, 4.4), layout="constrained")
     grid = figure.subplots(2, len(side), sharex=True, height_ratios=(2.2, 1), squeeze=False)
     for column, signal in enumerate(side):
-        _, factor = SHOWN[target.units[signal]]
+        _, factor = SHOWN[target.axis.units[signal]]
         above, below = grid[:, column]
         if column == 0:
             above.step(
@@ -204,7 +204,7 @@ def rivals(
 def steps(target: Target, index: int, signal: int) -> Figure:
     """Readings of one signal of one grasp around its fastest change, with lines at the multiples of their step."""
     grasp, quantum = target.grasps[index], target.quantum[signal]
-    _, factor = SHOWN[target.units[signal]]
+    _, factor = SHOWN[target.axis.units[signal]]
     values, time = target.signals[index, : len(grasp.time_s), signal], grasp.time_s - grasp.time_s[0]
     middle = int(np.argmax(np.abs(np.gradient(values)))) if len(values) > 1 else 0
     shown = slice(max(0, middle - 25), middle + 26)
@@ -256,12 +256,12 @@ def falls(rows: Sequence[tuple[str, float, float]]) -> Figure:
 
 
 def _words(target: Target, signal: int) -> str:
-    name = target.names[signal]
+    name = target.axis.names[signal]
     return NAMES.get(name, name)
 
 
 def _axis(target: Target, signal: int) -> str:
-    return f"{_words(target, signal)} [{SHOWN[target.units[signal]][0]}]"
+    return f"{_words(target, signal)} [{SHOWN[target.axis.units[signal]][0]}]"
 
 
 def _thin(count: int) -> slice:

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from forcegrasp.diagnosis.search import Candidate, Diagnosis, Step
+from forcegrasp.diagnosis.result import Candidate, Diagnosis, Step
 from forcegrasp.effects import Effect
-from forcegrasp.effects.for_gripper import effect_of
-from forcegrasp.effects.quantisation import Quantisation
 from forcegrasp.identify.comparison import Comparison
 from forcegrasp.identify.fit import Fit
-from forcegrasp.identify.intervals import intervals, standard_errors, warnings
+from forcegrasp.identify.fitted_model import effects_of_fit
+from forcegrasp.identify.intervals import standard_errors, warnings
+from forcegrasp.models.model_file import Fitted
 from forcegrasp.reports.comparison import worst_cell
 
 
@@ -25,7 +25,7 @@ def where(diagnosis: Diagnosis) -> dict[str, Any]:
     """Where the final model's largest error is, what it goes with, and how much of the rest a model could explain."""
     left = remaining(diagnosis)
     cell = worst_cell(left.cells())
-    kind = cell.signal.partition("_")[0]
+    kind = diagnosis.target.axis.kind_of(cell.signal)
     return {
         "phase": cell.phase,
         "signal": cell.signal,
@@ -40,33 +40,24 @@ def found_steps(diagnosis: Diagnosis) -> list[tuple[Step, Fit]]:
     """The steps that found something, each with the fit that it started from."""
     found, fit = [], diagnosis.base.fit
     for step in diagnosis.steps:
-        if step.verdict != "none":
+        if step.effects:
             found.append((step, fit))
             fit = step.candidates[0].fit if step.candidates else fit
     return found
 
 
-def found_parameters(diagnosis: Diagnosis) -> dict[str, dict[str, tuple[float, float, float, str]]]:
-    """Value, 95 % interval and unit of the parameters of all effects in the final model."""
-    fit = diagnosis.fit
-    found: dict[str, dict[str, tuple[float, float, float, str]]] = {}
-    errors = standard_errors(fit, diagnosis.numerical)
-    for entry, numbers in zip(fit.problem.entries, intervals(fit, errors), strict=True):
-        if entry.effect >= 0:
-            effect = fit.problem.effects[entry.effect][0].name
-            found.setdefault(effect, {})[entry.parameter] = (*numbers, entry.unit)
-    if any(diagnosis.target.rounding):
-        rounding = effect_of(Quantisation.name, diagnosis.target.gripper)
-        steps = zip(rounding.parameters, diagnosis.target.rounding, strict=True)
-        found[Quantisation.name] = {p.name: (step, step, step, p.unit) for p, step in steps}
-    return found
+def found_parameters(diagnosis: Diagnosis) -> dict[str, dict[str, Fitted]]:
+    """The parameters of all effects in the final model, by effect and by name."""
+    fit, target = diagnosis.fit, diagnosis.target
+    effects = effects_of_fit(fit, target, standard_errors(fit, diagnosis.numerical))
+    return {found.effect.name: found.parameters for found in effects}
 
 
 def candidate_json(candidate: Candidate, diagnosis: Diagnosis) -> dict[str, Any]:
     """An effect that was fitted, in plain types."""
     return {
         "effect": candidate.effect.name,
-        "variant": candidate.variant,
+        "variant": candidate.setting.variant,
         "p_family": candidate.p_family,
         "heldout_gain": candidate.heldout_gain,
         "floor_ratio_after": candidate.error_after,
@@ -76,9 +67,9 @@ def candidate_json(candidate: Candidate, diagnosis: Diagnosis) -> dict[str, Any]
 
 def candidate_parameters(candidate: Candidate, diagnosis: Diagnosis) -> dict[str, float]:
     """An effect's parameters: those of the final model if it is in there, and otherwise of its own fit."""
-    if (candidate.effect, candidate.variant) not in diagnosis.fit.problem.effects:
-        return candidate.parameters()
-    return {name: entry[0] for name, entry in found_parameters(diagnosis)[candidate.effect.name].items()}
+    if candidate.setting.kind not in [known.kind for known in diagnosis.fit.problem.effects]:
+        return candidate.setting.parameters
+    return {name: fitted.value for name, fitted in found_parameters(diagnosis)[candidate.effect.name].items()}
 
 
 def final_warnings(diagnosis: Diagnosis) -> list[str]:
@@ -94,7 +85,7 @@ def noise_json(diagnosis: Diagnosis) -> dict[str, Any] | None:
     return {
         signal: {"times_stated": float(times), "core": float(core), "heavy_tails": bool(heavy)}
         for signal, times, core, heavy, unlike in zip(
-            diagnosis.target.names, noise.times, noise.core, noise.heavy_tails, noise.unlike, strict=True
+            diagnosis.target.axis.names, noise.times, noise.core, noise.heavy_tails, noise.unlike, strict=True
         )
         if unlike
     }
@@ -105,8 +96,8 @@ def ranking(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     nothing = dict.fromkeys(("p_family", "heldout_gain", "floor_ratio_after", "parameters"))
     rows: list[dict[str, Any]] = []
     for step in diagnosis.steps:
-        if step.verdict != "none" and not step.candidates:  # found by counting values, without a fit
-            values = {name: entry[0] for name, entry in found_parameters(diagnosis)[step.effects[0]].items()}
+        if step.is_counted:
+            values = {name: fitted.value for name, fitted in found_parameters(diagnosis)[step.effects[0]].items()}
             found = nothing | {"floor_ratio_after": step.error_after, "parameters": values}
             rows.append({"effect": step.effects[0], "variant": "", **found})
     first = _first_search(diagnosis)
@@ -115,9 +106,10 @@ def ranking(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     rows += [candidate_json(c, diagnosis) for c in first.candidates]
     seen = {row["effect"] for row in rows}
     for score in first.scores:
-        if score.effect.name not in seen:
-            seen.add(score.effect.name)
-            rows.append({"effect": score.effect.name, "variant": score.variant, **nothing})
+        name = score.setting.effect.name
+        if name not in seen:
+            seen.add(name)
+            rows.append({"effect": name, "variant": score.setting.variant, **nothing})
     return rows
 
 
@@ -126,8 +118,8 @@ def no_trace(diagnosis: Diagnosis, tried: Sequence[type[Effect]]) -> list[str]:
     first = _first_search(diagnosis)
     if first is None:
         return []
-    scored = {score.effect.name for score in first.scores}
-    known = {effect.name for effect, _ in diagnosis.base.fit.problem.effects}
+    scored = {score.setting.effect.name for score in first.scores}
+    known = {known.effect.name for known in diagnosis.base.fit.problem.effects}
     return [e.name for e in tried if e.name not in scored | known and len(e.trials())]
 
 

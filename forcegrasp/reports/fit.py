@@ -12,15 +12,15 @@ from rich import box
 from rich.table import Table as Printed
 from rich.text import Text as Plain
 
-from forcegrasp.diagnosis.workflow import Added
+from forcegrasp.diagnosis.add_effect import Added
 from forcegrasp.effects import Effect
-from forcegrasp.effects.quantisation import Quantisation
 from forcegrasp.identify.base_fit import BaseFit, rms_error
 from forcegrasp.identify.cross_validation import heldout_residual, make_folds, rms
 from forcegrasp.identify.fit import Fit
 from forcegrasp.identify.intervals import reached_bound
 from forcegrasp.identify.target import Target
 from forcegrasp.models.model_file import Fitted, Model
+from forcegrasp.physics.sensors import is_rounding
 from forcegrasp.reports import figures
 from forcegrasp.reports.comparison import amount, noise_sentence, value_text, words
 from forcegrasp.reports.html import Picture, Section, Table, Text
@@ -190,10 +190,10 @@ def _by_signal(added: Added, effect: type[Effect]) -> list[tuple[str, float, flo
     """Held-out error ÷ noise of each signal, before and after."""
     target = added.target
     before, after = held_out(added.before, target), held_out(added.after, target)
-    if effect.name == Quantisation.name:  # what rounding adds to the noise is an error to a model that does not know it
-        before = before * target.sigma / target.sensor_sigma
-    one = np.eye(len(target.names), dtype=bool)
-    return [(s, rms(before, target, one[k]), rms(after, target, one[k])) for k, s in enumerate(target.names)]
+    if is_rounding(effect):
+        before = target.before_rounding(before)
+    one = np.eye(len(target.axis.names), dtype=bool)
+    return [(s, rms(before, target, one[k]), rms(after, target, one[k])) for k, s in enumerate(target.axis.names)]
 
 
 def add_answer(added: Added, effect: type[Effect]) -> str:
@@ -220,7 +220,7 @@ def add_sections(added: Added, effect: type[Effect]) -> list[Section]:
     rows = [(words(signal), before, after) for signal, before, after in _by_signal(added, effect)]
     rows.append(("all", added.error_before, added.error_after))
     fall = Picture(figures.falls(rows), "Errors on grasps held out of the fit, without and with the effect.")
-    if effect.name == Quantisation.name:
+    if is_rounding(effect):
         seen = steps_picture(added.target)
     else:
         seen = symptom_picture(added.target, added.before, added.after, effect)
@@ -239,19 +239,21 @@ def symptom_picture(target: Target, before: Fit, after: Fit, effect: type[Effect
     errors = [np.sqrt(np.sum(fit.residual[index, :, signal] ** 2) / count) for fit in (before, after)]
     return Picture(
         figures.symptom(target, index, signal, before.predicted[index], after.predicted[index], effect.name),
-        f"Where {effect.name} helps most: {words(target.names[signal])} of grasp {grasp.name} on {grasp.object}; error"
-        f" {errors[0]:.2f} × noise without it, {errors[1]:.2f} × with it. Below: measured − model ÷ noise, band ± 2.",
+        f"Where {effect.name} helps most: {words(target.axis.names[signal])} of grasp {grasp.name} on {grasp.object};"
+        f" error {errors[0]:.2f} × noise without it, {errors[1]:.2f} × with it. Below: measured − model ÷ noise, band"
+        " ± 2.",
     )
 
 
 def steps_picture(target: Target) -> Picture:
     """Readings that come in steps."""
-    signal = target.forces.start if target.rounding[1] else 0
+    forces = target.axis.forces
+    signal = forces.start if target.quantum[forces].any() else target.axis.positions.start
     swing = np.ptp(np.where(target.mask, target.signals[..., signal], target.signals[:, :1, signal]), axis=1)
     index = int(np.argmax(swing))
     grasp = target.grasps[index]
     return Picture(
         figures.steps(target, index, signal),
-        f"Readings of {words(target.names[signal])} in grasp {grasp.name}, where they change fastest: they are"
-        f" multiples of {amount(target.quantum[signal], target.units[signal])} (grey lines).",
+        f"Readings of {words(target.axis.names[signal])} in grasp {grasp.name}, where they change fastest: they are"
+        f" multiples of {amount(float(target.quantum[signal]), target.axis.units[signal])} (grey lines).",
     )

@@ -9,10 +9,9 @@ from types import SimpleNamespace
 import pytest
 
 from forcegrasp.api import results
-from forcegrasp.diagnosis import advice
-from forcegrasp.diagnosis import workflow as diagnosis_workflow
+from forcegrasp.diagnosis import add_effect, advice, diagnose_set
+from forcegrasp.identify import compare_set, fit_set, loading
 from forcegrasp.identify import noise_floor as floor
-from forcegrasp.identify import workflow
 from tests.compare.conftest import made_up as made_up  # a fixture
 
 TABLE_META = "format: forcegrasp-measurements/1\nkind: final_force\ngripper: tiago\nsource: a test\nlicense: none\n"
@@ -31,7 +30,7 @@ def table(tmp_path) -> Path:
 
 @pytest.fixture
 def work(made_up, monkeypatch, tmp_path) -> SimpleNamespace:
-    """Nothing is simulated: the workflow returns what was made up. ``calls`` holds what it was asked."""
+    """Nothing is simulated: what is slow returns what was made up. ``calls`` holds what it was asked."""
     calls: dict[str, tuple] = {}
 
     def returns(name: str, value: object) -> Callable:
@@ -41,16 +40,15 @@ def work(made_up, monkeypatch, tmp_path) -> SimpleNamespace:
 
         return stub
 
-    load, diagnosis = workflow.load, made_up.diagnosis("effect")
+    load, diagnosis = loading.load, made_up.diagnosis("effect")
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(workflow, "load", lambda path: made_up.loaded if str(path) == "my_set" else load(path))
-    for name, value in {
-        "compare": (made_up.comparison, made_up.model, ["a note"]),
-        "fit_model": (made_up.target, None, made_up.base),
-        "diagnose_set": (diagnosis, None),
-        "add_effect": made_up.added,
-    }.items():
-        home = workflow if hasattr(workflow, name) else diagnosis_workflow
+    monkeypatch.setattr(loading, "load", lambda path: made_up.loaded if str(path) == "my_set" else load(path))
+    for home, name, value in (
+        (compare_set, "compare", (made_up.comparison, made_up.model, ["a note"])),
+        (fit_set, "fit_model", (made_up.target, None, made_up.base)),
+        (diagnose_set, "diagnose_set", (diagnosis, None)),
+        (add_effect, "add_effect", made_up.added),
+    ):
         monkeypatch.setattr(home, name, returns(name, value))
     monkeypatch.setattr(advice, "advise", lambda diagnosis: made_up.advice)
     monkeypatch.setattr("forcegrasp.api.functions.advise", lambda diagnosis: made_up.advice)

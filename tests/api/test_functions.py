@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 import forcegrasp as fg
 from forcegrasp.api import CompareResult, TableResult
 from forcegrasp.cli.main import main
-from forcegrasp.diagnosis import workflow as diagnosis_workflow
+from forcegrasp.diagnosis import add_effect
 from forcegrasp.effects import catalogue, get_effect
 from forcegrasp.errors import ConfigError, MeasurementError
 from forcegrasp.models.model_file import Model, read_model, write_model
@@ -194,7 +194,7 @@ def test_mistakes_are_the_verbs(call, error, told, model, table):
 
 def test_an_effect_that_does_not_help_is_not_added(work, model, monkeypatch):
     added = dataclasses.replace(work.made_up.added, error_before=1.0, error_after=0.996)
-    monkeypatch.setattr(diagnosis_workflow, "add_effect", lambda *_: added)
+    monkeypatch.setattr(add_effect, "add_effect", lambda *_: added)
     with pytest.raises(ConfigError, match=r"force_bias: the error on held-out grasps does not fall \(1\.000 ×"):
         fg.add("my_set", model, "force_bias", out="worse.yaml")
     assert not Path("worse.yaml").exists()

@@ -115,11 +115,11 @@ def test_diagnose_writes_the_base_model_beside_the_report_and_suggests_it(loop):
 
 
 def test_compare_writes_the_base_model_beside_the_report_and_suggests_it(folder, capsys, monkeypatch):
-    from forcegrasp.identify import workflow
+    from forcegrasp.identify import compare_set
     from forcegrasp.models.model_file import read_model
 
-    fitted, real = read_model(Path("model.yaml")), workflow.compare
-    monkeypatch.setattr(workflow, "compare", lambda loaded, model, *rest: real(loaded, fitted, *rest))  # saves a fit
+    fitted, real = read_model(Path("model.yaml")), compare_set.compare
+    monkeypatch.setattr(compare_set, "compare", lambda loaded, model, *rest: real(loaded, fitted, *rest))  # saves a fit
     assert main(["compare", "my_set", "out=where"]) == 0
     assert "diagnose data=my_set model=where/base_model.yaml" in capsys.readouterr().out
     beside = yaml.safe_load((folder / "where" / "base_model.yaml").read_text())
@@ -132,16 +132,15 @@ def test_compare_writes_the_base_model_beside_the_report_and_suggests_it(folder,
 @pytest.mark.parametrize("verb", ["compare", "diagnose", "add"])
 @pytest.mark.parametrize("other", [True, False])
 def test_a_model_of_other_measurements_is_used_with_a_warning(verb, other, folder, capsys, monkeypatch):
-    from forcegrasp.diagnosis import workflow as diagnosis_workflow
+    from forcegrasp.diagnosis import add_effect, diagnose_set
     from forcegrasp.errors import ConfigError
-    from forcegrasp.identify import workflow
+    from forcegrasp.identify import compare_set
 
     def stop(loaded, model, *rest):
         raise ConfigError(f"with {model.data['set']} and {len(loaded.warnings)} warnings")
 
-    monkeypatch.setattr(workflow, "compare", stop)
-    for name in ("diagnose_set", "add_effect"):
-        monkeypatch.setattr(diagnosis_workflow, name, stop)
+    for home, name in ((compare_set, "compare"), (diagnose_set, "diagnose_set"), (add_effect, "add_effect")):
+        monkeypatch.setattr(home, name, stop)
     if other:
         text = (folder / "model.yaml").read_text()
         (folder / "model.yaml").write_text(text.replace("fingerprint: ", "fingerprint: 0").replace("my_set", "hers"))
@@ -153,10 +152,10 @@ def test_a_model_of_other_measurements_is_used_with_a_warning(verb, other, folde
 
 
 def test_noise_that_is_given_is_held_against_the_readings_before_anything_is_fitted(folder, capsys, monkeypatch):
-    from forcegrasp.identify import workflow
+    from forcegrasp.identify import fit_set
 
     meta = (folder / "my_set" / "meta.yaml").read_text()
-    monkeypatch.setattr(workflow, "make_target", None)  # nothing may be fitted
+    monkeypatch.setattr(fit_set, "make_target", None)  # nothing may be fitted
     for given, told in (
         ("13", "looks like millinewtons"),
         ("1.0e+300", "looks like"),
@@ -207,12 +206,12 @@ def test_a_table_of_final_forces(folder, capsys):
 
 
 def test_an_effect_that_does_not_help_is_not_added(folder, capsys, monkeypatch):
-    from forcegrasp.diagnosis import workflow
+    from forcegrasp.diagnosis import add_effect
 
     def useless(*arguments):
         return SimpleNamespace(error_before=1.0, error_after=0.996)
 
-    monkeypatch.setattr(workflow, "add_effect", useless)
+    monkeypatch.setattr(add_effect, "add_effect", useless)
     assert main(["add", "data=my_set", "model=model.yaml", "effect=backlash", "out=worse.yaml"]) == 2
     error = capsys.readouterr().err
     assert error.startswith("forcegrasp: effect=backlash: the error on held-out grasps does not fall (1.000 ×")

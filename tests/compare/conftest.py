@@ -8,17 +8,20 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from forcegrasp.diagnosis.add_effect import Added
 from forcegrasp.diagnosis.advice import Advice
-from forcegrasp.diagnosis.search import Candidate, Diagnosis, Step
+from forcegrasp.diagnosis.result import Candidate, Diagnosis, Step
 from forcegrasp.diagnosis.signatures import Score
-from forcegrasp.diagnosis.workflow import Added
 from forcegrasp.effects import get_effect
+from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.identify.base_fit import BaseFit
 from forcegrasp.identify.comparison import Comparison
 from forcegrasp.identify.fit import Fit
+from forcegrasp.identify.fitted_model import model_of
+from forcegrasp.identify.loading import Loaded
 from forcegrasp.identify.problem import Problem
 from forcegrasp.identify.target import make_target
-from forcegrasp.identify.workflow import Loaded, model_of
+from forcegrasp.identify.verdict import Verdict
 from forcegrasp.measure import MeasuredGrasp, MeasurementSet
 from forcegrasp.physics.gripper_file import load_gripper
 
@@ -70,24 +73,28 @@ def made_up() -> SimpleNamespace:
     effects = [get_effect(name) for name in names]
     candidates = []
     for effect, share in zip(effects, (0.0, 0.5), strict=True):
-        fit = _fit(Problem(loaded.gripper, grasps, [(effect, "")]), target, noise + share * (left - noise))
+        fit = _fit(
+            Problem(loaded.gripper, grasps, [EffectSetting.typical(effect)]), target, noise + share * (left - noise)
+        )
         gains = np.full(8, 100.0 * (1 - share))
         error = float(np.sqrt(np.mean(fit.residual**2)))
-        candidates.append(Candidate(effect, "", fit, 0.002, gains, error, 1 - share, 0.5, np.ones(1)))
-    poor = [Score(get_effect(n), "", np.zeros(1), 1.0, np.ones(1)) for n in ("backlash", "force_lag")]
-    good = [Score(effect, "", np.zeros(2), 9.0, np.ones(1)) for effect in effects]
+        candidates.append(
+            Candidate(fit.problem.case(fit.vector).effects[0], fit, 0.002, gains, error, 1 - share, 0.5, np.ones(1))
+        )
+    poor = [Score(EffectSetting.typical(get_effect(n)), 1.0, np.ones(1)) for n in ("backlash", "force_lag")]
+    good = [Score(EffectSetting.typical(effect), 9.0, np.ones(1)) for effect in effects]
     before = float(np.sqrt(np.mean(left**2)))
     folds = tuple(np.array([i, i + 4]) for i in range(4))
 
     def diagnosis(verdict: str) -> Diagnosis:
         chosen = {"effect": names[:1], "one_of": names}.get(verdict, ())
-        step = Step(verdict if chosen else "none", chosen, tuple(candidates), (*good, *poor), before, 1.0)
+        step = Step(chosen, tuple(candidates), (*good, *poor), before, 1.0)
         fit = candidates[0].fit if chosen else base.fit
         after = float(np.sqrt(np.mean(fit.residual**2)))
         gate = base if verdict != "not_fitted" else BaseFit(base.fit, (1.0, 2.0, 3.0), False, "the starts differ")
         steps = (step,) if verdict != "not_fitted" else ()
         return Diagnosis(
-            verdict,
+            Verdict(verdict),
             chosen,
             steps,
             gate,

@@ -7,15 +7,17 @@ import dataclasses
 import numpy as np
 import pytest
 
-from forcegrasp.diagnosis import workflow as diagnosis_workflow
 from forcegrasp.diagnosis.advice import advise
+from forcegrasp.diagnosis.diagnose_set import chosen_effects, diagnose_set
 from forcegrasp.effects import get_effect
 from forcegrasp.errors import ConfigError
-from forcegrasp.identify import workflow
 from forcegrasp.identify.comparison import Comparison
+from forcegrasp.identify.fitted_model import model_of
 from forcegrasp.identify.initial_guess import guess, pad_distances
+from forcegrasp.identify.loading import Loaded
+from forcegrasp.identify.phases import PHASES, contacts, find_phases
 from forcegrasp.identify.problem import Problem
-from forcegrasp.identify.target import PHASES, contacts, find_phases, make_target
+from forcegrasp.identify.target import make_target
 from forcegrasp.measure import MeasuredGrasp
 from forcegrasp.physics.gripper import Gripper
 from forcegrasp.physics.gripper_file import load_gripper
@@ -34,7 +36,7 @@ NAMES = {
 }
 
 
-def recorded(gripper: Gripper, hidden: list[str], grasps: int, monkeypatch, objects: int = 2) -> workflow.Loaded:
+def recorded(gripper: Gripper, hidden: list[str], grasps: int, monkeypatch, objects: int = 2) -> Loaded:
     """Typical noise; never written, so that its fingerprint does not matter."""
     monkeypatch.setattr("forcegrasp.replay.record.fingerprint_of_set", lambda *_: "set")
     made = record(
@@ -49,19 +51,19 @@ def recorded(gripper: Gripper, hidden: list[str], grasps: int, monkeypatch, obje
         force_std_n=0.013 * gripper.force_scale,
         seed=1,
     )
-    return workflow.Loaded(made.measured, gripper, [])
+    return Loaded(made.measured, gripper, [])
 
 
 @pytest.mark.parametrize("name", ["franka_hand", "so101_gripper"])
 def test_finds_what_was_hidden(name, monkeypatch, tmp_path):
     """A coupled hand with two force sensors; one jaw whose motor's effort is read. And all that is told of it."""
     loaded = recorded(load_gripper(name), ["backlash"], 6, monkeypatch, objects=1)
-    diagnosis, _ = diagnosis_workflow.diagnose_set(loaded, None, LOOK_ALIKES, 0, lambda text: None)
+    diagnosis, _ = diagnose_set(loaded, None, LOOK_ALIKES, 0, lambda text: None)
     assert (diagnosis.verdict, diagnosis.effects) == ("effect", ("backlash",))
     assert diagnosis.error_after <= 1.1 * diagnosis.floor
     assert diagnosis.error_after < 0.7 * diagnosis.error_before
-    (found,) = workflow.model_of(diagnosis.fit, diagnosis.target, loaded, diagnosis.numerical).effects
-    assert found.values == pytest.approx(parse_effect("backlash", loaded.gripper)[2], rel=0.1)
+    (found,) = model_of(diagnosis.fit, diagnosis.target, loaded, diagnosis.numerical).effects
+    assert found.values == pytest.approx(parse_effect("backlash", loaded.gripper).values, rel=0.1)
 
     told = diagnosis_report.diagnosis_json(diagnosis, None, [], "set")
     assert list(told["parameters"]["backlash"]) == [p.name for p in found.effect.parameters]
@@ -74,14 +76,17 @@ def test_signals_are_the_grippers(name, monkeypatch, tmp_path):
     gripper = load_gripper(name)
     loaded = recorded(gripper, [], 2, monkeypatch)
     target = make_target(loaded.measured, gripper)
-    assert target.names == NAMES[name]
+    assert target.axis.names == NAMES[name]
     assert target.signals.shape[-1] == target.sigma.shape[0] == len(NAMES[name])
     assert target.sigma == pytest.approx(
-        [(0.013 * gripper.force_scale) if unit == "N" else 2.7e-5 * gripper.position_scale for unit in target.units]
+        [
+            (0.013 * gripper.force_scale) if unit == "N" else 2.7e-5 * gripper.position_scale
+            for unit in target.axis.units
+        ]
     )
     assert {PHASES[k] for k in np.unique(target.phase) if k >= 0} >= {"free", "hold", "release"}
 
-    residual = np.where(target.mask[..., None], 1.0, 0.0) * np.ones(len(target.names))
+    residual = np.where(target.mask[..., None], 1.0, 0.0) * np.ones(len(target.axis.names))
     comparison = Comparison(target, target.signals - residual * target.sigma, residual, residual, 1.0)
     told = comparison_report.compare_json(comparison, "set", "model", [])
     unit = gripper.unit
@@ -124,9 +129,9 @@ def test_a_gripper_without_forces_is_told_by_its_motion(monkeypatch, tmp_path):
     assert gripper.forces == ()
     loaded = recorded(gripper, [], 2, monkeypatch)
     target = make_target(loaded.measured, gripper)
-    assert target.names == ["position"]
-    assert list(target.kinds) == ["position"]
-    assert target.rounding == (0, 0)
+    assert target.axis.names == ["position"]
+    assert list(target.axis.kinds) == ["position"]
+    assert target.rounding is None
     assert {"free", "hold"} <= {PHASES[k] for k in np.unique(target.phase) if k >= 0}
     residual = np.where(target.mask[..., None], 1.0, 0.0)
     comparison = Comparison(target, target.signals, residual, residual, 1.0)
@@ -163,20 +168,19 @@ def test_radii_are_felt(name, monkeypatch):
 
 def test_effects_are_those_of_the_gripper():
     hand, jaw = load_gripper("franka_hand"), load_gripper("so101_gripper")
-    (delay,) = diagnosis_workflow.chosen_effects(hand, ["command_delay"])
+    (delay,) = chosen_effects(hand, ["command_delay"])
     assert delay.motors == 1
     assert get_effect("command_delay").motors == 2
-    assert len(diagnosis_workflow.chosen_effects(jaw, [])) < len(
-        diagnosis_workflow.chosen_effects(load_gripper("tiago"), [])
-    )
+    assert len(chosen_effects(jaw, [])) < len(chosen_effects(load_gripper("tiago"), []))
     with pytest.raises(ConfigError, match="force_crosstalk: needs 2 force readings; so101_gripper has 1"):
-        diagnosis_workflow.chosen_effects(jaw, ["force_crosstalk"])
+        chosen_effects(jaw, ["force_crosstalk"])
 
 
 def test_steps_of_a_turning_motor_are_a_parameter_in_radians(monkeypatch):
     gripper = load_gripper("robotiq_2f85")
     loaded = recorded(gripper, ["quantisation position_step_rad=0.004 force_step_n=0.4"], 2, monkeypatch)
     target = make_target(loaded.measured, gripper)
-    assert target.rounding == pytest.approx((0.004, 0.4))
+    assert target.rounding is not None
+    assert target.rounding.parameters == pytest.approx({"position_step_rad": 0.004, "force_step_n": 0.4})
     assert "readings come in steps: positions 4 mrad, forces 400 mN" in comparison_report.noise_sentence(target)
     assert fit_report.steps_picture(target).caption.startswith("Readings of force left")

@@ -13,19 +13,23 @@ from rich.console import Console
 
 from forcegrasp.diagnosis import signatures as score_module
 from forcegrasp.diagnosis.refine import refine
-from forcegrasp.diagnosis.search import Diagnosis, diagnose
+from forcegrasp.diagnosis.result import Diagnosis
+from forcegrasp.diagnosis.search import diagnose
 from forcegrasp.diagnosis.signatures import Background, Signatures, best_sizes
+from forcegrasp.diagnosis.study import Study
 from forcegrasp.effects import get_effect
+from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.identify import fit as fit_module
 from forcegrasp.identify.base_fit import BaseFit, check_gradient, fit_base, rms_error
 from forcegrasp.identify.cross_validation import heldout_residual, make_folds, rms
 from forcegrasp.identify.fit import Fit, Simulators, fit_exactly, fit_once
+from forcegrasp.identify.fitted_model import model_of
 from forcegrasp.identify.intervals import intervals, standard_errors, warnings
+from forcegrasp.identify.loading import Loaded
 from forcegrasp.identify.noise_floor import beyond_fit, excess, numerical_error, numerical_floor
-from forcegrasp.identify.predict import Applied, Case, predict
+from forcegrasp.identify.predict import Case, predict
 from forcegrasp.identify.problem import Problem
 from forcegrasp.identify.target import Target, make_target
-from forcegrasp.identify.workflow import Loaded, model_of
 from forcegrasp.measure import MeasuredGrasp, MeasurementSet
 from forcegrasp.physics.gripper_file import load_gripper
 from forcegrasp.replay.replay import Replay
@@ -59,7 +63,7 @@ def planned(index: int) -> MeasuredGrasp:
 
 
 def truth_of(problem: Problem) -> np.ndarray:
-    return np.array([e.coordinate(TRUTH[e.name]) for e in problem.entries if e.effect < 0])
+    return np.array([e.coordinate(TRUTH[e.name]) for e in problem.entries if e.effect is None])
 
 
 def measure(bias: np.ndarray) -> tuple[Target, Problem]:
@@ -196,7 +200,7 @@ def test_known_slopes_spare_simulations_and_lead_to_the_same_place(fitted, monke
     target, _ = measure(BIAS)
     before = fit_once(target, fitted.problem, fitted.simulators, fitted.fit.vector)
     bias = get_effect("force_bias")
-    problem = Problem(TIAGO, target.grasps, [(bias, "")])
+    problem = Problem(TIAGO, target.grasps, [EffectSetting.typical(bias)])
     start = np.r_[before.vector, problem.start()[len(before.vector) :] * 0.3]
     counts = []
 
@@ -223,9 +227,9 @@ def test_cases_that_differ_in_sensors_share_a_simulation(fitted, monkeypatch):
     bias, delay = get_effect("force_bias"), get_effect("command_delay")
     cases = [
         Case(base),
-        Case(base, (Applied(bias, "", BIAS),)),
+        Case(base, (EffectSetting(bias, "", BIAS),)),
         Case(base | {"force_scale": 2 * base["force_scale"]}),
-        Case(base, (Applied(delay, "", np.array([0.04])), Applied(bias, "", BIAS))),
+        Case(base, (EffectSetting(delay, "", np.array([0.04])), EffectSetting(bias, "", BIAS))),
         Case(base | {"position_gain": base["position_gain"] + 1}),
     ]
     simulated = []
@@ -247,7 +251,7 @@ def test_what_was_just_simulated_is_not_simulated_again(fitted, monkeypatch):
     simulate = Replay.simulate
     monkeypatch.setattr(Replay, "simulate", lambda self, g, *a: simulated.append(len(g)) or simulate(self, g, *a))
     (once,) = predict(replay, [Case(base)])
-    again, moved, read = predict(replay, [Case(base), Case(stronger), Case(base, (Applied(bias, "", BIAS),))])
+    again, moved, read = predict(replay, [Case(base), Case(stronger), Case(base, (EffectSetting(bias, "", BIAS),))])
     assert simulated == [6, 6]
     assert again.tobytes() == once.tobytes()
     assert np.abs(moved - once).max() > 1e-5
@@ -284,28 +288,29 @@ def threshold(fitted) -> SimpleNamespace:
     """The base model fitted to readings with a large dead zone: a threshold, whose signatures are far from straight."""
     zone = get_effect("force_deadzone")
     model = fitted.problem.case(fitted.fit.vector)
-    case = Case(model.base, (Applied(zone, zone.variants[0], np.array([0.4])),))
+    case = Case(model.base, (EffectSetting(zone, zone.variants[0], np.array([0.4])),))
     signals = predict(fitted.simulators.exact, [case])[0]
     target = dataclasses.replace(
         fitted.target, signals=signals + SIGMA * np.random.default_rng(3).standard_normal(signals.shape)
     )
     fit = fit_once(target, fitted.problem, fitted.simulators, fitted.fit.vector)
-    return SimpleNamespace(target=target, fit=fit, zone=zone, background=Background(fit, []))
+    told: list[str] = []
+    study = Study(target, fitted.simulators, (), progress=told.append)
+    return SimpleNamespace(study=study, told=told, fit=fit, zone=zone, background=Background(fit, []))
 
 
 def test_refining_finds_a_large_threshold(fitted, threshold):
-    target, fit, zone = threshold.target, threshold.fit, threshold.zone
-    signatures = Signatures([zone], target, fitted.simulators)
+    study, target, fit, zone = threshold.study, threshold.study.target, threshold.fit, threshold.zone
+    signatures = Signatures([zone], study)
     signatures.simulate(fit, [zone])
     scores = [group[0] for group in signatures.scores(fit, threshold.background, [zone])]
-    assert {score.variant for score in scores} == set(zone.variants)
-    sized = best_sizes(scores, fit, target, fitted.simulators, threshold.background)
-    assert [s.variant for s in sized] == [s.variant for s in scores]
-    told = []
-    refined = refine(scores, target, fit, fitted.simulators, threshold.background, told.append)
-    assert 1 <= len(refined) == len(told) <= len(scores)
+    assert {score.setting.variant for score in scores} == set(zone.variants)
+    sized = best_sizes(scores, study, fit, threshold.background)
+    assert [s.setting.kind for s in sized] == [s.setting.kind for s in scores]
+    refined = refine(scores, study, fit, threshold.background)
+    assert 1 <= len(refined) == len(threshold.told) <= len(scores)
     best = min(refined, key=lambda r: r.fit.cost)
-    assert best.score.variant == zone.variants[0]
+    assert best.score.setting.variant == zone.variants[0]
     refined = fit_exactly(target, best.fit.problem, fitted.simulators, best.fit.vector)
     assert refined.values[-1] == pytest.approx(0.4, rel=0.05)
     assert rms_error(refined, target) < 1.1 < rms_error(fit, target)
@@ -315,7 +320,7 @@ def test_refining_finds_a_large_threshold(fitted, threshold):
 
 def test_signatures_are_simulated_when_asked_for_and_kept(fitted, threshold, monkeypatch):
     zone, limit = threshold.zone, get_effect("force_limit")
-    signatures = Signatures([zone, limit], threshold.target, fitted.simulators)
+    signatures = Signatures([zone, limit], threshold.study)
     assert signatures.missing([zone, limit]) == [zone, limit]
     signatures.simulate(threshold.fit, [zone])
     assert signatures.missing([zone, limit]) == [limit]

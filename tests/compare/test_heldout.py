@@ -11,12 +11,14 @@ import pytest
 from scipy.stats import norm
 
 from forcegrasp.effects import get_effect
+from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.identify.cross_validation import FOLDS, heldout_residual, log_likelihood, make_folds, rms
 from forcegrasp.identify.fit import Fit
 from forcegrasp.identify.intervals import intervals, reached_bound, standard_errors, warnings
 from forcegrasp.identify.noise_floor import cells, excess, numerical_floor
+from forcegrasp.identify.phases import PHASES
 from forcegrasp.identify.problem import Problem
-from forcegrasp.identify.target import PHASES, Target
+from forcegrasp.identify.target import Target
 from forcegrasp.measure import MeasuredGrasp
 from forcegrasp.physics.gripper_file import load_gripper
 
@@ -203,7 +205,7 @@ ENTRIES = ("position_gain", "velocity_gain", "rho_m of cup", "force_scale of cup
 def fit_at(jacobian: np.ndarray, residual: np.ndarray, *effects: str, **values: float) -> Fit:
     """A fit of one object's grasps that ended at these values, nominal or typical by default."""
     grasps = [grasp(i, thing="cup") for i in range(len(residual))]
-    problem = Problem(TIAGO, grasps, [(get_effect(name), "") for name in effects])
+    problem = Problem(TIAGO, grasps, [EffectSetting.typical(get_effect(name)) for name in effects])
     vector = np.array([e.coordinate(values.get(e.parameter, e.start)) for e in problem.entries])
     return Fit(problem, vector, 0 * residual, residual, jacobian, 0 * residual, 0.0, 1)
 

@@ -6,10 +6,13 @@ import dataclasses
 
 import pytest
 
-from forcegrasp.diagnosis import workflow as diagnosis_workflow
+from forcegrasp.diagnosis.add_effect import add_effect
+from forcegrasp.diagnosis.diagnose_set import diagnose_set
 from forcegrasp.effects import get_effect
 from forcegrasp.errors import ConfigError, MeasurementError
-from forcegrasp.identify import workflow
+from forcegrasp.identify.fit_set import fit_model
+from forcegrasp.identify.fitted_model import model_of
+from forcegrasp.identify.loading import Loaded, load
 from forcegrasp.measure import check_set
 from tests.independent.rig import record
 
@@ -20,13 +23,13 @@ def silent(text: str) -> None:
     """Takes what a diagnosis tells about its progress."""
 
 
-def recorded(folder, hidden: dict, seed: int = 1, grasps: int = GRASPS) -> workflow.Loaded:
+def recorded(folder, hidden: dict, seed: int = 1, grasps: int = GRASPS) -> Loaded:
     record(folder / "set", hidden, seed, grasps)
-    return workflow.load(folder / "set")
+    return load(folder / "set")
 
 
-def diagnosed(loaded: workflow.Loaded):
-    return diagnosis_workflow.diagnose_set(loaded, None, [], 0, silent)[0]
+def diagnosed(loaded: Loaded):
+    return diagnose_set(loaded, None, [], 0, silent)[0]
 
 
 @pytest.mark.parametrize("name", ["object_friction"])
@@ -50,7 +53,7 @@ def test_does_not_name_an_effect_for_one_that_it_does_not_know(tmp_path):
     assert diagnosis.left
 
 
-def respoil(loaded: workflow.Loaded, spoil) -> workflow.Loaded:
+def respoil(loaded: Loaded, spoil) -> Loaded:
     grasps = tuple(spoil(list(loaded.measured.grasps)))
     return dataclasses.replace(loaded, measured=dataclasses.replace(loaded.measured, grasps=grasps))
 
@@ -90,15 +93,15 @@ def test_spoilt_sets_do_not_pass(tmp_path, spoil):
 
 def test_the_wrong_effect_does_not_lower_the_error(tmp_path):
     loaded = recorded(tmp_path, {"force_lag": "medium"}, grasps=8)
-    target, _, base = workflow.fit_model(loaded, 0, silent)
-    model = workflow.model_of(base.fit, target, loaded, [])
-    right = diagnosis_workflow.add_effect(loaded, model, get_effect("force_lag"), silent)
-    wrong = diagnosis_workflow.add_effect(loaded, model, get_effect("object_friction"), silent)
+    target, _, base = fit_model(loaded, 0, silent)
+    model = model_of(base.fit, target, loaded, [])
+    right = add_effect(loaded, model, get_effect("force_lag"), silent)
+    wrong = add_effect(loaded, model, get_effect("object_friction"), silent)
     assert right.error_after < 0.8 * right.error_before
     assert wrong.error_after > 0.97 * wrong.error_before
     assert right.model.effects[0].parameters["time_constant_s"].value == pytest.approx(0.03, abs=0.003)
     with pytest.raises(ConfigError, match="has it already"):
-        diagnosis_workflow.add_effect(loaded, right.model, get_effect("force_lag"), silent)
+        add_effect(loaded, right.model, get_effect("force_lag"), silent)
 
 
 def test_a_diagnosis_needs_grasps_to_hold_out(tmp_path):

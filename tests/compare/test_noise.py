@@ -9,7 +9,8 @@ import pytest
 
 from forcegrasp.diagnosis.noise_check import Noise, unlike_said
 from forcegrasp.identify.noise_floor import excess
-from forcegrasp.identify.target import PHASES, Target
+from forcegrasp.identify.phases import PHASES
+from forcegrasp.identify.target import Target
 from forcegrasp.measure import MeasuredGrasp
 from forcegrasp.physics.gripper_file import load_gripper
 from forcegrasp.reports import diagnosis as diagnosis_report

@@ -6,8 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from forcegrasp.diagnosis import workflow as diagnosis_workflow
-from forcegrasp.identify import workflow
+from forcegrasp.diagnosis.diagnose_set import diagnose_set
+from forcegrasp.identify.fitted_model import model_of
+from forcegrasp.identify.loading import load
 from forcegrasp.measure import write_set
 from forcegrasp.models.model_file import read_model, write_model
 from forcegrasp.physics.gripper_file import load_gripper
@@ -30,14 +31,14 @@ def test_finds_what_was_hidden_in_another_gripper(tmp_path):
         seed=4,
     )
     write_set(recorded.measured, tmp_path / "set")
-    loaded = workflow.load(tmp_path / "set")
+    loaded = load(tmp_path / "set")
     assert loaded.gripper.name == load_gripper(str(SECOND)).name
     names = ["force_lag", "force_bias"]
-    diagnosis, _ = diagnosis_workflow.diagnose_set(loaded, None, names, 0, lambda text: None)
+    diagnosis, _ = diagnose_set(loaded, None, names, 0, lambda text: None)
     assert (diagnosis.verdict, diagnosis.effects) == ("effect", ("force_lag",))
     assert diagnosis.error_after < 1.1 * diagnosis.floor < 1.2 * diagnosis.error_before
 
-    model = workflow.model_of(diagnosis.fit, diagnosis.target, loaded, [])
+    model = model_of(diagnosis.fit, diagnosis.target, loaded, [])
     write_model(model, tmp_path / "model.yaml")
     again = read_model(tmp_path / "model.yaml")
     assert np.isclose(again.effects[0].values[0], 0.1, rtol=0.05)

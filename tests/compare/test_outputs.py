@@ -13,11 +13,11 @@ from rich.console import Console
 
 from forcegrasp.cli.measuring import write_results
 from forcegrasp.cli.results import write_json
-from forcegrasp.diagnosis.search import Step
+from forcegrasp.diagnosis.result import Step
 from forcegrasp.effects import get_effect
 from forcegrasp.identify.base_fit import BaseFit
 from forcegrasp.identify.fit import Fit
-from forcegrasp.identify.workflow import model_of
+from forcegrasp.identify.fitted_model import model_of
 from forcegrasp.reports import comparison as comparison_report
 from forcegrasp.reports import diagnosis as diagnosis_report
 from forcegrasp.reports import figures
@@ -270,7 +270,7 @@ def test_rounding_is_found_without_any_fit(made_up, tmp_path):
     """The step has no candidates: nothing was fitted for it."""
     target = dataclasses.replace(made_up.target, quantum=np.array([0, 0, 0.04, 0.04]))
     plainly = made_up.diagnosis("effect")
-    step = Step("effect", ("quantisation",), (), (), 2.0, 1.5)
+    step = Step(("quantisation",), (), (), 2.0, 1.5)
     diagnosis = dataclasses.replace(
         plainly, target=target, steps=(step, *plainly.steps), effects=("quantisation", "force_bias")
     )

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from forcegrasp.effects import catalogue, get_effect
+from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.identify.problem import Problem
 from forcegrasp.measure import MeasuredGrasp
 from forcegrasp.physics.gripper_file import load_gripper
@@ -24,7 +25,10 @@ GRASPS = [
     grasp("c", "cup", None, 0.002),
     grasp("d", "ball", 0.03, None),
 ]
-EFFECTS = [(get_effect("rate_limit"), ""), (get_effect("backlash"), "loose"), (get_effect("force_bias"), "")]
+EFFECTS = [
+    EffectSetting.typical(get_effect(name), variant)
+    for name, variant in (("rate_limit", ""), ("backlash", "loose"), ("force_bias", ""))
+]
 
 
 @pytest.fixture
@@ -111,11 +115,11 @@ def test_a_vector_is_a_model(problem):
     assert {*case.base} == {*expected}
     for name, values in expected.items():
         assert case.base[name] == pytest.approx(values), name
-    assert [(a.effect, a.variant) for a in case.effects] == EFFECTS
+    assert [a.kind for a in case.effects] == [e.kind for e in EFFECTS]
     assert [a.values.tolist() for a in case.effects] == [pytest.approx(v) for v in ([0.05], [0.001], [0.1, -0.2])]
 
 
-@pytest.mark.parametrize("effects", [[], EFFECTS, [(e, e.variants[0]) for e in catalogue().values()]])
+@pytest.mark.parametrize("effects", [[], EFFECTS, [EffectSetting.typical(e) for e in catalogue().values()]])
 def test_columns_can_be_varied_together(effects):
     """Each entry in one group, and no grasp follows two entries of a group: its change is the one entry's."""
     problem = Problem(TIAGO, GRASPS, effects)
@@ -124,5 +128,5 @@ def test_columns_can_be_varied_together(effects):
     for group in groups:
         followers = np.sum([problem.entries[i].members for i in group], axis=0)
         assert followers.max() == 1
-    of_base = [g for g in groups if problem.entries[g[0]].effect < 0]
+    of_base = [g for g in groups if problem.entries[g[0]].effect is None]
     assert len(of_base) == len(TIAGO.parameters)  # not one per object or grasp

@@ -9,13 +9,17 @@ import numpy as np
 import pytest
 
 from forcegrasp.errors import MeasurementError
+from forcegrasp.identify.phases import PHASES, contacts, find_phases
 from forcegrasp.identify.rounding import find_step
-from forcegrasp.identify.target import PHASES, contacts, estimate_noise, find_phases, make_target
+from forcegrasp.identify.sensor_noise import estimate_noise
+from forcegrasp.identify.signal_axis import SignalAxis
+from forcegrasp.identify.target import make_target
 from forcegrasp.measure import MeasuredGrasp, MeasurementSet
 from forcegrasp.physics.gripper_file import load_gripper
 
 SIGMA_M, SIGMA_N = 3e-5, 0.02
 TIAGO = load_gripper("tiago")
+KINDS = SignalAxis(TIAGO).kinds
 TIME = np.arange(150) * 0.04
 
 
@@ -42,7 +46,7 @@ def measured(*grasps: MeasuredGrasp, std: tuple[float | None, float | None] = (N
 @pytest.mark.parametrize("std", [(SIGMA_M, SIGMA_N), (2e-4, 0.005)])
 def test_noise_is_told_from_motion(std):
     rng = np.random.default_rng(0)
-    estimate = estimate_noise(tuple(smooth_grasp(rng, std=std) for _ in range(8)))
+    estimate = estimate_noise([smooth_grasp(rng, std=std) for _ in range(8)], KINDS)
     assert estimate == pytest.approx([std[0], std[0], std[1], std[1]], rel=0.08)
 
 
@@ -51,7 +55,7 @@ def test_noise_estimate_survives_jumps():
     grasps = [smooth_grasp(rng) for _ in range(8)]
     for g in grasps:
         g.force_n[rng.integers(0, 150)] += 1.0
-    assert estimate_noise(tuple(grasps))[2] == pytest.approx(
+    assert estimate_noise(grasps, KINDS)[2] == pytest.approx(
         SIGMA_N, rel=0.15
     )  # by their spread it would be four times that
 
@@ -63,7 +67,7 @@ def test_noise_that_cannot_be_told_is_asked_for(std, kind):
         g, position_m=g.position_m if std[0] else 0 * g.position_m, force_n=g.force_n if std[1] else 0 * g.force_n
     )
     with pytest.raises(MeasurementError, match=rf"noise of the {kind} can't be told .*meta\.yaml"):
-        estimate_noise((still,))
+        estimate_noise([still], KINDS)
 
 
 def test_given_noise_is_believed():

@@ -9,10 +9,13 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from forcegrasp.diagnosis import search as diagnose
-from forcegrasp.diagnosis.search import Diagnosis, Step
+from forcegrasp.diagnosis import search
+from forcegrasp.diagnosis.evidence import indistinguishable, is_significant
+from forcegrasp.diagnosis.result import Diagnosis, Step
 from forcegrasp.diagnosis.verdict import conclude, explained_share
 from forcegrasp.effects import get_effect
+from forcegrasp.effects.setting import EffectSetting
+from forcegrasp.identify.verdict import Verdict
 from forcegrasp.reports import diagnosis as diagnosis_report
 
 
@@ -47,7 +50,7 @@ def test_what_convinces(made_up, changed, taken):
     gains = changed.get("gains")
     if gains is not None and len(gains) == 4 and gains.std() > 1:
         assert gains.std(ddof=1) == pytest.approx(10)
-    assert diagnose._is_significant(candidate(made_up, **changed), 0.02) == taken
+    assert is_significant(candidate(made_up, **changed), 0.02) == taken
 
 
 @pytest.mark.parametrize(("ahead", "equal"), [(4.9, True), (5.1, False)])
@@ -57,7 +60,7 @@ def test_a_lead_within_its_standard_error_decides_nothing(made_up, ahead, equal)
     assert lead.std(ddof=1) == pytest.approx(10)
     winner = candidate(made_up, gains=100 + lead, signature=np.array([1.0, 0.0]))
     other = candidate(made_up, gains=np.full(4, 100.0), signature=np.array([0.0, 1.0]))
-    assert diagnose._indistinguishable(winner, other) == equal
+    assert indistinguishable(winner, other) == equal
 
 
 # --- all steps -----------------------------------------------------------------------------------------------------
@@ -83,7 +86,7 @@ def test_a_lead_within_its_standard_error_decides_nothing(made_up, ahead, equal)
     ],
 )
 def test_the_verdict(found, before, after, left, verdict):
-    assert conclude(found, before, after, 1.0, left) == verdict
+    assert conclude([Verdict(step) for step in found], before, after, 1.0, left) == verdict
 
 
 def test_shares_are_of_the_mean_square_beyond_the_noise():
@@ -97,10 +100,13 @@ def test_shares_are_of_the_mean_square_beyond_the_noise():
 def two_steps(made_up, rivals: tuple[str, ...] = ("coulomb_friction", "stiction"), **changed: Any) -> Diagnosis:
     """Two effects found, the first with rivals that these data can't tell from it."""
     one = made_up.diagnosis("one_of")
-    first = [dataclasses.replace(one.steps[0].candidates[0], effect=get_effect(name)) for name in rivals]
+    first = [
+        dataclasses.replace(one.steps[0].candidates[0], setting=EffectSetting.typical(get_effect(name)))
+        for name in rivals
+    ]
     steps = (
-        Step("one_of", rivals, tuple(first), (), 5.0, 2.0),
-        Step("effect", ("force_bias",), one.steps[0].candidates[:1], (), 2.0, 1.0),
+        Step(rivals, tuple(first), (), 5.0, 2.0),
+        Step(("force_bias",), one.steps[0].candidates[:1], (), 2.0, 1.0),
     )
     names = (rivals[0], "force_bias", *rivals[1:])
     figures = {"error_before": 5.0, "error_after": 1.0, "floor": 1.02, "left": ""} | changed
@@ -157,15 +163,15 @@ def found_by(made_up, monkeypatch):
     """Runs the search with steps that are given."""
 
     def run(*steps: Step) -> Diagnosis:
-        following = iter((*steps, Step("none", (), (), (), 1.0, 1.0)))
+        following = iter((*steps, Step((), (), (), 1.0, 1.0)))
         base = made_up.base.fit
-        monkeypatch.setattr(diagnose, "_look_further", lambda *a: next(following))
-        monkeypatch.setattr(diagnose, "numerical_error", lambda fit, target: (0 * fit.residual + 0.1,) * 2)
-        monkeypatch.setattr(diagnose, "Signatures", lambda *a: None)
+        monkeypatch.setattr(search, "look_further", lambda *a: next(following))
+        monkeypatch.setattr(search, "numerical_error", lambda fit, target: (0 * fit.residual + 0.1,) * 2)
+        monkeypatch.setattr(search, "Signatures", lambda *a: None)
         effects = [get_effect(name) for name in ("force_bias", "force_drift", "backlash", "stiction")]
         nothing = cast(Any, SimpleNamespace())
         assert base.problem.effects == ()
-        return diagnose.diagnose(made_up.target, made_up.base, nothing, effects, np.random.default_rng(0))
+        return search.diagnose(made_up.target, made_up.base, nothing, effects, np.random.default_rng(0))
 
     return run
 
@@ -174,8 +180,8 @@ def test_effects_lists_what_was_found_and_then_the_rivals(made_up, found_by):
     bias, drift = made_up.diagnosis("one_of").steps[0].candidates
     half = dataclasses.replace(bias, fit=drift.fit)  # something is left, so that the search goes on
     diagnosis = found_by(
-        Step("one_of", ("force_bias", "stiction", "backlash"), (half,), (), 2.0, 1.6),
-        Step("one_of", ("force_drift", "backlash"), (dataclasses.replace(drift, fit=bias.fit),), (), 1.6, 1.0),
+        Step(("force_bias", "stiction", "backlash"), (half,), (), 2.0, 1.6),
+        Step(("force_drift", "backlash"), (dataclasses.replace(drift, fit=bias.fit),), (), 1.6, 1.0),
     )
     assert diagnosis.verdict == "one_of"
     assert diagnosis.effects == ("force_bias", "force_drift", "stiction", "backlash")
@@ -185,7 +191,7 @@ def test_effects_lists_what_was_found_and_then_the_rivals(made_up, found_by):
 
 def test_intervals_are_those_of_the_final_fit(made_up, found_by):
     (bias, _) = made_up.diagnosis("effect").steps[0].candidates
-    diagnosis = found_by(Step("effect", ("force_bias",), (bias,), (), 2.0, 1.0))
+    diagnosis = found_by(Step(("force_bias",), (bias,), (), 2.0, 1.0))
     assert diagnosis.fit is bias.fit
     assert [n.shape for n in diagnosis.numerical] == [bias.fit.residual.shape] * 2
     assert np.all(diagnosis.numerical[0] == 0.1 + 0 * bias.fit.residual)

@@ -105,18 +105,21 @@ class BegunError(Exception):
 
 def begun(monkeypatch, verb: str, **values: Any) -> dict[str, Any]:
     """What a verb sets out to compute: the arguments of the first expensive step, and where it would write."""
-    from forcegrasp.diagnosis import workflow as diagnosis_workflow
-    from forcegrasp.identify import workflow
+    from forcegrasp.diagnosis import add_effect, diagnose_set
+    from forcegrasp.identify import fit_set
+    from forcegrasp.identify.loading import Loaded
+    from forcegrasp.identify.target import Target
+    from forcegrasp.models.model_file import Model
 
     def told(value: Any) -> Any:
         match value:
             case np.random.Generator():
                 return int(value.integers(1 << 60))
-            case workflow.Loaded():
+            case Loaded():
                 return value.measured.fingerprint
-            case workflow.Model():
+            case Model():
                 return repr((value.base, value.effects))
-            case workflow.Target():
+            case Target():
                 return value.signals.tolist()
             case list():
                 return [told(item) for item in value]
@@ -133,13 +136,12 @@ def begun(monkeypatch, verb: str, **values: Any) -> dict[str, Any]:
     monkeypatch.setattr("forcegrasp.cli.measuring.check_folder", lambda path: reached.setdefault("folder", path))
     monkeypatch.setattr("forcegrasp.cli.measuring.check_file", lambda path: reached.setdefault("file", path))
     monkeypatch.setattr("time.strftime", lambda *_: "NOW")
-    monkeypatch.setattr(workflow, "fit_base", stop)
-    for name in ("diagnose", "add_effect"):
-        monkeypatch.setattr(diagnosis_workflow, name, stop)
+    for home, name in ((fit_set, "fit_base"), (diagnose_set, "diagnose"), (add_effect, "add_effect")):
+        monkeypatch.setattr(home, name, stop)
     if verb == "diagnose":
-        monkeypatch.setattr(workflow, "fit_model", fitted)
+        monkeypatch.setattr(fit_set, "fit_model", fitted)
     if verb != "add":
-        monkeypatch.setattr(workflow, "apply_model", fitted if verb == "diagnose" else stop)
+        monkeypatch.setattr(fit_set, "apply_model", fitted if verb == "diagnose" else stop)
     with pytest.raises(BegunError) as caught:
         main([verb, *(f"{name}={value}" for name, value in values.items())])
     return reached | {"arguments": caught.value.args[0]}

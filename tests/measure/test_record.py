@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from forcegrasp.effects import Effect, catalogue, get_effect
+from forcegrasp.effects import catalogue, get_effect
+from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.errors import ConfigError
 from forcegrasp.measure import check_set, read_set, write_set
 from forcegrasp.physics.gripper import Gripper
@@ -22,10 +23,9 @@ from forcegrasp.replay.replay import EffectOn, Replay
 TIAGO = load_gripper("tiago")
 SECOND = load_gripper(str(Path(__file__).parents[1] / "grippers" / "second.yaml"))
 CASES = [pytest.param(e, v, id=f"{e.name}-{v}".rstrip("-")) for e in catalogue().values() for v in e.variants]
-Use = tuple[type[Effect], str, np.ndarray]
 
 
-def make(gripper: Gripper = TIAGO, plan: str = "rich", effects: tuple[Use, ...] = (), **options) -> Recorded:
+def make(gripper: Gripper = TIAGO, plan: str = "rich", effects: tuple[EffectSetting, ...] = (), **options) -> Recorded:
     """A small recording without noise, unless told otherwise."""
     usual = {"grasps": 2, "objects": 2, "known": {}, "off_nominal": 0.2, "position_std_m": 0.0, "force_std_n": 0.0}
     return record(gripper, plan, effects=effects, **usual | {"seed": 15} | options)
@@ -46,14 +46,14 @@ def signals(made: Recorded) -> np.ndarray:
     return np.array([np.concatenate([g.position_m, g.force_n], axis=1) for g in made.measured.grasps])
 
 
-def replay_truth(made: Recorded, gripper: Gripper, effects: tuple[Use, ...]) -> np.ndarray:
+def replay_truth(made: Recorded, gripper: Gripper, effects: tuple[EffectSetting, ...]) -> np.ndarray:
     """The set's commands on a gripper with the true parameters and effects."""
     simulator, rows = Replay(gripper, made.measured.grasps), np.arange(len(made.measured.grasps))
-    on = [EffectOn(e, v, rows, np.repeat(values[None], len(rows), axis=0)) for e, v, values in effects]
+    on = [EffectOn(*e.kind, np.repeat(e.values[None], len(rows), axis=0), rows) for e in effects]
     base = {name: values for name, values in made.base.items() if name != "force_scale"}
     motion = simulator.simulate(rows, base, [e for e in on if not e.effect.reads_only(e.variant)])
     readings = simulator.read(motion, rows, made.base["force_scale"], [e for e in on if e.effect.reads()])
-    steps = rounding_steps((effect, values) for effect, _, values in effects)
+    steps = rounding_steps((e.effect, e.values) for e in effects)
     pairs = zip((readings.position, readings.force), steps, strict=True)
     return np.concatenate([with_noise(values, 0.0, 0.0, step) for values, step in pairs], axis=-1)
 
@@ -69,7 +69,8 @@ def test_replay_with_the_true_parameters_is_the_recording(gripper):
 def test_every_effect_can_be_recorded_and_replayed(effect, variant):
     """The replay knows recorded positions only, not what happened; that is enough for every effect alone."""
     # the typical converter saturates beyond what this grasp presses
-    use = (effect, variant, np.array([0.1]) if effect.name == "force_saturation" else effect.typical_values())
+    strength = np.array([0.1]) if effect.name == "force_saturation" else effect.typical_values()
+    use = EffectSetting(effect, variant, strength)
     made = make(effects=(use,), grasps=1)
     assert signals(made).tobytes() != signals(plain())[:1].tobytes()
     assert replay_truth(made, TIAGO, (use,)).tobytes() == signals(made).tobytes()
@@ -77,7 +78,7 @@ def test_every_effect_can_be_recorded_and_replayed(effect, variant):
 
 @pytest.mark.parametrize("effect", [pytest.param(e, id=e.name) for e in catalogue().values()])
 def test_null_values_change_no_bit(effect):
-    made = make(effects=((effect, "", effect.null_values()),), grasps=1)
+    made = make(effects=(EffectSetting(effect, "", effect.null_values()),), grasps=1)
     assert signals(made).tobytes() == signals(plain())[:1].tobytes()
 
 
@@ -92,7 +93,9 @@ def test_seed_decides_everything():
 
 def test_effects_and_noise_change_nothing_else():
     """The same seed grasps the same objects in the same way, so that sets can be compared."""
-    lagging = make(effects=((get_effect("force_lag"), "", np.array([0.1])),), position_std_m=1e-4, force_std_n=0.01)
+    lagging = make(
+        effects=(EffectSetting(get_effect("force_lag"), "", np.array([0.1])),), position_std_m=1e-4, force_std_n=0.01
+    )
     for one, other in zip(plain().measured.grasps, lagging.measured.grasps, strict=True):
         assert np.array_equal(one.command_m, other.command_m)
         assert (one.name, one.object, one.radius_m, one.offset_m) == (
@@ -162,7 +165,9 @@ def test_recorded_sets_are_sets_like_any_other(plan, gripper, samples, tmp_path)
 
 def test_quantisation_rounds_the_noise_too():
     steps = np.array([1e-4, 0.04])
-    made = make(effects=((get_effect("quantisation"), "", steps),), position_std_m=2.7e-5, force_std_n=0.013)
+    made = make(
+        effects=(EffectSetting(get_effect("quantisation"), "", steps),), position_std_m=2.7e-5, force_std_n=0.013
+    )
     for values, step in ((signals(made)[..., :2], steps[0]), (signals(made)[..., 2:], steps[1])):
         assert values / step == pytest.approx(np.round(values / step), abs=1e-6)
     free = signals(made)[:, :10, 2:]  # noise alone would not reach half a step often
@@ -184,12 +189,12 @@ def test_effects_by_word():
         ("none", get_effect("none"), "", []),
     ):
         parsed = parse_effect(text, TIAGO)
-        assert parsed[:2] == (effect, variant)
-        assert parsed[2].tolist() == values
+        assert parsed.kind == (effect, variant)
+        assert parsed.values.tolist() == values
     infinite = [(e, p) for e in catalogue().values() for p in e.parameters if np.isinf(p.null)]
     assert infinite
     for effect, p in infinite:  # null values lie beyond the bounds, and may be given all the same
-        assert np.isinf(parse_effect(f"{effect.name} {p.name}=inf", TIAGO)[2]).any()
+        assert np.isinf(parse_effect(f"{effect.name} {p.name}=inf", TIAGO).values).any()
 
 
 @pytest.mark.parametrize(

@@ -83,14 +83,14 @@ def test_effects_act_as_they_do_live(effect, variant):
     """Sensors are read after the simulation, those of the command see what is new: all as on a plant."""
     one, values = grasp(TIMES["jitter"]), effect.typical_values()
     simulator = Replay(TIAGO, [one], "fast", encoders_known=False)
-    on = EffectOn(effect, variant, np.array([0]), values[None])
+    on = EffectOn(effect, variant, values[None], np.array([0]))
     assert replayed(simulator, np.array([0]), on)[0].tobytes() == by_hand(one, (effect, variant, values)).tobytes()
 
 
 def test_several_effects_act_in_their_order():
     one = grasp(REGULAR)
     chosen = [get_effect(n) for n in ("quantisation", "force_bias", "force_lag", "backlash", "command_delay")]
-    on = [EffectOn(e, "", np.array([0]), e.typical_values()[None]) for e in chosen]
+    on = [EffectOn(e, "", e.typical_values()[None], np.array([0])) for e in chosen]
     seen = replayed(Replay(TIAGO, [one], "fast", encoders_known=False), np.array([0]), *on)[0]
     assert seen.tobytes() == by_hand(one, *((e, "", e.typical_values()) for e in chosen)).tobytes()
 
@@ -127,9 +127,9 @@ def many() -> tuple[Replay, np.ndarray, tuple[EffectOn, ...], dict[str, np.ndarr
     rows = np.array([0, 1, 2, 2, 1, 0, 0, 1, 2])
     bias, delay, viscous = map(get_effect, ("force_bias", "command_delay", "viscoelastic_contact"))
     effects = (
-        EffectOn(bias, "", np.array([1, 4, 8]), np.array([[0.1, 0.2], [0.3, 0.4], [0.5, 0.6]])),
-        EffectOn(delay, "", np.array([0, 4, 5, 7]), np.array([[0.01], [0.02], [0.03], [0.045]])),
-        EffectOn(viscous, "", np.array([8]), np.array([[300.0, 0.2]])),
+        EffectOn(bias, "", np.array([[0.1, 0.2], [0.3, 0.4], [0.5, 0.6]]), np.array([1, 4, 8])),
+        EffectOn(delay, "", np.array([[0.01], [0.02], [0.03], [0.045]]), np.array([0, 4, 5, 7])),
+        EffectOn(viscous, "", np.array([[300.0, 0.2]]), np.array([8])),
     )
     return Replay(TIAGO, grasps, "fast"), rows, effects, {"position_gain": np.linspace(80, 110, 9)}
 
@@ -150,7 +150,7 @@ def test_rows_are_as_if_alone():
         for e in effects:
             at = np.flatnonzero(e.rows == row)
             if len(at):
-                mine.append(EffectOn(e.effect, e.variant, np.array([0]), e.values[at]))
+                mine.append(EffectOn(*e.kind, e.values[at], np.array([0])))
         alone = replayed(simulator, rows[[row]], *mine, base={n: v[[row]] for n, v in base.items()})
         assert alone[0].tobytes() == whole[row].tobytes()
 
@@ -158,7 +158,7 @@ def test_rows_are_as_if_alone():
 def test_one_motion_is_read_in_several_ways():
     simulator = Replay(TIAGO, [grasp(REGULAR), grasp(TIMES["gap"])], "fast")
     motion = simulator.simulate(np.arange(2), {name: np.full(2, value) for name, value in BASE.items()})
-    bias = EffectOn(get_effect("force_bias"), "", np.array([1]), np.array([[0.1, -0.2]]))
+    bias = EffectOn(get_effect("force_bias"), "", np.array([[0.1, -0.2]]), np.array([1]))
     readings = simulator.read(motion, np.array([0, 0, 1, 0]), np.array([1.0, 1.0, 2.0, 3.0]), [bias])
     assert np.array_equal(readings.position[0], readings.position[3])
     assert readings.force[3] == pytest.approx(3 * readings.force[0], rel=1e-12)
@@ -170,7 +170,7 @@ def test_one_motion_is_read_in_several_ways():
 
 def test_a_drivers_dead_band_goes_by_the_recorded_encoder():
     """Where a grasp was recorded, the driver decided by what its encoder said then, not by what we simulate."""
-    dead = EffectOn(get_effect("command_deadband"), "position", np.array([0]), np.array([[0.003]]))
+    dead = EffectOn(get_effect("command_deadband"), "position", np.array([[0.003]]), np.array([0]))
     one = grasp(REGULAR)
     at_command = grasp(REGULAR, position_m=one.command_m.copy())  # recorded as being there already: nothing is sent
     far = grasp(REGULAR, position_m=one.command_m + 0.01)

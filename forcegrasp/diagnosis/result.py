@@ -1,0 +1,117 @@
+"""What a search for missing effects found: its steps, their candidates, and the diagnosis that they add up to."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from forcegrasp.diagnosis.noise_check import Noise
+from forcegrasp.diagnosis.signatures import Score
+from forcegrasp.diagnosis.verdict import explained_share
+from forcegrasp.effects import Effect
+from forcegrasp.effects.setting import EffectSetting
+from forcegrasp.identify.base_fit import BaseFit
+from forcegrasp.identify.cross_validation import heldout_residual
+from forcegrasp.identify.fit import Fit
+from forcegrasp.identify.target import Target
+from forcegrasp.identify.verdict import Verdict
+from forcegrasp.short_repr import ShortRepr, counted, some
+
+#: Stands for the verdict of a step that found no effect, in JSON and where it is printed.
+NOTHING = "none"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Candidate(ShortRepr):
+    """One effect, refitted together with everything else."""
+
+    setting: EffectSetting  #: the effect, as it was fitted
+    fit: Fit
+    p_family: float  #: probability that the best signature of sensor noise does as well
+    gains: np.ndarray  #: change of each held-out grasp's log-likelihood, ``(G,)``
+    error_after: float  #: held-out rms residual ÷ noise
+    share: float  #: share of the mean square beyond the noise that it explains
+    largest_fall: float  #: largest share by which the error of a signal in a phase falls
+    signature: np.ndarray  #: unit vector, ``(N,)``
+
+    def summary(self) -> str:
+        sizes = some(f"{name} {value:.3g}" for name, value in self.setting.parameters.items())
+        return f"{self.effect.name}: error {self.error_after:.2f} × noise, gain {self.heldout_gain:+.0f}, {sizes}"
+
+    @property
+    def effect(self) -> type[Effect]:
+        """The effect's class."""
+        return self.setting.effect
+
+    @property
+    def heldout_gain(self) -> float:
+        """Change of the held-out log-likelihood, all grasps together."""
+        return float(np.nansum(self.gains))
+
+
+@dataclass(frozen=True, repr=False)
+class Step(ShortRepr):
+    """One step of the search: one more effect, or none."""
+
+    effects: tuple[str, ...]  #: the effect found, or those that can't be told apart, best first; none if nothing was
+    candidates: tuple[Candidate, ...]  #: refitted, best first
+    scores: tuple[Score, ...]  #: best signature of each effect, best first
+    error_before: float
+    error_after: float
+
+    @property
+    def verdict(self) -> Verdict | None:
+        """Whether one effect was found or several that can't be told apart; None if there is none."""
+        if not self.effects:
+            return None
+        return Verdict.EFFECT if len(self.effects) == 1 else Verdict.ONE_OF
+
+    @property
+    def is_counted(self) -> bool:
+        """Whether the effect was found by counting the values of readings, without any fit."""
+        return bool(self.effects) and not self.candidates
+
+    def summary(self) -> str:
+        change = f"error {self.error_before:.2f} → {self.error_after:.2f} × noise"
+        return (
+            f"{self.verdict or NOTHING}: {some(self.effects)}; {change}, {counted(len(self.candidates), 'candidate')}"
+        )
+
+
+@dataclass(frozen=True, repr=False)
+class Diagnosis(ShortRepr):
+    """What the data say that the model lacks."""
+
+    verdict: Verdict
+    effects: tuple[str, ...]  #: those in the model, in the order found; with "one_of" then the rivals of each
+    steps: tuple[Step, ...]
+    base: BaseFit
+    fit: Fit  #: with the effects that were found
+    target: Target
+    folds: tuple[np.ndarray, ...]
+    error_before: float
+    error_after: float
+    numerical: tuple[np.ndarray, ...] = field(default=())  #: of the final fit, each ``(G, S, C)``
+    floor: float = 1.0  #: error that sensor noise and the model's own numerical error leave
+    left: str = ""  #: where there is more than that, in words; empty if nowhere
+    noise: Noise | None = None  #: what the noise is, if the residuals show that it is not what was said
+
+    @property
+    def preferred(self) -> tuple[str, ...]:
+        """The effects that were found and are in the final model: of those that can't be told apart the first."""
+        return tuple(step.effects[0] for step in self.steps if step.effects)
+
+    @property
+    def explained(self) -> float:
+        """Share of the held-out mean square beyond the noise that the effects found explain."""
+        noise = self.error_after if self.noise is not None and not self.left else 1.0
+        return float(np.clip(explained_share(self.error_before, self.error_after, noise), 0.0, 1.0))
+
+    def summary(self) -> str:
+        change = f"error {self.error_before:.2f} → {self.error_after:.2f} × noise, floor {self.floor:.2f}"
+        return f"{self.verdict}: {some(self.effects)}; {change}"
+
+    def heldout(self) -> np.ndarray:
+        """Residuals of held-out grasps under the final fit, ``(G, S, C)``."""
+        return heldout_residual(self.fit, self.target, self.folds)

@@ -1,0 +1,63 @@
+"""Puts a model beside a measurement set: the base model, fitted to it, or one that is given."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from forcegrasp.errors import ConfigError
+from forcegrasp.identify.base_fit import BaseFit, check_gradient, fit_base
+from forcegrasp.identify.fit import Simulators, fit_once
+from forcegrasp.identify.loading import Loaded
+from forcegrasp.identify.problem import Problem
+from forcegrasp.identify.progress import Progress
+from forcegrasp.identify.target import Target, make_target
+from forcegrasp.measure import MeasurementSet
+from forcegrasp.models.model_file import Model
+from forcegrasp.physics.sensors import is_rounding
+
+
+def fit_model(loaded: Loaded[MeasurementSet], seed: int, progress: Progress) -> tuple[Target, Simulators, BaseFit]:
+    """Fits the base model to a set, from several starts."""
+    target = make_target(loaded.measured, loaded.gripper)
+    problem = Problem(loaded.gripper, target.grasps)
+    simulators = Simulators(problem)
+    return target, simulators, fit_base(target, problem, simulators, np.random.default_rng(seed), progress)
+
+
+def apply_model(
+    loaded: Loaded[MeasurementSet], model: Model, progress: Progress, refit: bool
+) -> tuple[Target, Simulators, BaseFit]:
+    """Puts a model beside a set: as it is but for objects and grasps it does not know, or fitted again from there.
+
+    Raises:
+      ConfigError: if the model is of another gripper.
+    """
+    if model.gripper.name != loaded.gripper.name:
+        raise ConfigError(f"model: is of gripper {model.gripper.name}, the set is of {loaded.gripper.name}")
+    target = make_target(loaded.measured, loaded.gripper)
+    # rounding is not fitted: the measurements show it, and it counts as noise
+    effects = [found.setting for found in model.effects if not is_rounding(found.effect)]
+    problem = Problem(loaded.gripper, target.grasps, effects)
+    simulators = Simulators(problem)
+    vector, unknown = _coordinates(problem, model)
+    if unknown.any() and not refit:
+        names = ", ".join(e.name for e, u in zip(problem.entries, unknown, strict=True) if u)
+        progress(f"the model does not say {names}: fitted")
+    free = np.ones(len(problem), bool) if refit else unknown
+    return target, simulators, check_gradient(fit_once(target, problem, simulators, vector, free=free), target)
+
+
+def _coordinates(problem: Problem, model: Model) -> tuple[np.ndarray, np.ndarray]:
+    """A model's numbers as a problem's coordinates, and which of them the model does not have."""
+    vector, unknown = problem.start(), np.zeros(len(problem), bool)
+    for index, entry in enumerate(problem.entries):
+        if entry.effect is not None:  # effects start from the model's values
+            continue
+        first = problem.grasps[int(np.flatnonzero(entry.members)[0])]
+        places = [model.base, model.objects.get(first.object, {}), model.grasps.get(first.name, {})]
+        fitted = next((place[entry.parameter] for place in places if entry.parameter in place), None)
+        if fitted is None:
+            unknown[index] = True
+        else:
+            vector[index] = entry.coordinate(fitted.value)
+    return vector, unknown

@@ -1,0 +1,54 @@
+"""A measurement set that was read and checked, with the gripper that it is of."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Generic, TypeVar
+
+from forcegrasp.identify.given_noise import check_given_noise
+from forcegrasp.measure import FinalForceTable, MeasurementSet, check_set, check_table, read_set
+from forcegrasp.models.model_file import Model
+from forcegrasp.physics.gripper import Gripper
+from forcegrasp.physics.gripper_file import load_gripper
+from forcegrasp.short_repr import ShortRepr, counted
+
+Measured = TypeVar("Measured", bound=MeasurementSet | FinalForceTable, covariant=True)
+
+
+@dataclass(frozen=True, repr=False)
+class Loaded(ShortRepr, Generic[Measured]):
+    """A measurement set that was read and checked."""
+
+    measured: Measured
+    gripper: Gripper
+    warnings: list[str]
+
+    def summary(self) -> str:
+        return f"{self.measured.summary()}; {counted(len(self.warnings), 'warning')}"
+
+
+def load(path: str | Path) -> Loaded[MeasurementSet] | Loaded[FinalForceTable]:
+    """Reads and checks a set.
+
+    Raises:
+      MeasurementError: if the set can't be right.
+      ConfigError: if its gripper is unknown.
+    """
+    measured = read_set(path)
+    gripper = load_gripper(measured.gripper, measured.path)
+    if isinstance(measured, FinalForceTable):
+        return Loaded(measured, gripper, check_table(measured, gripper.stroke))
+    odd = check_set(measured, gripper.stroke, half_opening_m=float(gripper.opening.opening_m[-1]) / 2)
+    return Loaded(measured, gripper, odd + check_given_noise(measured, gripper.unit))
+
+
+def warn_of_other_set(loaded: Loaded[MeasurementSet], model: Model, name: object) -> Loaded[MeasurementSet]:
+    """The set, with a warning if a model says that it was fitted to another one; ``name`` is the model's file."""
+    own = loaded.measured.fingerprint
+    if model.data.get("fingerprint", own) == own:
+        return loaded
+    other = model.data.get("set", "a set without a name")
+    warning = f"model={name}: was fitted to other measurements ({other}) than {loaded.measured.path}"
+    return dataclasses.replace(loaded, warnings=[*loaded.warnings, warning])
