@@ -20,6 +20,7 @@ from forcegrasp.identify.fitted_model import model_of
 from forcegrasp.identify.loading import Loaded
 from forcegrasp.identify.noise_floor import numerical_error
 from forcegrasp.identify.target import Target
+from forcegrasp.identify.verdict import Verdict
 from forcegrasp.measure import FinalForceTable, MeasurementSet
 from forcegrasp.models.model_file import Model
 from forcegrasp.reports import comparison as comparison_report
@@ -174,7 +175,7 @@ class DiagnoseResult(Result):
     file = "diagnosis"
 
     @property
-    def verdict(self) -> str:
+    def verdict(self) -> Verdict:
         """One of "effect", "one_of", "explained", "unknown" and "not_fitted"."""
         return self.diagnosis.verdict
 
@@ -197,7 +198,7 @@ class DiagnoseResult(Result):
     def model(self) -> Model:
         """The fitted model, with the effects that were found; of those that can't be told apart with the first."""
         diagnosis = self.diagnosis
-        if self.verdict not in ("effect", "one_of"):
+        if not self.verdict.names_effects:
             return self._base_model
         numerical = numerical_error(diagnosis.fit, diagnosis.target)
         return model_of(diagnosis.fit, diagnosis.target, self.data, numerical)
@@ -223,7 +224,7 @@ class DiagnoseResult(Result):
 
     def models(self) -> dict[str, Model]:
         base = {measuring.BASE_MODEL: self._base_model} if self.from_base else {}
-        return base | ({"model.yaml": self.model} if self.verdict in ("effect", "one_of") else {})
+        return base | ({"model.yaml": self.model} if self.verdict.names_effects else {})
 
     def summary(self) -> str:
         found = f"{self.verdict} {some(self.effects)}".strip()
@@ -288,7 +289,7 @@ class TableResult(Result):
     file: str  #: "compare" or "diagnosis"
 
     @property
-    def verdict(self) -> str:
+    def verdict(self) -> Verdict:
         """One of "one_of", "explained", "unknown" and "not_fitted"; a table alone never names one effect."""
         return self.analysis.verdict
 

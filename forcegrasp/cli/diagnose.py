@@ -69,7 +69,7 @@ def main(arguments: list[str]) -> int:
     if model is None:
         write_model(base_model(diagnosis.base, diagnosis.target, loaded), out / BASE_MODEL)
         print(f"wrote {known}: the base model, fitted to this set")
-    if diagnosis.verdict in ("effect", "one_of"):
+    if diagnosis.verdict.names_effects:
         print(f"add it: forcegrasp add data={data} model={known} effect={diagnosis.effects[0]} out=better.yaml")
         better = model_of(diagnosis.fit, diagnosis.target, loaded, diagnosis.numerical)
         write_model(better, out / "model.yaml")

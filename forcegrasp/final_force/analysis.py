@@ -7,11 +7,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.optimize import least_squares
-from scipy.stats import chi2, f, t
+from scipy.stats import chi2, t
 
+from forcegrasp.final_force.candidate import Candidate, Rows, freedom, rms
 from forcegrasp.final_force.causes import CAUSES, causes_of
 from forcegrasp.final_force.shapes import BASE, FURTHER, Shape, ShapeFit, bootstrap, captured, fit_shape
+from forcegrasp.final_force.slopes import shared_onset, slope_ratio, slopes_differ
+from forcegrasp.identify.verdict import Verdict
 from forcegrasp.measure.schema import FinalForceTable
 from forcegrasp.physics.gripper import Gripper
 from forcegrasp.physics.gripper_parts import Training
@@ -31,42 +33,13 @@ _SEED = 20230
 
 
 @dataclass(frozen=True, repr=False)
-class Rows(ShortRepr):
-    """The rows of one object that are fitted."""
-
-    delta_m: np.ndarray  #: ``(n,)``
-    force_n: np.ndarray  #: ``(n,)``
-
-
-@dataclass(frozen=True, repr=False)
-class Candidate(ShortRepr):
-    """One shape on all objects, each with its own parameters."""
-
-    shape: Shape
-    fits: dict[str, ShapeFit]  #: by object
-    p_family: float  #: probability that noise about the base law makes the best of all shapes look this good
-    heldout_gain: float  #: change of the leave-one-out log-likelihood against the base law
-    lead_error: float  #: standard error of that change
-
-    @property
-    def left_out(self) -> np.ndarray:
-        """Leave-one-out errors of all rows, N."""
-        return np.concatenate([fit.left_out for fit in self.fits.values()])
-
-    @property
-    def residual(self) -> np.ndarray:
-        """Residuals of all rows, N."""
-        return np.concatenate([fit.residual for fit in self.fits.values()])
-
-
-@dataclass(frozen=True, repr=False)
 class TableAnalysis(ShortRepr):
     """A table of final forces against the base model's static law, and what else would describe it."""
 
     table: FinalForceTable
     rows: dict[str, Rows]  #: of each object that was fitted
     skipped: dict[str, str]  #: object → why it was not
-    verdict: str  #: "one_of", "explained", "unknown" or "not_fitted"; a table alone never names one effect
+    verdict: Verdict  #: a table alone never names one effect
     reason: str  #: of the verdict, in a sentence
     effects: tuple[str, ...] = ()  #: what could make the shape that was found
     found: tuple[str, ...] = ()  #: names of the shapes that are equally good, best first; empty if none is needed
@@ -122,7 +95,7 @@ def analyse_table(table: FinalForceTable, gripper: Gripper) -> TableAnalysis:
     }
     if not rows:
         why = "; ".join(f"{name}: {reason}" for name, reason in skipped.items())
-        return TableAnalysis(table, rows, skipped, "not_fitted", f"no object can be fitted ({why})", **facts)
+        return TableAnalysis(table, rows, skipped, Verdict.NOT_FITTED, f"no object can be fitted ({why})", **facts)
     rng = np.random.default_rng(_SEED)
     fits = {shape: {name: fit_shape(shape, r.delta_m, r.force_n) for name, r in rows.items()} for shape in _shapes()}
     noise, noise_from, known = _noise(table, rows, fits)
@@ -142,9 +115,10 @@ def analyse_table(table: FinalForceTable, gripper: Gripper) -> TableAnalysis:
     }
     verdict, reason = _verdict(found, effects, best, noise, noise_from)
     return TableAnalysis(
-        table, rows, skipped, verdict, reason, effects if verdict == "one_of" else (), found, noise, noise_from, base,
-        tuple(candidates), intervals, slopes_differ_p=_one_slope(best, rows), slope_ratio=_ratio(best, rows, rng),
-        shared=_shared(rows, fits) if found and "dead_zone" in found else {}, **facts,
+        table, rows, skipped, verdict, reason, effects if verdict is Verdict.ONE_OF else (), found, noise, noise_from,
+        base, tuple(candidates), intervals, slopes_differ_p=slopes_differ(best, rows),
+        slope_ratio=slope_ratio(best, rows, rng),
+        shared=shared_onset(rows, fits) if found and "dead_zone" in found else {}, **facts,
     )  # fmt: skip
 
 
@@ -184,15 +158,11 @@ def _rounding(rows: Mapping[str, Rows]) -> float:
     return max(step / np.sqrt(12), _LEAST_NOISE_N)
 
 
-def _freedom(shape: Shape, rows: Mapping[str, Rows]) -> int:
-    return max(1, sum(len(r.force_n) - len(shape.parameters) for r in rows.values()))
-
-
 def _noise(table: FinalForceTable, rows: Mapping[str, Rows], fits: Mapping) -> tuple[float, str, bool]:
     """Noise of a force, N, in words where it comes from, and whether it is known apart from the fits."""
     left = {shape: sum(float(np.sum(fit.residual**2)) for fit in of.values()) for shape, of in fits.items()}
     best, freedom = min(
-        ((squares, _freedom(shape, rows)) for shape, squares in left.items()), key=lambda pair: pair[0] / pair[1]
+        ((squares, freedom(shape, rows)) for shape, squares in left.items()), key=lambda pair: pair[0] / pair[1]
     )
     scatter = float(np.sqrt(best / freedom))
     spread, repeats = 0.0, 0
@@ -214,7 +184,7 @@ def _noise(table: FinalForceTable, rows: Mapping[str, Rows], fits: Mapping) -> t
 def _family(rows: Mapping[str, Rows], fits: Mapping, sigma: float | None, rng: np.random.Generator) -> dict:
     """Probability of each shape's improvement, or a better one of any shape, under the base law."""
     n = sum(len(r.force_n) for r in rows.values())
-    scatter = np.sqrt(sum(np.sum(fit.residual**2) for fit in fits[BASE].values()) / _freedom(BASE, rows))
+    scatter = np.sqrt(sum(np.sum(fit.residual**2) for fit in fits[BASE].values()) / freedom(BASE, rows))
     least = _rounding(rows)
     spread = sigma or max(float(scatter), least)
     gains = {shape: np.zeros(1 + _NULLS) for shape in FURTHER}
@@ -243,13 +213,13 @@ def _found(candidates: Sequence[Candidate], base: Candidate, noise: float) -> tu
     """Names of the shapes that the table needs and can't tell apart, best first."""
     before = rms(base.left_out)
     good = [c for c in candidates if c.heldout_gain > 0 and rms(c.left_out) < (1 - LEAST_GAIN) * before]
-    convincing = [c for c in good if c.p_family <= ALARM and before > _LEAST_NOISE_N]
-    if not convincing:
+    significant = [c for c in good if c.p_family <= ALARM and before > _LEAST_NOISE_N]
+    if not significant:
         return ()
-    equal = [convincing[0].shape.name]
+    equal = [significant[0].shape.name]
     for other in good:
-        lead = (other.left_out**2 - convincing[0].left_out ** 2) / (2 * noise**2)
-        if other is not convincing[0] and lead.sum() <= max(lead.std(ddof=1) * np.sqrt(len(lead)), 1.0):
+        lead = (other.left_out**2 - significant[0].left_out ** 2) / (2 * noise**2)
+        if other is not significant[0] and lead.sum() <= max(lead.std(ddof=1) * np.sqrt(len(lead)), 1.0):
             equal.append(other.shape.name)
     if "dead_zone" in equal and "bias" in equal:
         # With no negative readings, a line with a negative offset is the same curve.
@@ -258,80 +228,20 @@ def _found(candidates: Sequence[Candidate], base: Candidate, noise: float) -> tu
     return tuple(equal)
 
 
-def _verdict(found: tuple[str, ...], effects: tuple[str, ...], best: Candidate, noise: float, noise_from: str):
+def _verdict(
+    found: tuple[str, ...], effects: tuple[str, ...], best: Candidate, noise: float, noise_from: str
+) -> tuple[Verdict, str]:
     words = " or a ".join(name.replace("_", " ") for name in found if CAUSES[name] or not effects)
     if effects and "curve" in found:
         words += " (or a bent curve, which no effect of the catalogue makes in such trials)"
     misfit = rms(best.residual) / noise
     if found and not effects:
-        return "unknown", (
+        return Verdict.UNKNOWN, (
             f"the table follows a {words}, which no effect makes where the delta is added at every step;"
             " where one target is held, the contact's own stiffness bends the curve"
         )
     if not noise_from.startswith("scatter") and misfit > 1.5:
-        return "unknown", f"the best shape leaves {misfit:.1f} times the noise ({noise_from})"
+        return Verdict.UNKNOWN, f"the best shape leaves {misfit:.1f} times the noise ({noise_from})"
     if found:
-        return "one_of", f"the table follows a {words}; final forces can't tell which of its effects makes it"
-    return "explained", "no shape describes the table better than the base law, beyond what noise would do"
-
-
-def _one_slope(best: Candidate, rows: Mapping[str, Rows]) -> float | None:
-    """Probability of slopes that scatter this much if there were one: an F test over the objects."""
-    if len(rows) < 2:
-        return None
-    slopes, errors = np.array([_slope_error(best, rows, name) for name in rows]).T
-    weights = 1 / np.maximum(errors, 1e-9) ** 2
-    mean = np.sum(weights * slopes) / np.sum(weights)
-    spread = np.sum(weights * (slopes - mean) ** 2) / (len(slopes) - 1)
-    return float(f.sf(spread, len(slopes) - 1, _freedom(best.shape, rows)))
-
-
-def _slope_error(best: Candidate, rows: Mapping[str, Rows], name: str) -> tuple[float, float]:
-    """Slope and its standard error by the linearised fit with the table's common scatter."""
-    fit, x = best.fits[name], rows[name].delta_m
-    scatter = np.sqrt(np.sum(best.residual**2) / _freedom(best.shape, rows))
-    jacobian = []
-    for index, value in enumerate(fit.values):
-        step = 1e-4 * max(abs(value), 1e-4)
-        moved = fit.values.copy()
-        moved[index] += step
-        other = ShapeFit(fit.shape, moved, fit.residual, fit.left_out)
-        jacobian.append((other.predict(x) - fit.predict(x)) / step)
-    covariance = np.linalg.pinv(np.array(jacobian) @ np.array(jacobian).T)
-    return fit.slope, float(scatter * np.sqrt(max(covariance[0, 0], 0.0)))
-
-
-def _ratio(best: Candidate, rows: Mapping[str, Rows], rng: np.random.Generator) -> tuple[float, float, float] | None:
-    if len(rows) < 2:
-        return None
-    order = sorted(best.fits, key=lambda name: best.fits[name].slope)
-    low, high = (bootstrap(best.fits[name], rows[name].delta_m, rng)[:, 0] for name in (order[0], order[-1]))
-    value = best.fits[order[-1]].slope / best.fits[order[0]].slope
-    least, most = np.quantile(high / low, (0.025, 0.975))
-    return value, float(least), float(most)
-
-
-def _shared(rows: Mapping[str, Rows], fits: Mapping) -> dict[str, float]:
-    """rms error with one onset for all objects: as a "travel" Δq, or as a "force" on the reading."""
-    if len(rows) < 2:
-        return {}
-    names, dead = list(rows), {s.name: s for s in fits}["dead_zone"]
-    slopes = np.array([fits[dead][name].slope for name in names])
-    onsets = np.array([fits[dead][name].values[1] for name in names])
-
-    def residual(vector: np.ndarray, kind: str) -> np.ndarray:
-        slope, onset = vector[:-1], vector[-1]  # of a travel in mm, of a force in N
-        missing = slope * onset * 1e-3 if kind == "travel" else np.full(len(names), onset)
-        curves = [np.maximum(s * rows[n].delta_m - z, 0.0) for s, z, n in zip(slope, missing, names, strict=True)]
-        return np.concatenate(curves) - np.concatenate([rows[n].force_n for n in names])
-
-    found = {}
-    for kind, start in (("travel", onsets.mean() * 1e3), ("force", float((slopes * onsets).mean()))):
-        fit = least_squares(residual, np.r_[slopes, start], args=(kind,), x_scale=np.r_[slopes, max(start, 1e-3)])
-        found[kind] = rms(fit.fun)
-    return found
-
-
-def rms(values: np.ndarray) -> float:
-    """Root mean square."""
-    return float(np.sqrt(np.mean(values**2)))
+        return Verdict.ONE_OF, f"the table follows a {words}; final forces can't tell which of its effects makes it"
+    return Verdict.EXPLAINED, "no shape describes the table better than the base law, beyond what noise would do"

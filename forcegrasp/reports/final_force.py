@@ -8,8 +8,10 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from forcegrasp.final_force.analysis import Candidate, TableAnalysis
+from forcegrasp.final_force.analysis import TableAnalysis
+from forcegrasp.final_force.candidate import Candidate, rms
 from forcegrasp.final_force.causes import CAUSES, MENU, NO_TRACE, Onset, grasps_for
+from forcegrasp.identify.verdict import Verdict
 from forcegrasp.reports.figures import plain
 from forcegrasp.reports.html import Picture, Section, Table, Text
 
@@ -50,13 +52,13 @@ def diagnosis_json(analysis: TableAnalysis) -> dict:
         "error_after": after,
         "floor_ratio": after,
         "next_grasp": {"grasp": grasps[0], "tells_apart": list(analysis.effects)} if grasps else None,
-        "where": _where(analysis) if analysis.verdict == "unknown" else None,
+        "where": _where(analysis) if analysis.verdict is Verdict.UNKNOWN else None,
     }
 
 
 def next_grasps(analysis: TableAnalysis) -> tuple[str, ...]:
     """Grasps of the menu to record next; none if nothing is open."""
-    return grasps_for(analysis.found) if analysis.verdict in ("one_of", "unknown") else ()
+    return grasps_for(analysis.found) if analysis.verdict in (Verdict.ONE_OF, Verdict.UNKNOWN) else ()
 
 
 def _errors(analysis: TableAnalysis, candidate: Candidate | None, kind: str) -> dict[str, Any]:
@@ -65,19 +67,19 @@ def _errors(analysis: TableAnalysis, candidate: Candidate | None, kind: str) -> 
     objects = {
         name: {
             "rows": len(fit.residual),
-            "rms_n": number(_rms(getattr(fit, kind))),
-            "ratio": number(_rms(getattr(fit, kind)) / analysis.noise_n),
+            "rms_n": number(rms(getattr(fit, kind))),
+            "ratio": number(rms(getattr(fit, kind)) / analysis.noise_n),
             "bias_n": number(np.mean(getattr(fit, kind))),
             "slope_n_m": number(fit.slope),
         }
         for name, fit in candidate.fits.items()
     }
-    rms = _rms(getattr(candidate, kind))
-    return {"rms_n": number(rms), "ratio": number(rms / analysis.noise_n), "objects": objects}
+    error = rms(getattr(candidate, kind))
+    return {"rms_n": number(error), "ratio": number(error / analysis.noise_n), "objects": objects}
 
 
 def _ratio(analysis: TableAnalysis, candidate: Candidate | None) -> float | None:
-    return None if candidate is None else number(_rms(candidate.left_out) / analysis.noise_n)
+    return None if candidate is None else number(rms(candidate.left_out) / analysis.noise_n)
 
 
 def _ranking(analysis: TableAnalysis) -> list[dict]:
@@ -157,10 +159,10 @@ def _row(analysis: TableAnalysis, name: str) -> tuple[str, ...]:
         name,
         str(len(base.residual)),
         f"{base.slope:.0f}",
-        f"{_rms(base.residual):.3f}",
+        f"{rms(base.residual):.3f}",
         best.shape.name.replace("_", " "),
         "; ".join(_with_intervals(analysis, name)),
-        f"{_rms(fit.residual):.3f}",
+        f"{rms(fit.residual):.3f}",
         "–" if scale is None else f"{scale[0]:.2f} [{scale[1]:.2f}, {scale[2]:.2f}]",
     )
 
@@ -248,8 +250,8 @@ def _shape_row(candidate: Candidate, is_base: bool) -> tuple[str, ...]:
     return (
         candidate.shape.name.replace("_", " "),
         candidate.shape.formula,
-        f"{_rms(candidate.residual):.4f}",
-        f"{_rms(candidate.left_out):.4f}",
+        f"{rms(candidate.residual):.4f}",
+        f"{rms(candidate.left_out):.4f}",
         "–" if is_base else f"{candidate.heldout_gain:+.1f} ± {candidate.lead_error:.1f}",
         "–" if is_base else f"{candidate.p_family:.3f}",
     )
@@ -301,7 +303,3 @@ def draw(analysis: TableAnalysis) -> Figure:
 def number(value: float | None) -> float | None:
     """A plain finite float, or None."""
     return None if value is None or not math.isfinite(value) else float(value)
-
-
-def _rms(values: np.ndarray) -> float:
-    return float(np.sqrt(np.mean(values**2)))

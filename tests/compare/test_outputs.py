@@ -167,7 +167,11 @@ def test_a_parameter_at_its_bound_is_marked_in_every_table(made_up):
 def test_a_diagnosis_marks_parameters_at_their_bounds(made_up, tmp_path):
     one = made_up.diagnosis("one_of")
     (step,) = one.steps
-    candidates = tuple(dataclasses.replace(c, fit=at_bounds(c.fit)) for c in step.candidates)
+    fits = [at_bounds(c.fit) for c in step.candidates]
+    candidates = tuple(
+        dataclasses.replace(c, fit=fit, setting=fit.problem.case(fit.vector).effects[-1])
+        for c, fit in zip(step.candidates, fits, strict=True)
+    )
     diagnosis = dataclasses.replace(
         one, fit=candidates[0].fit, steps=(dataclasses.replace(step, candidates=candidates),)
     )
@@ -191,9 +195,9 @@ def test_values_of_a_step_give_way_to_final_ones(made_up):
     bias = one.steps[0].candidates[0]
     final = dataclasses.replace(bias.fit, vector=np.r_[bias.fit.vector[:-2], 0.0123 / 0.06, 0.0456 / 0.04])
     diagnosis = dataclasses.replace(one, fit=final)
-    drift = dict(one.steps[0].candidates[1].parameters())
+    drift = one.steps[0].candidates[1].setting.parameters
     (left, right) = final.values[-2:]
-    assert left != pytest.approx(bias.parameters()["left_n"])
+    assert left != pytest.approx(bias.setting.parameters["left_n"])
     found = diagnosis_report.diagnosis_json(diagnosis, None, made_up.tried, "s")
     for rows in (found["ranking"], found["steps"][0]["ranking"]):
         assert rows[0]["parameters"] == {"left_n": left, "right_n": right}

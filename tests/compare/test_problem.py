@@ -90,7 +90,7 @@ def test_the_start_is_nominal_and_typical(problem):
     values = dict(zip((e.name for e in problem.entries), problem.values(problem.start()), strict=True))
     for name, p in TIAGO.parameters.items():
         assert all(value == pytest.approx(p.nominal) for key, value in values.items() if key.split(" of ")[0] == name)
-    for effect, _ in EFFECTS:
+    for effect in (one.effect for one in EFFECTS):
         for p in effect.parameters:
             assert values[f"{effect.name}.{p.name}"] == pytest.approx(p.typical)
 

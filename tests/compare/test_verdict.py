@@ -149,7 +149,7 @@ def test_much_that_is_left_is_said_first(made_up, before, after, left, said):
 
 
 def test_little_explained_is_unknown_and_says_what_it_would_take_off(made_up):
-    diagnosis = two_steps(made_up, verdict="unknown", error_before=348.0, error_after=173.0, left="in all")
+    diagnosis = two_steps(made_up, verdict=Verdict.UNKNOWN, error_before=348.0, error_after=173.0, left="in all")
     first = diagnosis_report.answer(diagnosis).partition(". ")[0]
     assert "none of the effects I know" in first
     assert "348.00 × the sensor noise, and coulomb_friction and force_bias would only take it down to 173.00 ×" in first
