@@ -23,7 +23,7 @@ from forcegrasp.errors import ConfigError
 from forcegrasp.final_force.analysis import analyse_table
 from forcegrasp.identify import compare_set, fit_set, loading
 from forcegrasp.identify.loading import Loaded
-from forcegrasp.identify.progress import Progress
+from forcegrasp.identify.progress import Progress, silent
 from forcegrasp.measure import FinalForceTable, MeasurementSet
 from forcegrasp.models.model_file import Model, read_model, write_model
 from forcegrasp.short_repr import cut
@@ -41,7 +41,7 @@ def load(path: str | Path) -> Loaded[MeasurementSet] | Loaded[FinalForceTable]:
         final forces, with ``meta.yaml`` and ``table.csv``.
 
     Returns:
-      The set in ``measured``, its gripper, and in ``warnings`` what is odd about it.
+      The set in ``measured``, its gripper, and in ``warnings`` what looks wrong with it.
 
     Raises:
       MeasurementError: if the set can't be right: file, row, column and what to do.
@@ -60,7 +60,7 @@ def compare(
       model: what :func:`fit`, :func:`diagnose` or :func:`add` returned, or a model's file; a model that was fitted to
         other grasps is tested on all of these. Without one, the base model is fitted to these grasps first.
       seed: of the fit's starts.
-      progress: told in a line what is going on, such as ``print``; nothing is said by default.
+      progress: takes lines about what is done, such as ``print``; silent by default.
 
     Raises:
       MeasurementError: if the set can't be right.
@@ -83,7 +83,7 @@ def fit(data: AnySet, *, out: str | Path | None = None, seed: int = 0, progress:
       data: what :func:`load` returns, or the set's folder.
       out: the file to write the model to; none by default.
       seed: of the fit's starts.
-      progress: told in a line what is going on, such as ``print``; nothing is said by default.
+      progress: takes lines about what is done, such as ``print``; silent by default.
 
     Raises:
       MeasurementError: if the set can't be right.
@@ -112,7 +112,7 @@ def diagnose(
       model: what to start from, as for :func:`compare`; its parameters are fitted again. The base model by default.
       effects: names of the effects to try; the whole catalogue by default.
       seed: of the fit's starts and of the null distribution.
-      progress: told in a line what is going on, such as ``print``; nothing is said by default.
+      progress: takes lines about what is done, such as ``print``; silent by default.
 
     Raises:
       MeasurementError: if the set can't be right, or has too few grasps to hold any out.
@@ -146,7 +146,7 @@ def add(
       model: the model to add to, as for :func:`compare`.
       effect: its name; :func:`diagnose` tells which.
       out: the file to write the model to; none by default.
-      progress: told in a line what is going on, such as ``print``; nothing is said by default.
+      progress: takes lines about what is done, such as ``print``; silent by default.
 
     Raises:
       MeasurementError: if the set can't be right.
@@ -188,16 +188,12 @@ def report(result: ModelResult | TableResult, out: str | Path | None = None) -> 
 
 
 def _open(data: AnySet, progress: Progress | None) -> tuple[Loaded[MeasurementSet] | Loaded[FinalForceTable], Progress]:
-    """The set, and what is told about the work; first what is odd about it."""
+    """The set, whose warnings are reported, and where to report progress."""
     loaded = data if isinstance(data, Loaded) else load(data)
-    show = progress or _nothing
+    show = progress or silent
     for warning in loaded.warnings:
         show(f"warning: {warning}")
     return loaded, show
-
-
-def _nothing(line: str) -> None:
-    """Tells nobody."""
 
 
 def _beside(model: AnyModel, loaded: Loaded[MeasurementSet], show: Progress) -> tuple[Model, Loaded[MeasurementSet]]:

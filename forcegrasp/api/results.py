@@ -129,7 +129,7 @@ class FitResult(Result):
 
     @property
     def converged(self) -> bool:
-        """Whether to believe the fit; ``base.reason`` says why not."""
+        """Whether the fit converged; ``base.reason`` says why not."""
         return self.base.converged
 
     @cached_property

@@ -1,4 +1,4 @@
-"""Whether what a model leaves is noise of another size or shape than was said: white, and alike everywhere."""
+"""Whether what a model leaves is noise of another size or shape than was assumed: white, and alike everywhere."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from forcegrasp.identify.target import Target
 
 # Lags over which a missing effect would show, in samples.
 _LAGS = 5
-# Of the mean square beyond the noise that was said, so much may follow from the sample before and still be called
+# Of the mean square beyond the assumed noise, so much may follow from the sample before and still be called
 # noise: no effect that explains less is looked for. And so much may phases, speeds and forces differ by.
 _IN_TIME, _BETWEEN_GROUPS = 0.25, 0.35
-# A group is as was said if its readings are this many times likelier then (logarithm) than drawn from all groups.
-_LIKELIER, _LEAST_SAMPLES = np.log(3.0), 40
+# A group has the assumed noise if that explains it so much better than the noise of all groups (log likelihood ratio).
+_LOG_RATIO, _LEAST_SAMPLES = np.log(3.0), 40
 # Residuals are counted between these quantiles of their sizes, and beyond so many σ; the rarest class is of this share.
-_QUANTILES, _WILD, _LEAST_SHARE = (0.25, 0.5, 0.75, 0.9, 0.97), 4.0, 1e-3
-# Readings that scatter less than this share of the noise that was said.
-_LESS = 0.8
+_QUANTILES, _OUTLIER, _LEAST_SHARE = (0.25, 0.5, 0.75, 0.9, 0.97), 4.0, 1e-3
+# Readings that scatter less than this share of the assumed noise.
+_SMALLER = 0.8
 # rms ÷ core above which tails are heavy: 1 if the noise is normal, 1.5 with three degrees of freedom.
 _HEAVY = 1.2
 # Half of a normal distribution lies within so many σ.
@@ -31,27 +31,27 @@ _MEDIAN = float(ndtri(0.75))
 
 @dataclass(frozen=True)
 class Noise:
-    """Noise that is not what was said. One figure per signal where not told otherwise."""
+    """Noise that is not as assumed. One figure per signal, unless stated otherwise."""
 
-    times: np.ndarray  #: rms of the residuals ÷ the noise that was said, ``(C,)``
+    ratio: np.ndarray  #: rms of the residuals ÷ the assumed noise, ``(C,)``
     core: np.ndarray  #: the same of the middle half of them, which tails don't reach, ``(C,)``
-    unlike: np.ndarray  #: which signals it concerns, ``(C,)``
+    affected: np.ndarray  #: which signals it concerns, ``(C,)``
 
     @property
     def heavy_tails(self) -> np.ndarray:
-        """Which of these signals have more wild readings than a normal distribution, ``(C,)``."""
-        return self.unlike & (self.times > _HEAVY * self.core)
+        """Which of these signals have more outliers than a normal distribution, ``(C,)``."""
+        return self.affected & (self.ratio > _HEAVY * self.core)
 
     @property
     def stronger(self) -> bool:
-        """Whether some signal is noisier than was said, or has wilder readings."""
-        return bool(np.any(self.unlike & (self.times > 1)) or self.heavy_tails.any())
+        """Whether some signal is noisier than assumed, or has more outliers."""
+        return bool(np.any(self.affected & (self.ratio > 1)) or self.heavy_tails.any())
 
 
-def unlike_said(
+def unexpected_noise(
     residual: np.ndarray, numerical: Sequence[np.ndarray], target: Target, predicted: np.ndarray
 ) -> Noise | None:
-    """The noise, if it is not what was said, and all that residuals show; None if it is, or if they show more than it.
+    """The noise, if it is not as assumed and all that residuals show; None if it is, or if they show more than noise.
 
     A signal's residuals are judged by their normal scores: each is replaced by the quantile that its size has among
     all of them, with its sign. So neither the noise's size nor its tails count.
@@ -60,26 +60,26 @@ def unlike_said(
       residual: of held-out grasps, in units of the noise, ``(G, S, C)``.
       numerical: as for :func:`~forcegrasp.identify.noise_floor.numerical_floor`.
       target: the measurements.
-      predicted: signals, ``(G, S, C)``; by them, for they have no noise, slow and fast samples are told apart.
+      predicted: signals, ``(G, S, C)``; by them, for they have no noise, slow and fast samples are separated.
     """
     count = residual.shape[-1]
     one = np.eye(count, dtype=bool)
-    times = np.array([rms(residual, target, signal) for signal in one])
-    core = np.array([_core(residual[..., k][_there(residual[..., k], target)]) for k in range(count)])
+    ratio = np.array([rms(residual, target, signal) for signal in one])
+    core = np.array([_core(residual[..., k][_present(residual[..., k], target)]) for k in range(count)])
     if not excess(residual, numerical, target):
-        less = times < _LESS
-        return Noise(times, core, less) if less.any() else None
-    clean, unlike = residual.copy(), np.zeros(count, bool)
+        smaller = ratio < _SMALLER
+        return Noise(ratio, core, smaller) if smaller.any() else None
+    clean, affected = residual.copy(), np.zeros(count, bool)
     for k, signal in enumerate(one):
         values, floor = residual[..., k], numerical_floor(numerical, target, signal)
-        scores, beyond = _normal_scores(values, _there(values, target)), 1 - (min(floor, core[k]) / times[k]) ** 2
+        scores, beyond = _normal_scores(values, _present(values, target)), 1 - (min(floor, core[k]) / ratio[k]) ** 2
         groups = _partitions(target, predicted[..., target.axis.side_of(k)])
-        if _is_white(scores, beyond, groups) and not _some_group_as_said(values / floor, groups):
-            clean[..., k], unlike[k] = scores, True
-    return None if excess(clean, numerical, target) else Noise(times, core, unlike)
+        if _is_white(scores, beyond, groups) and not _some_group_as_assumed(values / floor, groups):
+            clean[..., k], affected[k] = scores, True
+    return None if excess(clean, numerical, target) else Noise(ratio, core, affected)
 
 
-def _there(values: np.ndarray, target: Target) -> np.ndarray:
+def _present(values: np.ndarray, target: Target) -> np.ndarray:
     return target.mask & np.isfinite(values)
 
 
@@ -123,7 +123,7 @@ def _is_white(scores: np.ndarray, beyond: float, partitions: Sequence[np.ndarray
 
     Args:
       scores: ``(G, S)``; NaN where there are none.
-      beyond: share of the mean square that is beyond the noise that was said.
+      beyond: share of the mean square that is beyond the assumed noise.
       partitions: from :func:`_partitions`.
     """
     count = int(np.isfinite(scores).sum())
@@ -138,20 +138,20 @@ def _is_white(scores: np.ndarray, beyond: float, partitions: Sequence[np.ndarray
     return True
 
 
-def _some_group_as_said(values: np.ndarray, partitions: Sequence[np.ndarray]) -> bool:
-    """Whether in some group a signal's residuals ÷ floor, ``(G, S)``, are just as was said, while others are not."""
+def _some_group_as_assumed(values: np.ndarray, partitions: Sequence[np.ndarray]) -> bool:
+    """Whether in some group a signal's residuals ÷ floor, ``(G, S)``, are as assumed, while others' are not."""
     sizes = np.abs(values)
     everything = sizes[(partitions[0] >= 0) & np.isfinite(sizes)]
-    edges = np.unique([*np.quantile(everything, _QUANTILES), _WILD])
-    said = np.diff(np.r_[0.0, 2 * ndtr(edges) - 1, 1.0])
+    edges = np.unique([*np.quantile(everything, _QUANTILES), _OUTLIER])
+    assumed = np.diff(np.r_[0.0, 2 * ndtr(edges) - 1, 1.0])
 
     def counted(values: np.ndarray) -> np.ndarray:
-        return np.bincount(np.searchsorted(edges, values), minlength=len(said))
+        return np.bincount(np.searchsorted(edges, values), minlength=len(assumed))
 
     of_all = counted(everything) / len(everything)
-    evidence = np.log(np.maximum(of_all, _LEAST_SHARE) / np.maximum(said, _LEAST_SHARE))
+    evidence = np.log(np.maximum(of_all, _LEAST_SHARE) / np.maximum(assumed, _LEAST_SHARE))
     counts = [counted(group) for partition in partitions for group in _grouped(sizes, partition)]
-    return any(count @ evidence < -_LIKELIER for count in counts if count.sum() >= _LEAST_SAMPLES)
+    return any(count @ evidence < -_LOG_RATIO for count in counts if count.sum() >= _LEAST_SAMPLES)
 
 
 def _at_most(square: float, of_noise: float, terms: int) -> float:

@@ -95,7 +95,7 @@ class Diagnosis(ShortRepr):
     numerical: tuple[np.ndarray, ...] = field(default=())  #: of the final fit, each ``(G, S, C)``
     floor: float = 1.0  #: error that sensor noise and the model's own numerical error leave
     left: str = ""  #: where there is more than that, in words; empty if nowhere
-    noise: Noise | None = None  #: what the noise is, if the residuals show that it is not what was said
+    noise: Noise | None = None  #: what the noise is, if the residuals show that it is not as assumed
 
     @property
     def preferred(self) -> tuple[str, ...]:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from forcegrasp.diagnosis.noise_check import Noise, unlike_said
+from forcegrasp.diagnosis.noise_check import Noise, unexpected_noise
 from forcegrasp.diagnosis.result import Diagnosis, Step
 from forcegrasp.diagnosis.signatures import Signatures
 from forcegrasp.diagnosis.step import look_further
@@ -81,7 +81,7 @@ def diagnose(
 
 
 def _left(study: Study, fit: Fit) -> tuple[str, Noise | None]:
-    """Where held-out residuals are more than noise, in words; and the noise, if it is not what was said."""
+    """Where held-out residuals are more than noise, in words; and the noise, if it is not as assumed."""
     held = study.heldout(fit)
-    noise = unlike_said(held, study.numerical, study.target, fit.predicted)
+    noise = unexpected_noise(held, study.numerical, study.target, fit.predicted)
     return ("" if noise else excess(held, study.numerical, study.target)), noise

@@ -18,9 +18,9 @@ def explained_share(before: float, after: float, noise: float = 1.0) -> float:
     """Share of the mean square beyond the noise that is gone.
 
     Args:
-      before: rms error ÷ the noise that was said.
+      before: rms error ÷ the assumed noise.
       after: the same afterwards.
-      noise: the noise as it turned out ÷ the noise that was said.
+      noise: the noise as it turned out ÷ the assumed noise.
     """
     return (before**2 - after**2) / max(before**2 - noise**2, 1e-9)
 

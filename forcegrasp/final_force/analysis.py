@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.stats import chi2, t
 
-from forcegrasp.final_force.candidate import Candidate, Rows, freedom, rms
+from forcegrasp.final_force.candidate import Candidate, Rows, degrees_of_freedom, rms
 from forcegrasp.final_force.causes import CAUSES, causes_of
 from forcegrasp.final_force.shapes import BASE, FURTHER, Shape, ShapeFit, bootstrap, captured, fit_shape
 from forcegrasp.final_force.slopes import shared_onset, slope_ratio, slopes_differ
@@ -162,7 +162,8 @@ def _noise(table: FinalForceTable, rows: Mapping[str, Rows], fits: Mapping) -> t
     """Noise of a force, N, in words where it comes from, and whether it is known apart from the fits."""
     left = {shape: sum(float(np.sum(fit.residual**2)) for fit in of.values()) for shape, of in fits.items()}
     best, freedom = min(
-        ((squares, freedom(shape, rows)) for shape, squares in left.items()), key=lambda pair: pair[0] / pair[1]
+        ((squares, degrees_of_freedom(shape, rows)) for shape, squares in left.items()),
+        key=lambda pair: pair[0] / pair[1],
     )
     scatter = float(np.sqrt(best / freedom))
     spread, repeats = 0.0, 0
@@ -184,7 +185,7 @@ def _noise(table: FinalForceTable, rows: Mapping[str, Rows], fits: Mapping) -> t
 def _family(rows: Mapping[str, Rows], fits: Mapping, sigma: float | None, rng: np.random.Generator) -> dict:
     """Probability of each shape's improvement, or a better one of any shape, under the base law."""
     n = sum(len(r.force_n) for r in rows.values())
-    scatter = np.sqrt(sum(np.sum(fit.residual**2) for fit in fits[BASE].values()) / freedom(BASE, rows))
+    scatter = np.sqrt(sum(np.sum(fit.residual**2) for fit in fits[BASE].values()) / degrees_of_freedom(BASE, rows))
     least = _rounding(rows)
     spread = sigma or max(float(scatter), least)
     gains = {shape: np.zeros(1 + _NULLS) for shape in FURTHER}

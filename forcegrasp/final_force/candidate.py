@@ -40,7 +40,7 @@ class Candidate(ShortRepr):
         return np.concatenate([fit.residual for fit in self.fits.values()])
 
 
-def freedom(shape: Shape, rows: Mapping[str, Rows]) -> int:
+def degrees_of_freedom(shape: Shape, rows: Mapping[str, Rows]) -> int:
     """Rows of all objects that a shape's parameters leave free, 1 at least."""
     return max(1, sum(len(r.force_n) - len(shape.parameters) for r in rows.values()))
 

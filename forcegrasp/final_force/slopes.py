@@ -8,7 +8,7 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.stats import f
 
-from forcegrasp.final_force.candidate import Candidate, Rows, freedom, rms
+from forcegrasp.final_force.candidate import Candidate, Rows, degrees_of_freedom, rms
 from forcegrasp.final_force.shapes import ShapeFit, bootstrap
 
 
@@ -20,13 +20,13 @@ def slopes_differ(best: Candidate, rows: Mapping[str, Rows]) -> float | None:
     weights = 1 / np.maximum(errors, 1e-9) ** 2
     mean = np.sum(weights * slopes) / np.sum(weights)
     spread = np.sum(weights * (slopes - mean) ** 2) / (len(slopes) - 1)
-    return float(f.sf(spread, len(slopes) - 1, freedom(best.shape, rows)))
+    return float(f.sf(spread, len(slopes) - 1, degrees_of_freedom(best.shape, rows)))
 
 
 def _slope_error(best: Candidate, rows: Mapping[str, Rows], name: str) -> tuple[float, float]:
     """Slope and its standard error by the linearised fit with the table's common scatter."""
     fit, x = best.fits[name], rows[name].delta_m
-    scatter = np.sqrt(np.sum(best.residual**2) / freedom(best.shape, rows))
+    scatter = np.sqrt(np.sum(best.residual**2) / degrees_of_freedom(best.shape, rows))
     jacobian = []
     for index, value in enumerate(fit.values):
         step = 1e-4 * max(abs(value), 1e-4)

@@ -1,8 +1,8 @@
-"""Fits the base model from several starts, and says whether to believe it."""
+"""Fits the base model from several starts, and says whether it converged."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +10,7 @@ import numpy as np
 from forcegrasp.identify.fit import Fit, Simulators, fit_exactly, fit_once
 from forcegrasp.identify.initial_guess import guess
 from forcegrasp.identify.problem import Problem
+from forcegrasp.identify.progress import Progress, silent
 from forcegrasp.identify.target import Target
 from forcegrasp.short_repr import ShortRepr
 
@@ -19,15 +20,15 @@ STARTS, MOST_STARTS = 3, 6
 _GRASPS_PER_OBJECT = 2
 # Starts end in the same place if their costs agree to this share, or to this much per residual.
 _SAME_SHARE, _SAME_COST = 0.01, 0.002
-# Where an effect is missing the ground is rough: starts agree if their costs beyond the noise do to this share.
+# Where an effect is missing the cost has many minima: starts agree if their costs beyond the noise do to this share.
 _SAME_BEYOND = 0.2
 # Largest slope at an optimum, in standard errors of the parameter; those of a noisy simulator never vanish.
-_FLAT = 5.0
+_MAX_GRADIENT = 5.0
 
 
 @dataclass(frozen=True, repr=False)
 class BaseFit(ShortRepr):
-    """The best of several fits, with the gate that a diagnosis must pass."""
+    """The best of several fits, and whether it converged, which a diagnosis needs."""
 
     fit: Fit
     errors: tuple[float, ...]  #: rms residual ÷ noise where each start ended
@@ -40,7 +41,7 @@ def fit_base(
     problem: Problem,
     simulators: Simulators,
     rng: np.random.Generator,
-    progress: Callable[[str], None] = lambda text: None,
+    progress: Progress = silent,
 ) -> BaseFit:
     """Fits from the nominal parameters, and then looks from random places inside the bounds for a better optimum."""
     first = fit_once(target, problem, simulators, guess(target, problem))
@@ -48,15 +49,15 @@ def fit_base(
     few = _few_grasps(target)
     small = _Subset(target, problem, few, first)
     ends = [small.fit(small.known)]
-    while len(ends) < STARTS or (len(ends) < MOST_STARTS and not _agree(ends, small.target)):
+    while len(ends) < STARTS or (len(ends) < MOST_STARTS and not _ends_agree(ends, small.target)):
         ends.append(small.fit(_random_start(small.problem, guess(small.target, small.problem), rng)))
         most = STARTS if len(ends) <= STARTS else MOST_STARTS
         progress(f"base model, start {len(ends)} of {most}: {rms_error(ends[-1], small.target):.2f} × noise")
     best = min(ends, key=lambda f: f.cost)
     errors = tuple(rms_error(f, small.target) for f in ends)
-    if ends[0].cost - best.cost > _same(best, small.target):  # another start found a better place
+    if ends[0].cost - best.cost > _cost_tolerance(best, small.target):  # another start found a better place
         first = fit_once(target, problem, simulators, small.enlarge(best))
-    if not _agree(ends, small.target):
+    if not _ends_agree(ends, small.target):
         spread = ", ".join(f"{error:.2f}" for error in errors)
         return BaseFit(first, errors, False, f"the starts end in different places (errors of {spread} × noise)")
     checked = check_gradient(first, target, errors)
@@ -69,21 +70,21 @@ def fit_base(
     return check_gradient(fit_exactly(target, problem, Simulators(problem, exact=True), first.vector), target, errors)
 
 
-def _same(best: Fit, target: Target) -> float:
+def _cost_tolerance(best: Fit, target: Target) -> float:
     """Difference of two costs that mean the same place."""
     return max(_SAME_SHARE * best.cost, _SAME_COST * target.readings)
 
 
-def _agree(ends: Sequence[Fit], target: Target) -> bool:
+def _ends_agree(ends: Sequence[Fit], target: Target) -> bool:
     """Whether two fits at least ended in the best place."""
     best = min(ends, key=lambda f: f.cost)
-    tolerance = max(_same(best, target), _SAME_BEYOND * (best.cost - target.readings))
+    tolerance = max(_cost_tolerance(best, target), _SAME_BEYOND * (best.cost - target.readings))
     return sum(f.cost - best.cost <= tolerance for f in ends) >= 2
 
 
 def check_gradient(fit: Fit, target: Target, errors: tuple[float, ...] = ()) -> BaseFit:
-    """The part of the gate that one fit can pass or not: projected gradient of at most 5 standard errors."""
-    if fit.gradient > _FLAT * max(1.0, rms_error(fit, target)):
+    """Whether one fit converged: projected gradient of at most 5 standard errors."""
+    if fit.gradient > _MAX_GRADIENT * max(1.0, rms_error(fit, target)):
         reason = f"the error still falls where the fit ended (slope of {fit.gradient:.1f} standard errors)"
         return BaseFit(fit, errors, False, reason)
     return BaseFit(fit, errors, True)

@@ -116,7 +116,7 @@ def fit_once(
 def fit_exactly(target: Target, problem: Problem, simulators: Simulators, start: np.ndarray) -> Fit:
     """Fits the model itself, near an optimum, with slopes from the cheap one.
 
-    For effects with memory, such as play: where the two models part ways, no correction brings them together.
+    For effects with memory, such as play: where the two models differ, no correction makes up for it.
     """
     local = _Local(target, problem, simulators.exact, simulators.cheap, None)
     free = np.ones(len(problem), bool)

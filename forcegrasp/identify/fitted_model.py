@@ -32,8 +32,8 @@ def model_of(fit: Fit, target: Target, loaded: Loaded, numerical: Sequence[np.nd
         else:
             grasps.setdefault(first.name, {})[entry.parameter] = fitted
     data = {"set": loaded.measured.name, "fingerprint": loaded.measured.fingerprint}
-    told, found = tuple(warnings(fit, errors)), effects_of_fit(fit, target, errors)
-    return Model(loaded.gripper, base, objects, grasps, found, data, told, _noise_of(target))
+    warned, found = tuple(warnings(fit, errors)), effects_of_fit(fit, target, errors)
+    return Model(loaded.gripper, base, objects, grasps, found, data, warned, _noise_of(target))
 
 
 def effects_of_fit(fit: Fit, target: Target, errors: np.ndarray) -> tuple[FoundEffect, ...]:

@@ -13,8 +13,8 @@ from forcegrasp.measure.check_copies import is_noisy
 from forcegrasp.measure.folder import show
 from forcegrasp.measure.schema import MeasuredGrasp, MeasurementSet
 
-#: Noise further than this from what the readings show is told, or refused.
-TELL, REFUSE = 1.5, 10.0
+#: Noise further than this from what the readings show is warned of, or refused.
+WARN, REFUSE = 1.5, 10.0
 # Noise that is correlated over less than this still shows in full, seconds.
 _SLOW_S = 0.1
 # Fewer windows than this, per sensor, say nothing.
@@ -22,7 +22,7 @@ _LEAST_WINDOWS = 60
 
 
 def check_given_noise(measured: MeasurementSet, unit: str = "m") -> list[str]:
-    """Holds ``position_std_m`` and ``force_std_n`` against the readings; returns a warning for each that is odd.
+    """Holds ``position_std_m`` and ``force_std_n`` against the readings; returns a warning for each that does not fit.
 
     Args:
       measured: the set.
@@ -45,7 +45,7 @@ def check_given_noise(measured: MeasurementSet, unit: str = "m") -> list[str]:
         noisy = all(is_noisy([signals[:, finger] for signals in readings]) for finger in range(readings[0].shape[1]))
         if apart > REFUSE and noisy:
             raise MeasurementError(f"{line}; correct it, in {unit}, or leave it out to have it estimated")
-        if apart > TELL:
+        if apart > WARN:
             warnings.append(f"{line}; errors are told as multiples of what is given")
     return warnings
 

@@ -95,15 +95,15 @@ def _confounded(fit: Fit) -> list[str]:
             entries = [fit.problem.entries[i] for i in members]
             strongest = float(inside[np.argmax(np.abs(inside))])
             found.setdefault(tuple(e.parameter for e in entries), []).append(([e.name for e in entries], strongest))
-    told = []
+    lines = []
     for parameters, alike in found.items():
         names, strongest = alike[0][0], max((c for _, c in alike), key=abs)
         if len(alike) == 1:
-            told.append(f"{listed(names)} are confounded (correlation {strongest:.3f})")
+            lines.append(f"{listed(names)} are confounded (correlation {strongest:.3f})")
         else:
             several = f"in {len(alike)} objects or grasps (correlation up to {strongest:.3f})"
-            told.append(f"{listed(parameters)} are confounded {several}")
-    return told
+            lines.append(f"{listed(parameters)} are confounded {several}")
+    return lines
 
 
 def listed(names: Sequence[str], word: str = "and") -> str:

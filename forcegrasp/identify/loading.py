@@ -40,8 +40,8 @@ def load(path: str | Path) -> Loaded[MeasurementSet] | Loaded[FinalForceTable]:
     gripper = load_gripper(measured.gripper, measured.path)
     if isinstance(measured, FinalForceTable):
         return Loaded(measured, gripper, check_table(measured, gripper.stroke))
-    odd = check_set(measured, gripper.stroke, half_opening_m=float(gripper.opening.opening_m[-1]) / 2)
-    return Loaded(measured, gripper, odd + check_given_noise(measured, gripper.unit))
+    warnings = check_set(measured, gripper.stroke, half_opening_m=float(gripper.opening.opening_m[-1]) / 2)
+    return Loaded(measured, gripper, warnings + check_given_noise(measured, gripper.unit))
 
 
 def warn_of_other_set(loaded: Loaded[MeasurementSet], model: Model, name: object) -> Loaded[MeasurementSet]:

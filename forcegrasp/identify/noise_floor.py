@@ -15,7 +15,7 @@ from forcegrasp.replay.replay import Replay
 
 # Room for what the estimate of the floor misses: in all, and in a single signal and phase.
 _ROOM, _ROOM_IN_CELL = 1.03, 1.15
-# A residual beyond this many σ, and three times the numerical error there, is no noise; a few may be mishaps.
+# A residual beyond this many σ, and three times the numerical error there, is no noise; a few outliers are allowed.
 _OUTLIER, _MAX_OUTLIERS = 5.0, 3
 # Cells with fewer samples say nothing.
 _LEAST_SAMPLES = 40

@@ -1,4 +1,4 @@
-"""Phases of a grasp, told from the measured data alone: when fingers touch, and when commands rest."""
+"""Phases of a grasp, from the measured data alone: when fingers touch, and when commands rest."""
 
 from __future__ import annotations
 

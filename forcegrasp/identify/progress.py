@@ -1,12 +1,12 @@
-"""Who is told what long computations are at."""
+"""How long computations report what they do."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
-#: Is told in a line what is going on.
+#: Takes a line about what is done now.
 Progress = Callable[[str], None]
 
 
 def silent(line: str) -> None:
-    """Tells nobody."""
+    """Reports nothing."""

@@ -148,17 +148,17 @@ def _value(effect: type[Effect], name: str, value: float, digits: int) -> str:
 
 def lines(diagnosis: Diagnosis, advice: Advice | None) -> list[str]:
     """What stands below the table: symptoms, rivals, what is left, and what to record next."""
-    told = []
+    text = []
     for step, _ in found_steps(diagnosis):
         effect = effect_of(step.effects[0], diagnosis.target.gripper)
-        told.append(f"{effect.name}: {effect.symptom}")
-        told += [f"  {text}" for text in _final_texts(diagnosis, effect)]
-        told += [f"  it could also be: {listed(step.effects[1:], 'or')}"] if len(step.effects) > 1 else []
+        text.append(f"{effect.name}: {effect.symptom}")
+        text += [f"  {line}" for line in _final_texts(diagnosis, effect)]
+        text += [f"  it could also be: {listed(step.effects[1:], 'or')}"] if len(step.effects) > 1 else []
     if diagnosis.verdict is Verdict.UNKNOWN or diagnosis.verdict.names_effects:
-        told.append(left_sentence(diagnosis))
+        text.append(left_sentence(diagnosis))
     if advice is not None:
-        told.append(advice.sentence())
-    return [*told, noise_sentence(diagnosis.target), *(f"warning: {warning}" for warning in final_warnings(diagnosis))]
+        text.append(advice.sentence())
+    return [*text, noise_sentence(diagnosis.target), *(f"warning: {warning}" for warning in final_warnings(diagnosis))]
 
 
 def _final_texts(diagnosis: Diagnosis, effect: type[Effect]) -> list[str]:
@@ -201,7 +201,7 @@ def _step_section(number: int, step: Step, before: Fit, diagnosis: Diagnosis) ->
     blocks.append(Text("What else it could be:" + (" no other effect comes near." if alone else ""), strong=True))
     blocks += [_candidates_table(step, diagnosis)] if step.candidates else []
     if len(step.effects) > 1:
-        blocks.append(Text(f"{listed(step.effects, 'and')} can't be told apart by these data."))
+        blocks.append(Text(f"{listed(step.effects, 'and')} can't be found apart by these data."))
     blocks.append(Text(f"Looks like {listed(effect.look_alikes, 'and')}. What separates them: {effect.separates}."
                        if effect.look_alikes else f"What is its own: {effect.separates}."))  # fmt: skip
     return Section(f"{number}. {' or '.join(step.effects)}", blocks)

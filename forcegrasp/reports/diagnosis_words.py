@@ -1,4 +1,4 @@
-"""Sentences about a diagnosis: what the model lacks, how much is left, and what the noise turned out to be."""
+"""Sentences about a diagnosis: what the model lacks, how much is left, and what the noise is."""
 
 from __future__ import annotations
 
@@ -65,27 +65,27 @@ def left_sentence(diagnosis: Diagnosis) -> str:
 
 
 def noise_words(diagnosis: Diagnosis) -> str:
-    """What the noise is and what to do about it, if it is not what was said; empty otherwise."""
-    noise, said = diagnosis.noise, "given" if diagnosis.target.sigma_known else "estimated"
+    """What the noise is and what to do about it, if it is not as assumed; empty otherwise."""
+    noise, source = diagnosis.noise, "given" if diagnosis.target.sigma_known else "estimated"
     if noise is None:
         return ""
-    told, names = [], diagnosis.target.axis.names
+    parts, names = [], diagnosis.target.axis.names
     for kind, part in diagnosis.target.axis.kinds.items():
-        times = noise.times[part]
-        if all(noise.unlike[part]) and max(times) < 1.15 * min(times):
-            told.append(_scatter(f"{kind}s", float((times**2).mean() ** 0.5), any(noise.heavy_tails[part])))
+        ratio = noise.ratio[part]
+        if all(noise.affected[part]) and max(ratio) < 1.15 * min(ratio):
+            parts.append(_scatter(f"{kind}s", float((ratio**2).mean() ** 0.5), any(noise.heavy_tails[part])))
             continue
         signals = range(part.start, part.stop)
-        told += [_scatter(words(names[k]), noise.times[k], noise.heavy_tails[k]) for k in signals if noise.unlike[k]]
-    sizes = f"{', '.join(told)} the noise that was {said}"
+        parts += [_scatter(words(names[k]), noise.ratio[k], noise.heavy_tails[k]) for k in signals if noise.affected[k]]
+    sizes = f"{', '.join(parts)} the noise that was {source}"
     again = "give position_std_m and force_std_n as they are in meta.yaml, and diagnose again: a small effect may show"
     if not noise.stronger:
         return f"But the noise is smaller than that: {sizes}. What is smaller than the noise can't be seen; {again}."
     return (
-        f"But the noise is not what was {said}: {sizes}. The residuals are white in time and alike in all phases, which"
-        f" no missing effect makes. To do: {again}."
+        f"But the noise is not what was {source}: {sizes}. The residuals are white in time and alike in all phases,"
+        f" which no missing effect makes. To do: {again}."
     )
 
 
-def _scatter(what: str, times: float, heavy: bool) -> str:
-    return f"{what} scatter by {times:.2g} ×" + (" (with heavy tails)" if heavy else "")
+def _scatter(what: str, ratio: float, heavy: bool) -> str:
+    return f"{what} scatter by {ratio:.2g} ×" + (" (with heavy tails)" if heavy else "")

@@ -127,7 +127,7 @@ def dependence(values: dict[str, np.ndarray], residual: np.ndarray, target: Targ
             axes.axhline(0, color="0.5", lw=0.6)
             _finish(axes, f"{kind} residual ÷ noise" if column == 0 else "")
         grid[-1, column].set_xlabel(label.replace("mm", SHOWN[target.axis.units[0]][0]))
-    for row, part in enumerate(kinds.values()):  # a few wild points must not flatten the rest
+    for row, part in enumerate(kinds.values()):  # a few outliers must not flatten the rest
         sizes = np.abs(residual[..., part][mask])
         sizes = sizes[np.isfinite(sizes)]
         span = max(3.0, 1.2 * np.quantile(sizes, 0.99)) if len(sizes) else 3.0

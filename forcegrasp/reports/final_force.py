@@ -205,10 +205,12 @@ def facts(analysis: TableAnalysis) -> list[str]:
     if analysis.shared:
         travel, force = analysis.shared["travel"], analysis.shared["force"]
         better = "one travel" if travel < force else "one force"
-        told = "too little to tell" if abs(travel - force) < 0.1 * min(travel, force) else f"which speaks for {better}"
+        judged = (
+            "too little to tell" if abs(travel - force) < 0.1 * min(travel, force) else f"which speaks for {better}"
+        )
         text.append(
             f"one onset for all objects: as a travel rms {travel:.4f} N, as a force on the reading {force:.4f} N,"
-            f" {told}; an object of a very different slope would"
+            f" {judged}; an object of a very different slope would"
         )
     return text
 

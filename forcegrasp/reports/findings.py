@@ -78,16 +78,16 @@ def final_warnings(diagnosis: Diagnosis) -> list[str]:
 
 
 def noise_json(diagnosis: Diagnosis) -> dict[str, Any] | None:
-    """The noise of each signal of which it is not what was said; None if there is none."""
+    """The noise of each signal where it is not as assumed; None if there is none."""
     noise = diagnosis.noise
     if noise is None:
         return None
     return {
-        signal: {"times_stated": float(times), "core": float(core), "heavy_tails": bool(heavy)}
-        for signal, times, core, heavy, unlike in zip(
-            diagnosis.target.axis.names, noise.times, noise.core, noise.heavy_tails, noise.unlike, strict=True
+        signal: {"times_stated": float(ratio), "core": float(core), "heavy_tails": bool(heavy)}
+        for signal, ratio, core, heavy, affected in zip(
+            diagnosis.target.axis.names, noise.ratio, noise.core, noise.heavy_tails, noise.affected, strict=True
         )
-        if unlike
+        if affected
     }
 
 

@@ -136,12 +136,12 @@ def fit_json(base: BaseFit, target: Target, model: Model, name: str, path: Path)
 
 
 def fit_answer(base: BaseFit, target: Target) -> str:
-    """Whether to believe the fit, and how good it is."""
+    """Whether the fit converged, and how good it is."""
     error, held = rms_error(base.fit, target), rms(held_out(base.fit, target), target)
-    told = f"error {error:.2f} × noise" + (f", on held-out grasps {held:.2f} × noise" if np.isfinite(held) else "")
+    errors = f"error {error:.2f} × noise" + (f", on held-out grasps {held:.2f} × noise" if np.isfinite(held) else "")
     if base.converged:
-        return f"The base model is fitted: {told}."
-    return f"The base model is NOT fitted: {base.reason}. What was reached: {told}. To do: {ADVICE}."
+        return f"The base model is fitted: {errors}."
+    return f"The base model is NOT fitted: {base.reason}. What was reached: {errors}. To do: {ADVICE}."
 
 
 def fit_sections(base: BaseFit, target: Target, model: Model) -> list[Section]:

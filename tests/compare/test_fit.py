@@ -397,5 +397,5 @@ def test_noise_that_is_not_as_said_is_no_missing_effect(fitted, shape):
     assert diagnosis.error_after > 1.4
     assert (diagnosis.verdict, diagnosis.effects, diagnosis.left) == ("explained", (), "")
     assert diagnosis.noise is not None
-    assert diagnosis.noise.unlike.all()
+    assert diagnosis.noise.affected.all()
     assert diagnosis.noise.heavy_tails.any() == (shape == "heavy tails")

@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from forcegrasp.diagnosis.noise_check import Noise, unlike_said
+from forcegrasp.diagnosis.noise_check import Noise, unexpected_noise
 from forcegrasp.identify.noise_floor import excess
 from forcegrasp.identify.phases import PHASES
 from forcegrasp.identify.target import Target
@@ -47,16 +47,16 @@ def student(seed: int) -> np.ndarray:
 
 @pytest.mark.parametrize("seed", range(5))
 def test_noise_as_said_is_no_finding(seed):
-    assert unlike_said(normal(seed), NOTHING, make(), GRASPS) is None
+    assert unexpected_noise(normal(seed), NOTHING, make(), GRASPS) is None
 
 
 @pytest.mark.parametrize("seed", range(5))
 @pytest.mark.parametrize("times", [1.3, 3.0])
 def test_noise_of_another_size(times, seed):
-    noise = unlike_said(times * normal(seed), NOTHING, make(), GRASPS)
+    noise = unexpected_noise(times * normal(seed), NOTHING, make(), GRASPS)
     assert noise is not None
-    assert noise.unlike.all()
-    assert noise.times == pytest.approx(times, rel=0.05)
+    assert noise.affected.all()
+    assert noise.ratio == pytest.approx(times, rel=0.05)
     assert noise.core == pytest.approx(times, rel=0.15)
     assert noise.stronger
     assert not noise.heavy_tails.any()
@@ -65,7 +65,7 @@ def test_noise_of_another_size(times, seed):
 @pytest.mark.parametrize("seed", range(5))
 @pytest.mark.parametrize("scale", [1.0, 1 / np.sqrt(3)])
 def test_heavy_tails(scale, seed):
-    noise = unlike_said(scale * student(seed), NOTHING, make(), GRASPS)
+    noise = unexpected_noise(scale * student(seed), NOTHING, make(), GRASPS)
     assert noise is not None
     assert noise.heavy_tails.all()
     assert noise.stronger
@@ -74,24 +74,24 @@ def test_heavy_tails(scale, seed):
 
 def test_noise_of_one_signal():
     residual = normal(0) * [1, 1, 1, 3]
-    noise = unlike_said(residual, NOTHING, make(), GRASPS)
+    noise = unexpected_noise(residual, NOTHING, make(), GRASPS)
     assert noise is not None
-    assert noise.unlike.tolist() == [False, False, False, True]
-    assert noise.times[3] == pytest.approx(3, rel=0.05)
+    assert noise.affected.tolist() == [False, False, False, True]
+    assert noise.ratio[3] == pytest.approx(3, rel=0.05)
 
 
 def test_noise_that_is_smaller():
-    noise = unlike_said(normal(0) * [1, 1, 0.3, 0.3], NOTHING, make(), GRASPS)
+    noise = unexpected_noise(normal(0) * [1, 1, 0.3, 0.3], NOTHING, make(), GRASPS)
     assert noise is not None
-    assert (noise.unlike.tolist(), noise.stronger) == ([False, False, True, True], False)
+    assert (noise.affected.tolist(), noise.stronger) == ([False, False, True, True], False)
 
 
 def test_grasps_that_were_not_held_out_are_left_out():
     residual = 3 * normal(0)
     residual[5:] = np.nan
-    noise = unlike_said(residual, NOTHING, make(), GRASPS)
+    noise = unexpected_noise(residual, NOTHING, make(), GRASPS)
     assert noise is not None
-    assert noise.times == pytest.approx(3, rel=0.07)
+    assert noise.ratio == pytest.approx(3, rel=0.07)
 
 
 def slow(residual):
@@ -167,14 +167,14 @@ def one_signal_slow(residual):
 def test_an_effect_is_not_taken_for_noise(spoil, seed):
     residual = spoil(normal(seed))
     assert excess(residual, NOTHING, make())
-    assert unlike_said(residual, NOTHING, make(), GRASPS) is None
+    assert unexpected_noise(residual, NOTHING, make(), GRASPS) is None
 
 
 def test_in_doubt_it_is_not_noise():
     """One grasp of 150 samples does not show where so small an excess is from."""
     target, nothing = make(1), tuple(n[:1] for n in NOTHING)
     assert excess(1.2 * normal(0)[:1], nothing, target)
-    assert unlike_said(1.2 * normal(0)[:1], nothing, target, GRASPS[:1]) is None
+    assert unexpected_noise(1.2 * normal(0)[:1], nothing, target, GRASPS[:1]) is None
 
 
 # --- in words ------------------------------------------------------------------------------------------------------
