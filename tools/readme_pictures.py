@@ -22,8 +22,7 @@ from PIL import Image
 from forcegrasp.cli.main import main as forcegrasp
 from forcegrasp.cli.measuring import refuse_table
 from forcegrasp.evaluate.plots import figure_pixels
-from forcegrasp.identify.compare_set import compare
-from forcegrasp.identify.comparison import Comparison
+from forcegrasp.identify.comparison import Comparison, compare
 from forcegrasp.identify.cross_validation import rms
 from forcegrasp.identify.loading import load
 from forcegrasp.identify.phases import PHASES

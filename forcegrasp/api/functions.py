@@ -21,7 +21,7 @@ from forcegrasp.diagnosis import add_effect, diagnose_set
 from forcegrasp.diagnosis.advice import advise
 from forcegrasp.errors import ConfigError
 from forcegrasp.final_force.analysis import analyse_table
-from forcegrasp.identify import compare_set, fit_set, loading
+from forcegrasp.identify import comparison, fit_set, loading
 from forcegrasp.identify.loading import Loaded
 from forcegrasp.identify.progress import Progress, silent
 from forcegrasp.measure import FinalForceTable, MeasurementSet
@@ -71,9 +71,9 @@ def compare(
     if measuring.is_table(loaded):
         return _analyse(loaded, "compare", model=model)
     given, loaded = (None, loaded) if model is None else _beside(model, loaded, show)
-    comparison, used, notes = compare_set.compare(loaded, given, seed, show)
+    found, used, notes = comparison.compare(loaded, given, seed, show)
     name = "" if model is None else _name(model)
-    return CompareResult(loaded, comparison, used, name, (*notes, *used.warnings))
+    return CompareResult(loaded, found, used, name, (*notes, *used.warnings))
 
 
 def fit(data: AnySet, *, out: str | Path | None = None, seed: int = 0, progress: Progress | None = None) -> FitResult:

@@ -18,7 +18,6 @@ from forcegrasp.identify.comparison import Comparison
 from forcegrasp.identify.cross_validation import rms
 from forcegrasp.identify.fitted_model import model_of
 from forcegrasp.identify.loading import Loaded
-from forcegrasp.identify.noise_floor import numerical_error
 from forcegrasp.identify.target import Target
 from forcegrasp.identify.verdict import Verdict
 from forcegrasp.measure import FinalForceTable, MeasurementSet
@@ -200,8 +199,7 @@ class DiagnoseResult(Result):
         diagnosis = self.diagnosis
         if not self.verdict.names_effects:
             return self._base_model
-        numerical = numerical_error(diagnosis.fit, diagnosis.target)
-        return model_of(diagnosis.fit, diagnosis.target, self.data, numerical)
+        return model_of(diagnosis.fit, diagnosis.target, self.data, diagnosis.numerical)
 
     @cached_property
     def _base_model(self) -> Model:

@@ -34,7 +34,7 @@ def main(arguments: list[str]) -> int:
         tell_warnings,
         write_results,
     )
-    from forcegrasp.identify import compare_set, loading
+    from forcegrasp.identify import comparison, loading
     from forcegrasp.models.model_file import write_model
     from forcegrasp.reports import comparison as comparison_report
 
@@ -45,11 +45,11 @@ def main(arguments: list[str]) -> int:
         return 0
     model, loaded = take_model(Path(config.model), loaded) if config.model else (None, loaded)
     tell_warnings(loaded)
-    comparison, used, notes = compare_set.compare(loaded, model, config.seed, progress_printer())
+    found, used, notes = comparison.compare(loaded, model, config.seed, progress_printer())
     notes, name = [*notes, *used.warnings], config.model or "base model, fitted to this set"
-    lead = comparison_report.answer(comparison)
-    print_table(comparison_report.printed(comparison))
-    print("\n".join([lead, *comparison_report.details(comparison), *(f"note: {note}" for note in notes)]))
+    lead = comparison_report.answer(found)
+    print_table(comparison_report.printed(found))
+    print("\n".join([lead, *comparison_report.details(found), *(f"note: {note}" for note in notes)]))
     if model is None:
         known = out / BASE_MODEL
         write_model(dataclasses.replace(used, warnings=tuple(notes)), known)
@@ -57,10 +57,10 @@ def main(arguments: list[str]) -> int:
     write_results(
         out,
         "compare",
-        comparison_report.compare_json(comparison, loaded.measured.name, name, notes),
+        comparison_report.compare_json(found, loaded.measured.name, name, notes),
         f"Where the model fails: {loaded.measured.name}",
         lead,
-        comparison_report.sections(comparison, notes),
+        comparison_report.sections(found, notes),
         loaded,
     )
     return 0

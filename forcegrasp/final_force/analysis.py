@@ -9,9 +9,20 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.stats import chi2, t
 
-from forcegrasp.final_force.candidate import Candidate, Rows, degrees_of_freedom, rms
 from forcegrasp.final_force.causes import CAUSES, causes_of
-from forcegrasp.final_force.shapes import BASE, FURTHER, Shape, ShapeFit, bootstrap, captured, fit_shape
+from forcegrasp.final_force.shapes import (
+    BASE,
+    FURTHER,
+    Candidate,
+    Rows,
+    Shape,
+    ShapeFit,
+    bootstrap,
+    captured,
+    degrees_of_freedom,
+    fit_shape,
+    rms,
+)
 from forcegrasp.final_force.slopes import shared_onset, slope_ratio, slopes_differ
 from forcegrasp.identify.verdict import Verdict
 from forcegrasp.measure.schema import FinalForceTable

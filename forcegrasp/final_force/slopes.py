@@ -8,8 +8,7 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.stats import f
 
-from forcegrasp.final_force.candidate import Candidate, Rows, degrees_of_freedom, rms
-from forcegrasp.final_force.shapes import ShapeFit, bootstrap
+from forcegrasp.final_force.shapes import Candidate, Rows, ShapeFit, bootstrap, degrees_of_freedom, rms
 
 
 def slopes_differ(best: Candidate, rows: Mapping[str, Rows]) -> float | None:

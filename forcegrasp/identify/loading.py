@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Generic, TypeVar
 
-from forcegrasp.identify.given_noise import check_given_noise
+from forcegrasp.identify.sensor_noise import check_given_noise
 from forcegrasp.measure import FinalForceTable, MeasurementSet, check_set, check_table, read_set
 from forcegrasp.models.model_file import Model
 from forcegrasp.physics.gripper import Gripper

@@ -1,4 +1,4 @@
-"""Noise of the sensors, as far as readings show it."""
+"""Noise of the sensors, as far as readings show it, and whether the noise that is given with a set fits them."""
 
 from __future__ import annotations
 
@@ -8,7 +8,17 @@ import numpy as np
 
 from forcegrasp.errors import MeasurementError
 from forcegrasp.identify.phases import HELD_S, held_for
-from forcegrasp.measure.schema import MeasuredGrasp
+from forcegrasp.identify.rounding import find_step
+from forcegrasp.measure.check_copies import is_noisy
+from forcegrasp.measure.folder import show
+from forcegrasp.measure.schema import MeasuredGrasp, MeasurementSet
+
+#: Noise further than this from what the readings show is warned of, or refused.
+WARN, REFUSE = 1.5, 10.0
+# Noise that is correlated over less than this still shows in full, seconds.
+_SLOW_S = 0.1
+# Fewer windows than this, per sensor, say nothing.
+_LEAST_WINDOWS = 60
 
 
 def estimate_noise(grasps: Sequence[MeasuredGrasp], kinds: Mapping[str, slice]) -> np.ndarray:
@@ -52,3 +62,64 @@ def third_differences(grasp: MeasuredGrasp, signals: np.ndarray, stride: int = 1
         signals = signals[stride:] - signals[:-stride]
     time, reach = grasp.time_s, 3 * stride
     return signals, held_for(grasp)[reach:] >= HELD_S + time[reach:] - time[:-reach]
+
+
+def check_given_noise(measured: MeasurementSet, unit: str = "m") -> list[str]:
+    """Holds ``position_std_m`` and ``force_std_n`` against the readings; returns a warning for each that does not fit.
+
+    Args:
+      measured: the set.
+      unit: of the positions.
+
+    Raises:
+      MeasurementError: if one is more than ten times the noise of the readings, or less than a tenth of it.
+    """
+    warnings = []
+    given = {"position_std_m": (measured.position_std_m, unit), "force_std_n": (measured.force_std_n, "N")}
+    for key, (std, unit) in given.items():
+        readings = [g.force_n if unit == "N" else g.position_m for g in measured.grasps]
+        if std is None or not readings[0].shape[1]:
+            continue
+        least, most = noise_range(measured.grasps, readings)
+        shown = min(max(std, least), most)
+        apart = max(std / shown, shown / std)
+        where = f"{show(measured.path / 'meta.yaml')}: {key}"
+        line = f"{where}: {std:.3g} {unit} is given, the readings show {shown:.2g} {unit}"
+        noisy = all(is_noisy([signals[:, finger] for signals in readings]) for finger in range(readings[0].shape[1]))
+        if apart > REFUSE and noisy:
+            raise MeasurementError(f"{line}; correct it, in {unit}, or leave it out to have it estimated")
+        if apart > WARN:
+            warnings.append(f"{line}; errors are told as multiples of what is given")
+    return warnings
+
+
+def noise_range(grasps: Sequence[MeasuredGrasp], readings: Sequence[np.ndarray]) -> tuple[float, float]:
+    """The least and the most noise that the readings of sensors of one kind show; 0 and infinity where they can't tell.
+
+    The least is what jitters from sample to sample while the command is held; steps of a converter may be all of it.
+    The most counts slower noise, too, and only readings that change: stops, dead zones and steps hide noise.
+
+    Args:
+      grasps: that were read.
+      readings: positions or forces of each grasp, ``(T, sensors)``.
+    """
+    least, most = [], []
+    fast = [third_differences(g, r) for g, r in zip(grasps, readings, strict=True)]
+    slow = [third_differences(g, r, _stride(g)) for g, r in zip(grasps, readings, strict=True)]
+    for finger in range(readings[0].shape[1]):
+        least.append(_spread(np.concatenate([windows[held, finger] for windows, held in fast])) or 0.0)
+        held = np.concatenate([windows[held, finger] for windows, held in slow])
+        moving = np.concatenate([windows[:, finger] for windows, _ in slow])
+        most.append(_spread(held[held != 0]) or _spread(moving[moving != 0]) or np.inf)
+    rounding = find_step(np.concatenate([r.ravel() for r in readings])) / np.sqrt(12)
+    return min(least) if min(least) > 2 * rounding else 0.0, max(*most, rounding)
+
+
+def _stride(grasp: MeasuredGrasp) -> int:
+    """Samples in the time after which slow noise is another."""
+    return max(1, round(_SLOW_S / float(np.median(np.diff(grasp.time_s)))))
+
+
+def _spread(windows: np.ndarray) -> float | None:
+    """Noise that makes third differences like these, ``(n,)``; None if they are too few."""
+    return 1.4826 * float(np.median(np.abs(windows))) / np.sqrt(20) if len(windows) >= _LEAST_WINDOWS else None

@@ -2,45 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from forcegrasp.physics.gripper import Gripper
 
 
-@dataclass(frozen=True)
 class SignalAxis:
-    """The last axis of measured and predicted signals, ``C`` long."""
+    """The last axis of measured and predicted signals, ``C`` long, as a gripper's description names it."""
 
-    gripper: Gripper
+    def __init__(self, gripper: Gripper) -> None:
+        channels, motors = gripper.positions + gripper.forces, len(gripper.positions)
+        self.names = [channel.name for channel in channels]  #: such as position_l
+        self.units = [channel.unit for channel in channels]  #: m, rad or N
+        self.positions = slice(0, motors)  #: which are positions of motors
+        self.forces = slice(motors, len(channels))  #: which are forces; it may be none
+        both = {"position": self.positions, "force": self.forces}
+        #: channels of one kind, those that there are
+        self.kinds = {kind: part for kind, part in both.items() if part.stop > part.start}
 
     def __len__(self) -> int:
         return len(self.names)
-
-    @property
-    def names(self) -> list[str]:
-        """The channels' names, such as position_l."""
-        return [channel.name for channel in self.gripper.positions + self.gripper.forces]
-
-    @property
-    def units(self) -> list[str]:
-        """The channels' units: m, rad or N."""
-        return [channel.unit for channel in self.gripper.positions + self.gripper.forces]
-
-    @property
-    def positions(self) -> slice:
-        """Which channels are positions of motors."""
-        return slice(0, len(self.gripper.positions))
-
-    @property
-    def forces(self) -> slice:
-        """Which channels are forces; it may be none."""
-        return slice(len(self.gripper.positions), len(self))
-
-    @property
-    def kinds(self) -> dict[str, slice]:
-        """Channels of one kind, those that there are."""
-        both = {"position": self.positions, "force": self.forces}
-        return {kind: part for kind, part in both.items() if part.stop > part.start}
 
     def kind_of(self, name: str) -> str:
         """The kind that a channel is of."""

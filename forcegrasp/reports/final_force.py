@@ -9,8 +9,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from forcegrasp.final_force.analysis import TableAnalysis
-from forcegrasp.final_force.candidate import Candidate, rms
 from forcegrasp.final_force.causes import CAUSES, MENU, NO_TRACE, Onset, grasps_for
+from forcegrasp.final_force.shapes import Candidate, rms
 from forcegrasp.identify.verdict import Verdict
 from forcegrasp.reports.figures import plain
 from forcegrasp.reports.html import Picture, Section, Table, Text

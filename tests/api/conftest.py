@@ -8,9 +8,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from forcegrasp.api import results
 from forcegrasp.diagnosis import add_effect, advice, diagnose_set
-from forcegrasp.identify import compare_set, fit_set, loading
+from forcegrasp.identify import comparison, fit_set, loading
 from forcegrasp.identify import noise_floor as floor
 from tests.compare.conftest import made_up as made_up  # a fixture
 
@@ -44,7 +43,7 @@ def work(made_up, monkeypatch, tmp_path) -> SimpleNamespace:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(loading, "load", lambda path: made_up.loaded if str(path) == "my_set" else load(path))
     for home, name, value in (
-        (compare_set, "compare", (made_up.comparison, made_up.model, ["a note"])),
+        (comparison, "compare", (made_up.comparison, made_up.model, ["a note"])),
         (fit_set, "fit_model", (made_up.target, None, made_up.base)),
         (diagnose_set, "diagnose_set", (diagnosis, None)),
         (add_effect, "add_effect", made_up.added),
@@ -52,6 +51,5 @@ def work(made_up, monkeypatch, tmp_path) -> SimpleNamespace:
         monkeypatch.setattr(home, name, returns(name, value))
     monkeypatch.setattr(advice, "advise", lambda diagnosis: made_up.advice)
     monkeypatch.setattr("forcegrasp.api.functions.advise", lambda diagnosis: made_up.advice)
-    for module in (floor, results):
-        monkeypatch.setattr(module, "numerical_error", lambda fit, target: [])
+    monkeypatch.setattr(floor, "numerical_error", lambda fit, target: [])
     return SimpleNamespace(calls=calls, made_up=made_up)

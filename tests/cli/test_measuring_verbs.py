@@ -115,11 +115,11 @@ def test_diagnose_writes_the_base_model_beside_the_report_and_suggests_it(loop):
 
 
 def test_compare_writes_the_base_model_beside_the_report_and_suggests_it(folder, capsys, monkeypatch):
-    from forcegrasp.identify import compare_set
+    from forcegrasp.identify import comparison
     from forcegrasp.models.model_file import read_model
 
-    fitted, real = read_model(Path("model.yaml")), compare_set.compare
-    monkeypatch.setattr(compare_set, "compare", lambda loaded, model, *rest: real(loaded, fitted, *rest))  # saves a fit
+    fitted, real = read_model(Path("model.yaml")), comparison.compare
+    monkeypatch.setattr(comparison, "compare", lambda loaded, model, *rest: real(loaded, fitted, *rest))  # saves a fit
     assert main(["compare", "my_set", "out=where"]) == 0
     assert "diagnose data=my_set model=where/base_model.yaml" in capsys.readouterr().out
     beside = yaml.safe_load((folder / "where" / "base_model.yaml").read_text())
@@ -134,12 +134,12 @@ def test_compare_writes_the_base_model_beside_the_report_and_suggests_it(folder,
 def test_a_model_of_other_measurements_is_used_with_a_warning(verb, other, folder, capsys, monkeypatch):
     from forcegrasp.diagnosis import add_effect, diagnose_set
     from forcegrasp.errors import ConfigError
-    from forcegrasp.identify import compare_set
+    from forcegrasp.identify import comparison
 
     def stop(loaded, model, *rest):
         raise ConfigError(f"with {model.data['set']} and {len(loaded.warnings)} warnings")
 
-    for home, name in ((compare_set, "compare"), (diagnose_set, "diagnose_set"), (add_effect, "add_effect")):
+    for home, name in ((comparison, "compare"), (diagnose_set, "diagnose_set"), (add_effect, "add_effect")):
         monkeypatch.setattr(home, name, stop)
     if other:
         text = (folder / "model.yaml").read_text()

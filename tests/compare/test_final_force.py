@@ -15,7 +15,7 @@ from forcegrasp.final_force.causes import CAUSES, MENU, causes_of
 from forcegrasp.measure.schema import FinalForceTable
 from forcegrasp.physics.gripper_file import load_gripper
 from forcegrasp.physics.plant import Plant, write_base
-from forcegrasp.reports.final_force import draw
+from forcegrasp.reports import final_force as final_force_report
 from forcegrasp.reports.html import write_report
 
 GRIPPER = load_gripper("tiago")
@@ -80,11 +80,11 @@ def test_the_real_table_names_a_set_and_a_grasp(real):
     look_alikes = {"backlash", "force_deadzone", "command_deadband", "adhesion", "coulomb_friction", "stiction"}
     assert look_alikes | {"encoder_bias"} <= set(real.effects)
     assert not {"command_delay", "force_lag", "object_friction", "viscoelastic_contact"} & set(real.effects)
-    assert real.diagnosis_json()["next_grasp"]["grasp"] in MENU
+    assert final_force_report.diagnosis_json(real)["next_grasp"]["grasp"] in MENU
     assert real.slopes_differ_p < 0.01
     assert real.slope_ratio[0] == pytest.approx(339 / 283, abs=0.01)
     assert abs(real.shared["travel"] - real.shared["force"]) < 1e-3  # a gap or a threshold: these rows can't tell
-    assert any("sponge 0.554, wood 0.433" in line for line in real.lines())
+    assert any("sponge 0.554, wood 0.433" in line for line in final_force_report.lines(real))
 
 
 # --- the truth is recovered ------------------------------------------------------------------------------------------
@@ -97,7 +97,7 @@ def test_straight_lines_are_explained():
     assert low < 300 < high
     assert high - low < 30
     assert found.force_scale("b")[0] == pytest.approx(1.5, abs=0.1)
-    assert found.diagnosis_json()["next_grasp"] is None
+    assert final_force_report.diagnosis_json(found)["next_grasp"] is None
 
 
 def test_dead_zone_is_recovered():
@@ -107,7 +107,7 @@ def test_dead_zone_is_recovered():
         (low, high), (first, last) = found.intervals[name]["dead_zone"]
         assert low < slope < high
         assert first < 3e-4 < last
-    sizes = {entry["effect"]: entry["parameters"] for entry in found.diagnosis_json()["ranking"]}
+    sizes = {entry["effect"]: entry["parameters"] for entry in final_force_report.diagnosis_json(found)["ranking"]}
     assert sizes["backlash"]["gap_m"] == pytest.approx(6e-4, abs=1.5e-4)
     assert sizes["coulomb_friction"]["force_n"] == pytest.approx(0.03, abs=0.008)
 
@@ -143,7 +143,7 @@ def test_a_bent_curve_is_unknown():
     force = {name: top * (DELTA_M / DELTA_M[-1]) ** 2 for name, top in (("a", 0.9), ("b", 0.6))}
     found = analyse(noisy(force, 0.01, 6))
     assert (found.verdict, found.effects) == ("unknown", ())
-    assert found.diagnosis_json()["where"]["signal"] == "final_force"
+    assert final_force_report.diagnosis_json(found)["where"]["signal"] == "final_force"
 
 
 def test_scatter_beyond_the_given_noise_is_unknown():
@@ -195,10 +195,10 @@ def test_too_little_is_not_fitted(force, why):
     found = analyse({"a": force})
     assert found.verdict == "not_fitted"
     assert why in found.reason
-    assert why in "\n".join(found.lines())
-    assert json.loads(json.dumps(found.diagnosis_json(), allow_nan=False))["error_before"] is None
-    assert found.compare_json()["floor_ratio"] is None
-    assert found.sections()
+    assert why in "\n".join(final_force_report.lines(found))
+    assert json.loads(json.dumps(final_force_report.diagnosis_json(found), allow_nan=False))["error_before"] is None
+    assert final_force_report.compare_json(found)["floor_ratio"] is None
+    assert final_force_report.sections(found)
 
 
 def test_one_delta_again_and_again_is_not_fitted():
@@ -210,7 +210,7 @@ def test_a_short_object_is_left_out_and_named():
     found = analyse(noisy({"a": 300 * DELTA_M, "b": 300 * DELTA_M[:3]}, 0.01, 11))
     assert found.verdict == "explained"
     assert list(found.rows) == ["a"]
-    assert any(line.startswith("b: left out, 3 rows") for line in found.lines())
+    assert any(line.startswith("b: left out, 3 rows") for line in final_force_report.lines(found))
 
 
 def test_four_rows_are_fitted_and_prove_nothing():
@@ -240,7 +240,7 @@ def test_a_dead_zone_of_the_robots_size_is_usually_seen(std, least):
 
 
 def test_json_has_the_fixed_keys_and_plain_numbers(real):
-    compare, diagnosis = real.compare_json(), real.diagnosis_json()
+    compare, diagnosis = final_force_report.compare_json(real), final_force_report.diagnosis_json(real)
     assert set(compare) == {"set", "model", "signals", "phases", "floor_ratio", "heldout"}
     assert set(diagnosis) == {
         "verdict", "effects", "steps", "ranking", "error_before", "error_after", "floor_ratio", "next_grasp", "where",
@@ -257,17 +257,19 @@ def test_json_has_the_fixed_keys_and_plain_numbers(real):
 
 def test_analysis_is_the_same_every_time(real):
     again = analyse({name: np.array(force) for name, force in REAL.items()})
-    assert again.diagnosis_json() == real.diagnosis_json()
-    assert again.lines() == real.lines()
+    assert final_force_report.diagnosis_json(again) == final_force_report.diagnosis_json(real)
+    assert final_force_report.lines(again) == final_force_report.lines(real)
 
 
 def test_a_dollar_in_a_name_is_no_mathematics():
-    draw(analyse({"a$b_{$c": 200 * DELTA_M, "d": 300 * DELTA_M})).savefig(picture := io.BytesIO())
+    final_force_report.draw(analyse({"a$b_{$c": 200 * DELTA_M, "d": 300 * DELTA_M})).savefig(picture := io.BytesIO())
     assert picture.getvalue()
 
 
 def test_sections_make_a_report(real, tmp_path):
-    html = write_report(tmp_path / "r.html", "t", "lead", real.sections(), {}).read_text(encoding="utf-8")
+    html = write_report(tmp_path / "r.html", "t", "lead", final_force_report.sections(real), {}).read_text(
+        encoding="utf-8"
+    )
     assert "dead zone" in html
     assert "can&#39;t tell" in html or "can't tell" in html
     assert html.count("<svg") == 1

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from forcegrasp.errors import MeasurementError
-from forcegrasp.identify.given_noise import check_given_noise, noise_range
+from forcegrasp.identify.sensor_noise import check_given_noise, noise_range
 from forcegrasp.measure import MeasuredGrasp, MeasurementSet
 
 SIGMA_M, SIGMA_N = 3e-5, 0.02

@@ -206,7 +206,7 @@ def test_values_of_a_step_give_way_to_final_ones(made_up):
     assert f"left_n {left:.3g} N" in table
     cells = texts(diagnosis_report.sections(diagnosis, None, made_up.tried))
     assert any(f"left_n {left:.3g} N" in cell for cell in cells)
-    step_value = f"left_n {bias.parameters()['left_n']:.3g} N,"
+    step_value = f"left_n {bias.setting.parameters['left_n']:.3g} N,"
     assert not any(step_value in text for text in (table, *cells))
 
 

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from forcegrasp.diagnosis import search
-from forcegrasp.diagnosis.evidence import indistinguishable, is_significant
 from forcegrasp.diagnosis.result import Diagnosis, Step
+from forcegrasp.diagnosis.search import indistinguishable, is_significant
 from forcegrasp.diagnosis.verdict import conclude, explained_share
 from forcegrasp.effects import get_effect
 from forcegrasp.effects.setting import EffectSetting

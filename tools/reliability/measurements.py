@@ -11,7 +11,7 @@ import numpy as np
 
 from forcegrasp.cli.main import main
 from forcegrasp.errors import ForcegraspError
-from forcegrasp.identify.given_noise import check_given_noise
+from forcegrasp.identify.sensor_noise import check_given_noise
 from forcegrasp.measure import MeasurementSet, check_set, read_set
 from forcegrasp.models.model_file import read_model
 from forcegrasp.physics import default_gripper
