@@ -2,7 +2,7 @@
 
 Two ways to squeeze are known. *Again and again*: the delta is added to the measured position at every control step, as
 in the paper, and the motor settles at kp Δq whatever the object. *Once*: one target is held, Δq beyond the surface; the
-object's softness then takes its share of Δq. A table does not say which it was. tests/compare/test_final_force.py
+object's softness then takes its share of Δq. A table does not say which it was. tests/final_force/test_final_force.py
 holds this list against simulations of both.
 """
 

@@ -11,7 +11,7 @@ import pytest
 from forcegrasp.diagnosis import add_effect, advice, diagnose_set
 from forcegrasp.identify import comparison, fit_set, loading
 from forcegrasp.identify import noise_floor as floor
-from tests.compare.conftest import made_up as made_up  # a fixture
+from tests.made_up import made_up as made_up  # a fixture
 
 TABLE_META = "format: forcegrasp-measurements/1\nkind: final_force\ngripper: tiago\nsource: a test\nlicense: none\n"
 
