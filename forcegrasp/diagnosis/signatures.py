@@ -17,8 +17,6 @@ from forcegrasp.short_repr import ShortRepr
 
 # A signature stands for all smaller sizes, and for sizes up to this much larger than the one it was simulated with.
 _REACH = 3.0
-
-
 # Sizes around the promised one that are looked at before an effect is fitted.
 _SIZES = (0.45, 0.67, 1.0, 1.4, 1.9, 2.6)
 
@@ -59,23 +57,20 @@ class Signatures:
         self._tried = [
             EffectSetting(e, variant, values) for e in effects for variant in e.variants for values in e.trials()
         ]
-        self._changes: list[np.ndarray | None] = [None] * len(self._tried)  # each ``(N,)``; None until it is simulated
+        self._changes: dict[EffectSetting, np.ndarray] = {}  # each ``(N,)``
 
-    def _places(self, effects: Collection[type[Effect]]) -> list[int]:
-        return [index for index, trial in enumerate(self._tried) if trial.effect in effects]
+    def _trials(self, effects: Collection[type[Effect]]) -> list[EffectSetting]:
+        return [trial for trial in self._tried if trial.effect in effects]
 
     def missing(self, effects: Sequence[type[Effect]]) -> list[type[Effect]]:
         """Those of the effects that were never simulated."""
-        unknown = {t.effect for t, c in zip(self._tried, self._changes, strict=True) if c is None}
-        return [e for e in effects if e in unknown]
+        return [e for e in effects if any(trial not in self._changes for trial in self._trials([e]))]
 
     def simulate(self, fit: Fit, effects: Collection[type[Effect]]) -> None:
         """Simulates these effects on top of a fit, all at once."""
-        places = self._places(effects)
-        if places:
-            changes = _changes([self._tried[i] for i in places], self._study, fit)
-            for place, change in zip(places, changes.T, strict=True):
-                self._changes[place] = change
+        trials = self._trials(effects)
+        if trials:
+            self._changes.update(zip(trials, _changes(trials, self._study, fit).T, strict=True))
 
     def scores(self, fit: Fit, background: Background, effects: Sequence[type[Effect]]) -> list[list[Score]]:
         """How well these effects fit what a fit leaves.
@@ -83,10 +78,8 @@ class Signatures:
         Returns:
           For each effect and variant all its trials' scores, best first; effects that leave no trace are missing.
         """
-        residual = fit.residual.ravel()
-        places = self._places(effects)
-        tried = [self._tried[i] for i in places]
-        change = np.stack([c for i in places if (c := self._changes[i]) is not None], axis=1)
+        residual, tried = fit.residual.ravel(), self._trials(effects)
+        change = np.stack([self._changes[trial] for trial in tried], axis=1)
         clean = background.remove(change)
         found: dict[tuple[type[Effect], str], list[Score]] = {}
         for kind, columns in _kinds(tried).items():
