@@ -36,13 +36,17 @@ class Candidate(ShortRepr):
     signature: np.ndarray  #: unit vector, ``(N,)``
 
     def summary(self) -> str:
-        sizes = some(f"{name} {value:.3g}" for name, value in self.setting.parameters.items())
+        sizes = some(f"{name} {value:.3g}" for name, value in self.parameters().items())
         return f"{self.effect.name}: error {self.error_after:.2f} × noise, gain {self.heldout_gain:+.0f}, {sizes}"
 
     @property
     def effect(self) -> type[Effect]:
         """The effect's class."""
         return self.setting.effect
+
+    def parameters(self) -> dict[str, float]:
+        """The effect's fitted parameters."""
+        return self.setting.parameters
 
     @property
     def heldout_gain(self) -> float:

@@ -68,7 +68,7 @@ def candidate_json(candidate: Candidate, diagnosis: Diagnosis) -> dict[str, Any]
 def candidate_parameters(candidate: Candidate, diagnosis: Diagnosis) -> dict[str, float]:
     """An effect's parameters: those of the final model if it is in there, and otherwise of its own fit."""
     if candidate.setting.kind not in [known.kind for known in diagnosis.fit.problem.effects]:
-        return candidate.setting.parameters
+        return candidate.parameters()
     return {name: fitted.value for name, fitted in found_parameters(diagnosis)[candidate.effect.name].items()}
 
 
