@@ -67,8 +67,6 @@ def diagnose(
     """
     fit, folds = base.fit, tuple(make_folds(target.grasps))
     error_before = rms(target.before_rounding(heldout_residual(fit, target, folds)), target)
-    if not base.converged:
-        return Diagnosis(Verdict.NOT_FITTED, (), (), base, fit, target, folds, error_before, error_before)
     of_base = numerical_error(fit, target)
     study = Study(target, simulators, folds, beyond_fit(fit, of_base), progress)
     floor = numerical_floor(study.numerical, target)
@@ -91,6 +89,9 @@ def diagnose(
             break
     error_after, (left, noise) = rms(study.heldout(fit), target), _left(study, fit)
     found = [s for s in steps if s.effects]
+    # a missing effect makes the error rough, and the base fit stop short: then only what leaves nothing is an answer
+    if not base.converged and (left or not found):
+        return Diagnosis(Verdict.NOT_FITTED, (), (), base, base.fit, target, folds, error_before, error_before)
     verdict = conclude([s.verdict for s in found if s.verdict], error_before, error_after, floor, bool(left))
     names = [s.effects[0] for s in found] if verdict.names_effects else []
     if verdict is Verdict.ONE_OF:
