@@ -295,8 +295,8 @@ def _resume(path: Path) -> int:
     run = RunDir.open(path)
     config = run.config()
     (path / FAILURE).unlink(missing_ok=True)  # told when it failed; it gets another chance
-    if run.has_checkpoint and run.load()[1]["frames"] >= config.ppo.total_frames:
-        print(f"{path}: already trained to the end ({config.ppo.total_frames:,} frames)")
+    if run.has_checkpoint and run.load()[1]["frames"] >= config.algorithm.total_frames:
+        print(f"{path}: already trained to the end ({config.algorithm.total_frames:,} frames)")
         return 0
     return _train(config, run, resume=True)
 

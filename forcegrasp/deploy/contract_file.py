@@ -15,9 +15,10 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from forcegrasp.assets import DEFAULT_GRIPPER
-from forcegrasp.deploy.contract import PARTS, Contract, ForcePIGains, GripperInterface
+from forcegrasp.deploy.contract import Contract, ForcePIGains, GripperInterface
 from forcegrasp.errors import DeployError, closest
 from forcegrasp.files.bounded import read_bytes
+from forcegrasp.observation import PARTS
 
 FORMAT, FIRST_FORMAT = "forcegrasp-policy/2", "forcegrasp-policy/1"
 CONTRACT_FILE, NETWORK_FILE = "contract.json", "policy.onnx"
@@ -75,7 +76,7 @@ def _network(contract: Contract, network: bytes) -> dict[str, Any]:
             "shape": [1, contract.observation_size],
             "layout": "frames, the oldest first; in a frame the parts; in a part a number for each of its columns; at"
             " the start the first frame is repeated",
-            "parts": {part: PARTS[part] for part in contract.parts},
+            "parts": {part: PARTS[part].unit for part in contract.parts},
             "columns": {part: contract.columns(part) for part in contract.parts},
         },
         "output": {

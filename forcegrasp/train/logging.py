@@ -20,6 +20,7 @@ from forcegrasp.evaluate.video import grasp_video
 from forcegrasp.physics import load_gripper
 from forcegrasp.physics.scene_renderer import NoRendererError
 from forcegrasp.runs.run_dir import RunDir
+from forcegrasp.train.algorithms import algorithm_of
 from forcegrasp.train.board import card, layout, tag
 
 #: Episodes drawn in a figure of force traces.
@@ -58,7 +59,7 @@ class TrainingLog:
         if not frames:
             self.writer.add_text("1_about_this_run", card(run, config))
             self.writer.add_text("2_config", "```\n" + run.config_path.read_text("utf-8") + "```")
-            self.writer.add_custom_scalars(layout())
+            self.writer.add_custom_scalars(layout(algorithm_of(config)))
 
     def batch(self, number: int, frames: int, groups: dict[str, dict[str, float]], episodes: TensorDictBase) -> None:
         """Logs one batch.
