@@ -37,13 +37,6 @@ _KINDS: dict[str, tuple[set[type], str]] = {
     "tuple[float, float]": ({int, float}, "[low, high]"),
     "tuple[str, ...]": ({str}, "a list of names"),
 }
-#: What contracts of the first format do not say: there was one gripper.
-_FIRST_GRIPPER = {
-    "name": DEFAULT_GRIPPER,
-    "unit": "m",
-    "positions": ["q_l_m", "q_r_m"],
-    "forces": ["f_l_n", "f_r_n"],
-}
 
 Section = TypeVar("Section", Contract, ForcePIGains, GripperInterface)
 
@@ -110,7 +103,8 @@ def read_contract(folder: Path | str) -> tuple[Contract, bytes | ForcePIGains]:
     try:
         written, control = _entry(content, "format", str), _entry(content, "control", dict)
         if written == FIRST_FORMAT:
-            content |= {"policy": NETWORK, "gripper": _FIRST_GRIPPER}
+            first = json.loads((shipped_contracts() / DEFAULT_GRIPPER / CONTRACT_FILE).read_text("utf-8"))
+            content |= {"policy": NETWORK, "gripper": first["gripper"]}  # the only one of that format
             control["stall"] = None
         elif written != FORMAT:
             raise ValueError(f"format is {written!r}, but this version reads {FORMAT!r}: export the policy with it")

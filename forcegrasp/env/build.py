@@ -91,7 +91,7 @@ def build_env(
         ActionChangePenalty(reward.action_weight),
         # q from [0, stroke] to [-1, 1]
         ObservationNorm(loc=-1.0, scale=2 / gripper.stroke, in_keys=["sensed_position"], out_keys=["scaled_position"]),
-        *(_transform(part.transform, gripper, sensors) for part in parts if part.transform),
+        *(_transform(module, gripper, sensors) for module in dict.fromkeys(p.transform for p in parts) if module),
         CatTensors([part.entry or part.name for part in parts], "observation", del_keys=False, sort=False),
         CatFrames(observation.frames, dim=-1, in_keys=["observation"], padding="same"),
     ]
