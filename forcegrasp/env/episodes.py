@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from jaxtyping import Float
 from tensordict import TensorDictBase
 from torch import Tensor
 
@@ -27,7 +28,9 @@ METRICS = {
 }
 
 
-def summarise(rollout: TensorDictBase, sensors: SensorConfig, period_s: float | None = None) -> dict[str, Tensor]:
+def summarise(
+    rollout: TensorDictBase, sensors: SensorConfig, period_s: float | None = None
+) -> dict[str, Float[Tensor, " n"]]:
     """Figures of every episode, from the true state.
 
     Args:
