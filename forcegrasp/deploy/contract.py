@@ -136,7 +136,7 @@ class Contract:
 
 @dataclass(frozen=True)
 class ForcePIGains:
-    """What the hand-written controller is told beside its contract.
+    """Gains of the hand-written controller.
 
     Raises:
       ValueError: if the values can't be right, in one line.

@@ -113,7 +113,7 @@ class GraspController:
         self._position: np.ndarray | None = None  # of the last good reading
         self._commanded: np.ndarray | None = None
         self._time: float | None = None  # of the last good reading
-        self._told: set[str] = set()
+        self._reported: set[str] = set()
 
     def step(self, q: ArrayLike, f: ArrayLike, t: float | None = None) -> np.ndarray:
         """The command for one control period.
@@ -152,7 +152,7 @@ class GraspController:
             # any reading: forces come from both sides, and the other sensor may be dead
             delta = np.maximum(delta, 0.0)
             fault = f"force is above the ceiling of {self.contract.ceiling_n:.4g} N: {_show(force)} N; not closing"
-        self._tell(fault)
+        self._report(fault)
         self.delta_m = delta
         self._commanded = np.clip(position + delta, *self.contract.joint_range_m)
         return self._commanded.copy()
@@ -220,17 +220,17 @@ class GraspController:
             if position is None or not ((position >= low) & (position <= high)).all():
                 raise DeployError(f"{fault}, but no good position was read since the reset: there is nothing to hold")
             self._commanded = np.clip(position, *self.contract.joint_range_m)
-        self._tell(fault)
+        self._report(fault)
         return self._commanded.copy()
 
-    def _tell(self, fault: str | None) -> None:
+    def _report(self, fault: str | None) -> None:
         """Says what is wrong, and logs it unless that kind of fault was already logged in this grasp."""
         self.fault = fault
         if fault:
             kind = fault.partition(":")[0]
-            if kind not in self._told:
+            if kind not in self._reported:
                 _log.warning(fault)
-            self._told.add(kind)
+            self._reported.add(kind)
 
 
 def _with_ceiling(contract: Contract, ceiling_n: float | None) -> Contract:

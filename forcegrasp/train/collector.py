@@ -1,4 +1,4 @@
-"""Who simulates the grasps of a batch: this process, or workers of a Ray cluster. Both are told apart here alone."""
+"""Who simulates the grasps of a batch: this process, or workers of a Ray cluster. Nothing else knows which."""
 
 from __future__ import annotations
 
@@ -108,7 +108,7 @@ def make_collector(
     frames_per_batch: int,
     model: Model | None = None,
 ) -> GraspCollector | RayCollector:
-    """Returns what collects with this policy, and is spoken to by ``map_fn``.
+    """Returns a collector with this policy; ``map_fn`` calls a method of every worker's.
 
     Args:
       config: says who collects.

@@ -58,8 +58,8 @@ class Trainer:
 
     def prepare(self) -> CurriculumValues:
         """Sets curriculum and weights of whoever collects the next batch; returns the curriculum's values."""
-        told = (self.frames, self.policy.state_dict())
-        return self.collector.map_fn("prepare", [told] * self.config.collector.workers)[0]
+        frames_and_weights = (self.frames, self.policy.state_dict())
+        return self.collector.map_fn("prepare", [frames_and_weights] * self.config.collector.workers)[0]
 
     def state(self) -> tuple[dict[str, Tensor], dict[str, Any]]:
         """All that changes while training, as tensors and as JSON."""
@@ -117,9 +117,9 @@ def _train(config: TrainConfig, run: RunDir, resume: bool) -> bool:
             batch = next(batches)
             collected = time.perf_counter()
             summary = summarise(batch, config.sensors, period_s)
-            figures = {name: float(value.mean()) for name, value in summary.items()}
+            metrics = {name: float(value.mean()) for name, value in summary.items()}
             algorithm.set_progress(trainer.frames / total)
-            learned = algorithm.update(batch)
+            learning = algorithm.update(batch)
             ended = time.perf_counter()
 
             whole_task = trainer.frames >= trainer.schedule.end_frames  # before, the batch was easier
@@ -127,9 +127,9 @@ def _train(config: TrainConfig, run: RunDir, resume: bool) -> bool:
             trainer.batches += 1
             terms = batch.get(("next", "reward_terms"))
             groups = {
-                "episode": {"return": float(batch.get(("next", "reward")).sum((1, 2)).mean()), **figures},
+                "episode": {"return": float(batch.get(("next", "reward")).sum((1, 2)).mean()), **metrics},
                 "reward": {name: float(terms[name].mean()) for name in sorted(terms.keys())},
-                config.algorithm.name: learned,
+                config.algorithm.name: learning,
                 "curriculum": values.scalars(),
                 "speed": {
                     "frames_per_s": batch.numel() / (ended - started),
@@ -143,9 +143,9 @@ def _train(config: TrainConfig, run: RunDir, resume: bool) -> bool:
                 log.video(batch[0], trainer.frames)
             last = trainer.frames >= total or bool(stop)
             if last or trainer.batches % every.checkpoint_every == 0:
-                score = figures["force_reward_normalised"] if whole_task else None
+                score = metrics["force_reward_normalised"] if whole_task else None
                 run.save(trainer.frames, *trainer.state(), keep=every.keep, score=score)
-            progress(trainer.frames, figures)
+            progress(trainer.frames, metrics)
         if batch is not None and not stop:
             if config.log.figures_every:
                 log.traces(batch[:6], trainer.frames)
@@ -156,7 +156,7 @@ def _train(config: TrainConfig, run: RunDir, resume: bool) -> bool:
 
 @contextmanager
 def _progress(total: int, done: int, steps: int):
-    """Yields a function that shows progress: ``(frames, episode figures)``."""
+    """Yields a function that shows progress: ``(frames, metrics of the episodes)``."""
     columns = [
         BarColumn(bar_width=16),
         TextColumn("{task.percentage:3.0f} % of {task.total:,} frames"),
@@ -166,8 +166,8 @@ def _progress(total: int, done: int, steps: int):
     with Progress(*columns) as bar:
         task = bar.add_task("training", total=total, completed=done, reached="")
 
-        def show(frames: int, figures: dict[str, float]) -> None:
-            reward, moved = figures["force_reward_normalised"], figures["displacement_until_grasped_mm"]
+        def show(frames: int, metrics: dict[str, float]) -> None:
+            reward, moved = metrics["force_reward_normalised"], metrics["displacement_until_grasped_mm"]
             reached = f"force reward {reward:.0f}/{steps} moved {moved:.2f} mm"
             bar.update(task, completed=min(frames, total), reached=reached)
 
