@@ -16,7 +16,7 @@ PACKAGE = Path(__file__).parents[1] / "forcegrasp"
 #: Data, and where presets are.
 DATA = {"assets", "policies", "conf"}
 #: Rooms that still have some; to be emptied.
-NOT_YET = {"deploy", "evaluate", "measure", "compare", "doctor", "runs", "reports"}
+NOT_YET = {"evaluate", "measure", "compare", "doctor", "runs", "reports"}
 #: Numbers of its description that no other quantity of the package happens to have.
 NUMBERS = {default_gripper().stroke, default_gripper().stroke / 2, default_gripper().max_step}
 #: Sizes of effects are given for the paper's gripper, and scaled for others.

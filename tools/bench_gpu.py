@@ -54,7 +54,7 @@ def training(n: int, physics: PhysicsConfig, steps: int) -> Callable[[], object]
     config.ppo.grasps, config.ppo.initial_action = n, -1.0
     trainer = Trainer(config)
     batches = iter(trainer.collector)
-    return lambda: trainer.ppo.update(next(batches), trainer.shuffle)
+    return lambda: trainer.algorithm.update(next(batches))
 
 
 LEVELS = {"simulator": simulator, "environment": environment, "training": training}

@@ -91,12 +91,14 @@ def _name_of(key: str, given: Any) -> str:
 
 
 def _completed(config: TrainConfig) -> tuple[TrainConfig, Gripper]:
-    """The configuration with what it leaves to the gripper's description, and the gripper."""
+    """The configuration with what it leaves to the gripper's description and the model's noise, and the gripper."""
+    from forcegrasp.models.variation import read_model_of, with_noise_of
     from forcegrasp.physics import load_gripper
     from forcegrasp.physics.completion import complete
 
     gripper = load_gripper(config.gripper)
-    return dataclasses.replace(complete(config, gripper), gripper=gripper.name_or_path), gripper
+    model = read_model_of(gripper, config.model) if config.model else None
+    return dataclasses.replace(complete(config, with_noise_of(gripper, model)), gripper=gripper.name_or_path), gripper
 
 
 def _check(config: TrainConfig) -> TrainConfig:
@@ -115,10 +117,6 @@ def _check(config: TrainConfig) -> TrainConfig:
         raise ConfigError(f"gripper={config.gripper}: {NO_FORCES}")
     if config.physics.engine == "warp":
         check_gripper_for_warp(gripper)
-    if config.model:
-        from forcegrasp.models.variation import read_model_of
-
-        read_model_of(gripper, config.model)
     if config.collector.kind == "ray":
         from forcegrasp.train.cluster import find_ray
 
@@ -295,8 +293,8 @@ def _resume(path: Path) -> int:
     run = RunDir.open(path)
     config = run.config()
     (path / FAILURE).unlink(missing_ok=True)  # told when it failed; it gets another chance
-    if run.has_checkpoint and run.load()[1]["frames"] >= config.ppo.total_frames:
-        print(f"{path}: already trained to the end ({config.ppo.total_frames:,} frames)")
+    if run.has_checkpoint and run.load()[1]["frames"] >= config.algorithm.total_frames:
+        print(f"{path}: already trained to the end ({config.algorithm.total_frames:,} frames)")
         return 0
     return _train(config, run, resume=True)
 

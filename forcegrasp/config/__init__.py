@@ -1,8 +1,8 @@
 """Every option that a command line or YAML may set, as dataclasses: default, unit, bounds, choices and source."""
 
+from forcegrasp.config.algorithms import AlgorithmConfig, PPOConfig
 from forcegrasp.config.option import is_left_out, validate
 from forcegrasp.config.sections import (
-    OBSERVATION_PARTS,
     ActionConfig,
     CollectorConfig,
     CurriculumConfig,
@@ -10,7 +10,6 @@ from forcegrasp.config.sections import (
     LogConfig,
     ObservationConfig,
     PhysicsConfig,
-    PPOConfig,
     RewardConfig,
     SensorConfig,
     check_deformation,
@@ -30,9 +29,9 @@ from forcegrasp.config.verbs import (
 )
 
 __all__ = [
-    "OBSERVATION_PARTS",
     "ActionConfig",
     "AddConfig",
+    "AlgorithmConfig",
     "CollectorConfig",
     "CompareConfig",
     "CurriculumConfig",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Collection
 from dataclasses import field
 from typing import Any, cast
 
@@ -18,7 +19,7 @@ def option(
     source: str = "",
     low: float = -math.inf,
     high: float = math.inf,
-    choices: tuple[str, ...] = (),
+    choices: Collection[str] = (),
     of_gripper: str = "",
 ) -> Any:
     """A dataclass field that also says what it means, and what it may be. ``low`` and ``high`` are inclusive.

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass, field
 
 from forcegrasp.assets import DEFAULT_GRIPPER
+from forcegrasp.config.algorithms import AlgorithmConfig, PPOConfig
 from forcegrasp.config.option import of_gripper, option
 from forcegrasp.config.sections import (
     ActionConfig,
@@ -15,7 +16,6 @@ from forcegrasp.config.sections import (
     LogConfig,
     ObservationConfig,
     PhysicsConfig,
-    PPOConfig,
     RewardConfig,
     SensorConfig,
     check_deformation,
@@ -41,6 +41,11 @@ class TrainConfig:
     collector: CollectorConfig = field(default_factory=CollectorConfig)
     log: LogConfig = field(default_factory=LogConfig)
 
+    @property
+    def algorithm(self) -> AlgorithmConfig:
+        """Options of the algorithm that learns."""
+        return self.ppo
+
     def check(self, path: str) -> None:
         """Refuses objects squeezed flat, a model on an engine without effects, and shares that workers can't have."""
         check_no_effects(self.model, self.physics, f"{path}model={self.model}")
@@ -48,10 +53,10 @@ class TrainConfig:
         if self.collector.kind == "ray" and self.physics.device != "cpu":
             device = f"{path}physics.device={self.physics.device}"
             raise ConfigError(f"{device}: Ray's workers have no GPU; use collector=direct")
-        grasps, workers = self.ppo.grasps, self.collector.workers
+        grasps, workers, name = self.algorithm.grasps, self.collector.workers, self.algorithm.name
         if grasps % workers:
             raise ConfigError(
-                f"{path}ppo.grasps={grasps} can't be shared equally among {path}collector.workers={workers}:"
+                f"{path}{name}.grasps={grasps} can't be shared equally among {path}collector.workers={workers}:"
                 f" make it {-(-grasps // workers) * workers}"
             )
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from itertools import accumulate
 from typing import cast
 
 import torch
@@ -9,7 +11,8 @@ from tensordict.nn import AddStateIndependentNormalScale, TensorDictModule
 from torch import Tensor, nn
 from torchrl.modules import MLP, IndependentNormal, ProbabilisticActor
 
-from forcegrasp.config import ObservationConfig, PPOConfig
+from forcegrasp.config import AlgorithmConfig, ObservationConfig, TrainConfig
+from forcegrasp.observation import PARTS
 from forcegrasp.physics.gripper import Gripper
 from forcegrasp.physics.gripper_file import default_gripper
 
@@ -21,47 +24,54 @@ class Mirrored(nn.Module):
     object steadily to one side.
 
     Args:
-      net: ``(*B, 2k) -> (*B, 2)``, where inputs and outputs are pairs (left, right).
+      net: ``(*B, size) -> (*B, 2)``; its output is the pair (left, right).
+      sizes: of the observation's parts in their order: 2 for a pair, 1 for a number that is the same in the mirror.
     """
 
-    def __init__(self, net: nn.Module) -> None:
+    order: Tensor
+
+    def __init__(self, net: nn.Module, sizes: Sequence[int]) -> None:
         super().__init__()
         self.net = net
+        starts = accumulate(sizes, initial=0)
+        order = [start + k for start, size in zip(starts, sizes, strict=False) for k in reversed(range(size))]
+        self.register_buffer("order", torch.tensor(order), persistent=False)
 
     def forward(self, observation: Tensor) -> Tensor:
         """Both actions, ``(*B, 2)``."""
-        swapped = observation.unflatten(-1, (-1, 2)).flip(-1).flatten(-2)
+        swapped = observation[..., self.order]
         own, mirrored = self.net(torch.stack([observation, swapped])).unbind(0)
         return (own + mirrored.flip(-1)) / 2
 
 
-def observation_size(gripper: Gripper, config: ObservationConfig) -> int:
-    """Length of the stacked observation: a part has a number per motor, or one per force reading."""
-    of_motors = {"position", "last_action"}
-    sizes = [len(gripper.motors if part in of_motors else gripper.forces) for part in config.parts]
-    return sum(sizes) * config.frames
+def part_sizes(gripper: Gripper, config: ObservationConfig) -> list[int]:
+    """How many numbers each part of the stacked observation has, in its order."""
+    return [PARTS[part].size(len(gripper.motors), len(gripper.forces)) for part in config.parts] * config.frames
 
 
-def make_policy(observation_size: int, config: PPOConfig, gripper: Gripper | None = None) -> ProbabilisticActor:
-    """Reads ``observation`` ``(*B, observation_size)``, writes ``action`` ``(*B, motors)`` and ``action_log_prob``.
+def policy_of(config: TrainConfig, gripper: Gripper) -> ProbabilisticActor:
+    """The policy of a training, as it starts."""
+    return make_policy(part_sizes(gripper, config.observation), config.algorithm, gripper)
+
+
+def make_policy(sizes: Sequence[int], config: AlgorithmConfig, gripper: Gripper | None = None) -> ProbabilisticActor:
+    """Reads ``observation`` ``(*B, sum(sizes))``, writes ``action`` ``(*B, motors)`` and ``action_log_prob``.
 
     The standard deviation does not depend on the state. Actions are not squashed: the environment clips them to
     [−1, 1] (paper, Sec. 4).
 
     Args:
-      observation_size: length of the stacked observation.
+      sizes: of the parts of the stacked observation, see :func:`part_sizes`.
       config: size of the network, initial mean and deviation, and whether it is :class:`Mirrored`.
       gripper: how many motors there are, and whether it is its own mirror image; the paper's by default.
     """
     gripper = gripper or default_gripper()
     actions = len(gripper.motors)
-    net = MLP(
-        in_features=observation_size, out_features=actions, num_cells=list(config.hidden), activation_class=nn.Tanh
-    )
+    net = MLP(in_features=sum(sizes), out_features=actions, num_cells=list(config.hidden), activation_class=nn.Tanh)
     last = cast(nn.Linear, net[-1])
     nn.init.orthogonal_(last.weight, gain=0.01)
     nn.init.constant_(last.bias, config.initial_action)
-    mean = Mirrored(net) if config.mirrored and gripper.is_symmetric else net
+    mean = Mirrored(net, sizes) if config.mirrored and gripper.is_symmetric else net
     scale = AddStateIndependentNormalScale(actions, init_value=config.log_std)
     return ProbabilisticActor(
         TensorDictModule(nn.Sequential(mean, scale), in_keys=["observation"], out_keys=["loc", "scale"]),

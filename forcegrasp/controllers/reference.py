@@ -1,4 +1,4 @@
-"""Controllers to hold others against: doing nothing, only closing, and a feed-forward that knows the object."""
+"""Baselines: doing nothing, only closing, and a feed-forward that knows the object."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Constant(TensorDictModuleBase):
 
 
 class InformedFeedForward(TensorDictModuleBase):
-    """Static feed-forward that is told the object's force scale: waits on first touch, then commands one position.
+    """Static feed-forward that knows the object's force scale: waits on first touch, then commands one position.
 
     f = f_max · f_α · Δq / Δq_max at rest in the simulator, hence a = −f_goal / (f_max · f_α) once every reading has
     shown contact. It looks at no force and makes nothing faster, so that it is no upper bound: the force rises as the

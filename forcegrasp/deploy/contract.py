@@ -9,10 +9,7 @@ import math
 from dataclasses import dataclass
 
 from forcegrasp.errors import closest
-
-#: Part of the observation → unit; a number per motor each, or one per force reading.
-PARTS = {"position": "1, scaled", "force": "N", "force_error": "N", "last_action": "1", "had_contact": "0 or 1"}
-_OF_MOTORS = ("position", "last_action")
+from forcegrasp.observation import PARTS
 
 
 @dataclass(frozen=True)
@@ -84,6 +81,12 @@ class Contract:
         unknown = [part for part in self.parts if part not in PARTS]
         if unknown:
             raise ValueError(f"no observation part {unknown[0]!r}{closest(unknown[0], PARTS)}")
+        simulated = [part for part in self.parts if PARTS[part].on_robot is None]
+        if simulated:
+            raise ValueError(
+                f"observation.parts: {simulated[0]} has no form on a robot: write it (on_robot in"
+                " forcegrasp/observation.py), or train without that part"
+            )
         if not self.parts or len(set(self.parts)) < len(self.parts):
             raise ValueError("parts must name each part of the observation once, and at least one")
         if self.frames < 1:
@@ -107,8 +110,8 @@ class Contract:
             )
 
     def columns(self, part: str) -> tuple[str, ...]:
-        """The readings that the numbers of a part belong to: one per motor, or one per force channel."""
-        return self.gripper.positions if part in _OF_MOTORS else self.gripper.forces
+        """What the numbers of a part belong to: a reading per motor, one per force channel, or the whole grasp."""
+        return {"motor": self.gripper.positions, "force": self.gripper.forces, "grasp": (part,)}[PARTS[part].per]
 
     @property
     def observation_size(self) -> int:
@@ -133,7 +136,7 @@ class Contract:
 
 @dataclass(frozen=True)
 class ForcePIGains:
-    """What the hand-written controller is told beside its contract.
+    """Gains of the hand-written controller.
 
     Raises:
       ValueError: if the values can't be right, in one line.

@@ -15,9 +15,10 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from forcegrasp.assets import DEFAULT_GRIPPER
-from forcegrasp.deploy.contract import PARTS, Contract, ForcePIGains, GripperInterface
+from forcegrasp.deploy.contract import Contract, ForcePIGains, GripperInterface
 from forcegrasp.errors import DeployError, closest
 from forcegrasp.files.bounded import read_bytes
+from forcegrasp.observation import PARTS
 
 FORMAT, FIRST_FORMAT = "forcegrasp-policy/2", "forcegrasp-policy/1"
 CONTRACT_FILE, NETWORK_FILE = "contract.json", "policy.onnx"
@@ -35,13 +36,6 @@ _KINDS: dict[str, tuple[set[type], str]] = {
     "str": ({str}, "text"),
     "tuple[float, float]": ({int, float}, "[low, high]"),
     "tuple[str, ...]": ({str}, "a list of names"),
-}
-#: What contracts of the first format do not say: there was one gripper.
-_FIRST_GRIPPER = {
-    "name": DEFAULT_GRIPPER,
-    "unit": "m",
-    "positions": ["q_l_m", "q_r_m"],
-    "forces": ["f_l_n", "f_r_n"],
 }
 
 Section = TypeVar("Section", Contract, ForcePIGains, GripperInterface)
@@ -75,7 +69,7 @@ def _network(contract: Contract, network: bytes) -> dict[str, Any]:
             "shape": [1, contract.observation_size],
             "layout": "frames, the oldest first; in a frame the parts; in a part a number for each of its columns; at"
             " the start the first frame is repeated",
-            "parts": {part: PARTS[part] for part in contract.parts},
+            "parts": {part: PARTS[part].unit for part in contract.parts},
             "columns": {part: contract.columns(part) for part in contract.parts},
         },
         "output": {
@@ -109,7 +103,8 @@ def read_contract(folder: Path | str) -> tuple[Contract, bytes | ForcePIGains]:
     try:
         written, control = _entry(content, "format", str), _entry(content, "control", dict)
         if written == FIRST_FORMAT:
-            content |= {"policy": NETWORK, "gripper": _FIRST_GRIPPER}
+            first = json.loads((shipped_contracts() / DEFAULT_GRIPPER / CONTRACT_FILE).read_text("utf-8"))
+            content |= {"policy": NETWORK, "gripper": first["gripper"]}  # the only one of that format
             control["stall"] = None
         elif written != FORMAT:
             raise ValueError(f"format is {written!r}, but this version reads {FORMAT!r}: export the policy with it")

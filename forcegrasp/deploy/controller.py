@@ -17,6 +17,7 @@ from forcegrasp.deploy.contract import Contract
 from forcegrasp.deploy.contract_file import baseline_folder, read_contract
 from forcegrasp.deploy.policies import ForcePI, Policy, load_policy
 from forcegrasp.errors import DeployError
+from forcegrasp.observation import PARTS, Readings
 
 _log = logging.getLogger("forcegrasp.deploy")
 
@@ -112,7 +113,7 @@ class GraspController:
         self._position: np.ndarray | None = None  # of the last good reading
         self._commanded: np.ndarray | None = None
         self._time: float | None = None  # of the last good reading
-        self._told: set[str] = set()
+        self._reported: set[str] = set()
 
     def step(self, q: ArrayLike, f: ArrayLike, t: float | None = None) -> np.ndarray:
         """The command for one control period.
@@ -151,7 +152,7 @@ class GraspController:
             # any reading: forces come from both sides, and the other sensor may be dead
             delta = np.maximum(delta, 0.0)
             fault = f"force is above the ceiling of {self.contract.ceiling_n:.4g} N: {_show(force)} N; not closing"
-        self._tell(fault)
+        self._report(fault)
         self.delta_m = delta
         self._commanded = np.clip(position + delta, *self.contract.joint_range_m)
         return self._commanded.copy()
@@ -185,7 +186,7 @@ class GraspController:
         return None
 
     def _observe(self, position: np.ndarray, force: np.ndarray) -> dict[str, np.ndarray]:
-        """Every part of o(t), float32 as in training; remembers contact, h(t) = (f > f_θ) ∨ h(t−1) with h(0) = 0."""
+        """The parts of o(t), float32 as in training; remembers contact, h(t) = (f > f_θ) ∨ h(t−1) with h(0) = 0."""
         contract, position, force = self.contract, position.astype(np.float32), force.astype(np.float32)
         if self._had_contact is None or self._position is None:
             self._had_contact = np.zeros(force.shape, np.float32)
@@ -196,13 +197,9 @@ class GraspController:
             self._had_contact = np.maximum(self._had_contact, contact).astype(np.float32)
         self._position = position
         scale, offset = np.float32(contract.position_scale_per_m), np.float32(contract.position_offset)
-        return {
-            "position": position * scale + offset,
-            "force": force,
-            "force_error": np.float32(self.goal_n) - force,
-            "last_action": self.action,
-            "had_contact": self._had_contact,
-        }
+        goal = np.float32(self.goal_n)
+        readings = Readings(position, force, goal, self.action, self._had_contact, scale, offset)
+        return {name: part.on_robot(readings) for name, part in PARTS.items() if part.on_robot}
 
     def _bias(self, parts: dict[str, np.ndarray]) -> np.ndarray | np.float32:
         """φ of each motor (paper, eq. 7), in [0, 1]; the same for all unless each has a force reading of its own."""
@@ -223,17 +220,17 @@ class GraspController:
             if position is None or not ((position >= low) & (position <= high)).all():
                 raise DeployError(f"{fault}, but no good position was read since the reset: there is nothing to hold")
             self._commanded = np.clip(position, *self.contract.joint_range_m)
-        self._tell(fault)
+        self._report(fault)
         return self._commanded.copy()
 
-    def _tell(self, fault: str | None) -> None:
+    def _report(self, fault: str | None) -> None:
         """Says what is wrong, and logs it unless that kind of fault was already logged in this grasp."""
         self.fault = fault
         if fault:
             kind = fault.partition(":")[0]
-            if kind not in self._told:
+            if kind not in self._reported:
                 _log.warning(fault)
-            self._told.add(kind)
+            self._reported.add(kind)
 
 
 def _with_ceiling(contract: Contract, ceiling_n: float | None) -> Contract:

@@ -20,7 +20,7 @@ class Policy(Protocol):
         ...
 
     def act(self, parts: dict[str, np.ndarray]) -> np.ndarray:
-        """The action ``(motors,)``, −1 closing at full speed; from every part of o(t), float32, see :data:`PARTS`."""
+        """The action ``(motors,)``, −1 closing at full speed; from the parts of o(t), float32."""
         ...
 
 

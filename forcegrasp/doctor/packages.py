@@ -45,6 +45,7 @@ MODULES = (
     "safetensors.torch",
     "matplotlib.figure",
     "PIL.Image",
+    "jaxtyping",
     "jinja2",
     "rich.console",
     "packaging.requirements",

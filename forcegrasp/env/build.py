@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Callable
 from pathlib import Path
 
@@ -23,6 +24,7 @@ from forcegrasp.env.grasp_env import GraspEnv
 from forcegrasp.errors import ConfigError
 from forcegrasp.models.model_file import Model
 from forcegrasp.models.variation import read_model_of, with_noise_of
+from forcegrasp.observation import PARTS
 from forcegrasp.physics import GraspParameters, Gripper, load_gripper
 from forcegrasp.physics.completion import complete
 from forcegrasp.physics.gripper import NO_FORCES
@@ -36,15 +38,6 @@ from forcegrasp.transforms import (
     LastAction,
     ObservationNoise,
 )
-
-#: The tensordict entry behind each part of the paper's observation.
-PART_KEYS = {
-    "position": "scaled_position",
-    "force": "sensed_force",
-    "force_error": "force_error",
-    "last_action": "last_action",
-    "had_contact": "had_contact",
-}
 
 
 def build_env(
@@ -82,6 +75,7 @@ def build_env(
     action, reward = complete(action or ActionConfig(), gripper), reward or RewardConfig()
     for name, part in (("sensors", sensors), ("observation", observation), ("action", action)):
         validate(part, f"{name}.")
+    parts = [PARTS[name] for name in observation.parts]
     grasps = GraspEnv(n, physics, grasp, reward, sampler, model=known, gripper=gripper)
     transforms: list[Transform] = [
         ObservationNoise(
@@ -97,7 +91,8 @@ def build_env(
         ActionChangePenalty(reward.action_weight),
         # q from [0, stroke] to [-1, 1]
         ObservationNorm(loc=-1.0, scale=2 / gripper.stroke, in_keys=["sensed_position"], out_keys=["scaled_position"]),
-        CatTensors([PART_KEYS[part] for part in observation.parts], "observation", del_keys=False, sort=False),
+        *(_transform(module, gripper, sensors) for module in dict.fromkeys(p.transform for p in parts) if module),
+        CatTensors([part.entry or part.name for part in parts], "observation", del_keys=False, sort=False),
         CatFrames(observation.frames, dim=-1, in_keys=["observation"], padding="same"),
     ]
     if action.inductive_bias:
@@ -106,6 +101,11 @@ def build_env(
     env = TransformedEnv(grasps, Compose(transforms))
     seed_env(env, seed)
     return env
+
+
+def _transform(module: str, gripper: Gripper, sensors: SensorConfig) -> Transform:
+    """What writes a part of the observation that is not always there, see :mod:`forcegrasp.observation`."""
+    return importlib.import_module(f"forcegrasp.transforms.{module}").make(gripper, sensors)
 
 
 def seed_env(env: TransformedEnv, seed: int) -> None:

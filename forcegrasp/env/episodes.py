@@ -1,7 +1,8 @@
-"""What happened in a batch of whole episodes: the figures that training logs and evaluation report."""
+"""What happened in a batch of whole episodes: the metrics that training logs and evaluation report."""
 
 from __future__ import annotations
 
+from jaxtyping import Float
 from tensordict import TensorDictBase
 from torch import Tensor
 
@@ -10,7 +11,7 @@ from forcegrasp.env.reward import normalised_force_reward
 from forcegrasp.physics import default_gripper
 from forcegrasp.physics.completion import complete
 
-#: Figure → what it is. All of shape ``(n,)``, one per episode.
+#: Metric → what it is. All of shape ``(n,)``, one per episode.
 METRICS = {
     "force_reward_normalised": "Σ_t of r_force, authors' form (150 at best)",
     "force_reward_paper": "Σ_t of r_force, paper's form (150 at best)",
@@ -27,8 +28,10 @@ METRICS = {
 }
 
 
-def summarise(rollout: TensorDictBase, sensors: SensorConfig, period_s: float | None = None) -> dict[str, Tensor]:
-    """Figures of every episode, from the true state.
+def summarise(
+    rollout: TensorDictBase, sensors: SensorConfig, period_s: float | None = None
+) -> dict[str, Float[Tensor, " n"]]:
+    """Metrics of every episode, from the true state.
 
     Args:
       rollout: whole episodes as an env's ``rollout`` gives them, batch ``(n, T)``.

@@ -7,7 +7,9 @@ from collections.abc import Callable
 
 import numpy as np
 import torch
+from jaxtyping import Float, Shaped
 from tensordict import TensorDict, TensorDictBase
+from torch import Tensor
 from torchrl.data import Bounded, Categorical, Composite, Unbounded
 from torchrl.envs import EnvBase
 
@@ -123,8 +125,8 @@ class GraspEnv(EnvBase):
         reward = config.force_weight * force + config.object_weight * state["reward_terms", "object"]
         return state.set("reward", reward).update(self._done())
 
-    def _column(self, values: np.ndarray | torch.Tensor) -> torch.Tensor:
-        """What a simulator has, ``(n, ...)``, as the environment tells it. What is on a device stays there."""
+    def _column(self, values: Shaped[np.ndarray | Tensor, "{self.simulator.n} ..."]) -> Float[Tensor, "n k"]:
+        """A simulator's values ``(n,)`` or ``(n, k)`` as a float32 tensor ``(n, k)`` on the env's device."""
         return torch.as_tensor(values, dtype=torch.float32, device=self.device).reshape(self.simulator.n, -1)
 
     def _state(self) -> TensorDict:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import torch
+from jaxtyping import Float
 from torch import Tensor
 
 
-def force_reward(force_error: Tensor) -> Tensor:
+def force_reward(force_error: Float[Tensor, "*B 2"]) -> Float[Tensor, "*B 1"]:
     """r_force = 1 − tanh(Σ_i |Δf_i|) (paper, eq. 8).
 
     Args:
@@ -18,7 +19,9 @@ def force_reward(force_error: Tensor) -> Tensor:
     return 1 - torch.tanh(force_error.abs().sum(-1, keepdim=True))
 
 
-def normalised_force_reward(force_error: Tensor, goal_force: Tensor) -> Tensor:
+def normalised_force_reward(
+    force_error: Float[Tensor, "*B 2"], goal_force: Float[Tensor, "*B 1"]
+) -> Float[Tensor, "*B 1"]:
     """r_force = 1 − tanh(Σ_i |Δf_i| / f_goal), the form that trained the published policies (authors' code).
 
     Args:
@@ -31,7 +34,7 @@ def normalised_force_reward(force_error: Tensor, goal_force: Tensor) -> Tensor:
     return force_reward(force_error / goal_force)
 
 
-def object_penalty(object_speed: Tensor, threshold: float) -> Tensor:
+def object_penalty(object_speed: Float[Tensor, "*B 1"], threshold: float) -> Float[Tensor, "*B 1"]:
     """r_obj = −1 where the object moves faster than the threshold, else 0 (paper, eq. 9).
 
     Args:

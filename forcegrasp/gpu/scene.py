@@ -20,7 +20,7 @@ _WRITTEN = ("geom_size", "geom_solimp", "body_inertia", "actuator_biasprm")
 _DERIVED = ("geom_aabb", "geom_rbound", "dof_invweight0", "body_invweight0")
 # Ten contacts of pads and up to four with the floor, four rows each, and two joint limits.
 _CONTACTS, _ROWS = 16, 64
-# What must not be NaN nor larger than MuJoCo's mjMAXVAL, and the warning that tells. MuJoCo Warp itself goes on.
+# What must not be NaN nor larger than MuJoCo's mjMAXVAL, and the warning for it. MuJoCo Warp itself goes on.
 _SOUND = {
     mujoco.mjtWarning.mjWARN_BADQPOS: "qpos",
     mujoco.mjtWarning.mjWARN_BADQVEL: "qvel",
@@ -62,7 +62,7 @@ class WarpScene:
         host.geom_gap[floor] = GAP_M
         with wp.ScopedDevice(self._warp_device):
             self._model = mjw.put_model(host, dict.fromkeys(_WRITTEN + _DERIVED, n))
-            self._model.opt.warn_overflow = 0  # `warnings` tells
+            self._model.opt.warn_overflow = 0  # `warnings` says so
             self._model.opt.graph_conditional = self._warp_device.is_cpu or wp.is_conditional_graph_supported()
             self._model.callback.contactfilter = exact_contacts(floor, geom.id)
             self._data = mjw.make_data(host, nworld=n, nconmax=_CONTACTS, njmax=_ROWS)
@@ -118,7 +118,7 @@ class WarpScene:
         wp.capture_launch(self._graph)
 
     def warnings(self) -> Tensor:
-        """Whether each of MuJoCo's warnings holds, ``(n, kinds)``, as far as MuJoCo Warp lets them be told."""
+        """Whether each of MuJoCo's warnings holds, ``(n, kinds)``, as far as MuJoCo Warp's data show it."""
         warnings = torch.zeros(self.n, mujoco.mjtWarning.mjNWARNING.value, dtype=torch.bool, device=self.device)
         for kind, name in _SOUND.items():
             warnings[:, kind.value] = ~(self._state[name].abs() < _LARGEST).all(-1)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import mujoco
 import numpy as np
+from jaxtyping import Float, Int
 
 from forcegrasp.physics import guard
 from forcegrasp.physics.gripper import Gripper
@@ -15,6 +16,7 @@ from forcegrasp.physics.parameters import GraspParameters
 from forcegrasp.physics.plant import Plant, write_base
 
 
+@runtime_checkable
 class Variation(Protocol):
     """What makes one gripper differ from another."""
 
@@ -22,7 +24,7 @@ class Variation(Protocol):
         """Prepares a plant, once."""
         ...
 
-    def draw(self, rng: np.random.Generator, ids: np.ndarray) -> dict[str, np.ndarray]:
+    def draw(self, rng: np.random.Generator, ids: Int[np.ndarray, " rows"]) -> dict[str, Float[np.ndarray, " rows"]]:
         """Draws anew for these rows, before they are reset; returns base parameters, each ``(len(ids),)``."""
         ...
 
@@ -67,17 +69,17 @@ class GraspSimulator:
         self.reset(self.parameters)
 
     @property
-    def joint_position(self) -> np.ndarray:
+    def joint_position(self) -> Float[np.ndarray, "{self.n} {self.plant.motors}"]:
         """Positions of the motors (left, right, or the one), m or rad, ``(n, motors)``; 0 is closed."""
         return self.plant.position.copy()
 
     @property
-    def object_position(self) -> np.ndarray:
+    def object_position(self) -> Float[np.ndarray, " {self.n}"]:
         """Object position along the grasp axis, metres, ``(n,)``."""
         return self.plant.object_position
 
     @property
-    def force(self) -> np.ndarray:
+    def force(self) -> Float[np.ndarray, "{self.n} 2"]:
         """Fingertip forces (left, right), newtons, ``(n, 2)``.
 
         A finger's reading is the sum over its contacts of the normal and both signed tangential components at the last
@@ -86,17 +88,20 @@ class GraspSimulator:
         return self.plant.force.copy()
 
     @property
-    def measured_position(self) -> np.ndarray:
+    def measured_position(self) -> Float[np.ndarray, "{self.n} {self.plant.motors}"]:
         """What the encoders say, before noise, ``(n, motors)``; the positions themselves if nothing changes them."""
         return self.plant.measured_position
 
     @property
-    def measured_force(self) -> np.ndarray:
+    def measured_force(self) -> Float[np.ndarray, "{self.n} {len(self.gripper.forces)}"]:
         """What the force readings say, before noise, newtons, ``(n, channels)``."""
         return self.plant.measured_force
 
     def reset(
-        self, parameters: GraspParameters, ids: np.ndarray | None = None, rng: np.random.Generator | None = None
+        self,
+        parameters: GraspParameters,
+        ids: Int[np.ndarray, " rows"] | None = None,
+        rng: np.random.Generator | None = None,
     ) -> None:
         """Opens the gripper and puts an object of the given parameters between the fingers.
 
@@ -123,7 +128,7 @@ class GraspSimulator:
         self.object_speed[ids] = 0.0
         self.steps[ids] = 0
 
-    def step(self, joint_delta: np.ndarray) -> None:
+    def step(self, joint_delta: Float[np.ndarray, "{self.n} {self.plant.motors}"]) -> None:
         """Commands ``q_des = q + u`` to the motors and simulates one control step (paper, eq. 4); q as read.
 
         Args:
@@ -134,7 +139,7 @@ class GraspSimulator:
         """
         self.command(self.measured_position + joint_delta)
 
-    def command(self, position: np.ndarray) -> None:
+    def command(self, position: Float[np.ndarray, "{self.n} {self.plant.motors}"]) -> None:
         """Holds a commanded position (m or rad, ``(n, motors)``, clipped to the stroke) for one control step.
 
         Raises:
@@ -164,7 +169,7 @@ def nominal_grasps(gripper: Gripper, n: int) -> GraspParameters:
     return GraspParameters(*np.broadcast_to(row, (5, n)))
 
 
-def base_parameters(gripper: Gripper, grasps: GraspParameters) -> dict[str, np.ndarray]:
+def base_parameters(gripper: Gripper, grasps: GraspParameters) -> dict[str, Float[np.ndarray, " n"]]:
     """What grasps mean for a gripper: base parameter → ``(n,)``."""
     training = gripper.training
     base = {training.servo_gain: grasps.b2} if training.servo_gain else {}

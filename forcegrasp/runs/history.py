@@ -19,6 +19,8 @@ from forcegrasp.runs.provenance import experiment
 
 #: A row is half a kB, and a batch takes a second.
 MAX_METRICS_BYTES = 200_000_000
+#: The option that says how long a training is.
+TOTAL_FRAMES = f"{TrainConfig().algorithm.name}.total_frames"
 
 
 @dataclass
@@ -43,7 +45,7 @@ class History:
 
     @property
     def total(self) -> int:
-        return self.options["ppo.total_frames"]
+        return self.options[TOTAL_FRAMES]
 
     @property
     def finished(self) -> bool:
@@ -130,8 +132,8 @@ def _options(path: Path) -> dict[str, Any]:
     if not isinstance(loaded, dict):
         raise CheckpointError(f"{path}: not a valid configuration (no options in it)")
     options = flat(dataclasses.asdict(TrainConfig())) | flat(loaded)
-    if not all(isinstance(options[name], int) for name in ("seed", "ppo.total_frames")):
-        raise CheckpointError(f"{path}: not a valid configuration (seed and ppo.total_frames must be integers)")
+    if not all(isinstance(options[name], int) for name in ("seed", TOTAL_FRAMES)):
+        raise CheckpointError(f"{path}: not a valid configuration (seed and {TOTAL_FRAMES} must be integers)")
     return options
 
 

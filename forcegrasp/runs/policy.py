@@ -7,7 +7,7 @@ from pathlib import Path
 from torchrl.modules import ProbabilisticActor
 
 from forcegrasp.config import TrainConfig
-from forcegrasp.controllers.policy import make_policy, observation_size
+from forcegrasp.controllers.policy import policy_of
 from forcegrasp.errors import CheckpointError
 from forcegrasp.physics import load_gripper
 from forcegrasp.policies import FOLDER, shipped_policies
@@ -29,8 +29,7 @@ def load_policy(name: Path | str) -> tuple[ProbabilisticActor, TrainConfig]:
     run = RunDir.open(path.parent.parent if one else path)
     config = run.config()
     tensors, _ = run.load_file(path) if one else run.load()
-    gripper = load_gripper(config.gripper)
-    policy = make_policy(observation_size(gripper, config.observation), config.ppo, gripper)
+    policy = policy_of(config, load_gripper(config.gripper))
     weights = {key.removeprefix("policy."): t for key, t in tensors.items() if key.startswith("policy.")}
     try:
         policy.load_state_dict(weights)

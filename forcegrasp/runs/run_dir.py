@@ -28,7 +28,7 @@ from forcegrasp.errors import CheckpointError, ConfigError
 from forcegrasp.files import plain_yaml
 from forcegrasp.files.whole_file import write_whole
 from forcegrasp.models.model_file import Model, write_model
-from forcegrasp.models.variation import read_model_of
+from forcegrasp.models.variation import read_model_of, with_noise_of
 from forcegrasp.physics import load_gripper
 from forcegrasp.physics.completion import complete
 from forcegrasp.runs import checkpoint
@@ -159,7 +159,9 @@ class RunDir:
             merged = OmegaConf.merge(OmegaConf.structured(TrainConfig), loaded)
             config = cast(TrainConfig, OmegaConf.to_object(merged))
             validate(config)
-            config = complete(config, load_gripper(config.gripper))
+            gripper = load_gripper(config.gripper)
+            model = read_model_of(gripper, self.model_path) if config.model and self.model_path.exists() else None
+            config = complete(config, with_noise_of(gripper, model))
         except (OSError, OmegaConfBaseException, ConfigError, ValueError) as error:
             first_line = str(error).strip().splitlines()[0]
             raise CheckpointError(f"{self.config_path}: not a valid configuration ({first_line})") from error

@@ -8,6 +8,7 @@ from forcegrasp.config import TrainConfig
 from forcegrasp.env.episodes import METRICS
 from forcegrasp.runs.provenance import experiment
 from forcegrasp.runs.run_dir import RunDir
+from forcegrasp.train.algorithms import Algorithm, algorithm_of
 
 #: What the first screen shows, in its order; TensorBoard sorts by name, hence the numbers.
 OVERVIEW = (
@@ -18,9 +19,10 @@ OVERVIEW = (
     "episode/displacement_total_mm",
     "episode/fast_steps",
 )
-GROUPS = ("overview", "episode", "reward", "ppo", "curriculum", "speed")
+#: Groups of columns; in place of the third, the algorithm's name.
+GROUPS = ("overview", "episode", "reward", "algorithm", "curriculum", "speed")
 
-#: Page → chart → columns of metrics.csv drawn in it.
+#: Page → chart → columns of metrics.csv drawn in it; the algorithm's own page follows the second.
 CHARTS = {
     "Is it learning?": {
         "force reward of an episode": ("episode/force_reward_normalised", "episode/force_reward_paper"),
@@ -31,12 +33,6 @@ CHARTS = {
         "object moved, mm": ("episode/displacement_until_grasped_mm", "episode/displacement_total_mm"),
         "steps over the speed threshold": ("episode/fast_steps",),
         "time until contact, s": ("episode/first_contact_s", "episode/both_contact_s"),
-    },
-    "PPO health": {
-        "KL divergence": ("ppo/kl_approx",),
-        "clip fraction": ("ppo/clip_fraction",),
-        "entropy": ("ppo/entropy",),
-        "losses": ("ppo/loss_objective", "ppo/loss_critic"),
     },
     "Curriculum": {
         "weight of the object's speed": ("curriculum/object_weight",),
@@ -51,14 +47,15 @@ def tag(column: str) -> str:
     group, name = column.split("/")
     if column in OVERVIEW:
         return f"1_overview/{1 + OVERVIEW.index(column)}_{name}"
-    return f"{1 + GROUPS.index(group)}_{group}/{name}"
+    return f"{1 + GROUPS.index(group if group in GROUPS else 'algorithm')}_{group}/{name}"
 
 
-def layout() -> dict[str, dict[str, list]]:
-    """The page of charts, for ``SummaryWriter.add_custom_scalars``; it takes tags as patterns, hence the anchors."""
+def layout(algorithm: type[Algorithm]) -> dict[str, dict[str, list]]:
+    """The pages of charts, for ``SummaryWriter.add_custom_scalars``; it takes tags as patterns, hence the anchors."""
+    pages = list(CHARTS.items())
     return {
         page: {chart: ["Multiline", [f"^{tag(column)}$" for column in columns]] for chart, columns in charts.items()}
-        for page, charts in CHARTS.items()
+        for page, charts in (*pages[:2], *algorithm.CHARTS.items(), *pages[2:])
     }
 
 
@@ -75,22 +72,20 @@ def card(run: RunDir, config: TrainConfig) -> str:
     title = f"{experiment(run.path) or 'training'}, seed {config.seed}" + (config.model and f", model {config.model}")
     return f"""# {title}
 
-{config.ppo.total_frames:,} frames, {config.ppo.grasps} grasps at once, reward `{config.reward.form}`, simulated with
-{simulator}.
+{config.algorithm.total_frames:,} frames, {config.algorithm.grasps} grasps at once, reward `{config.reward.form}`,
+simulated with {simulator}.
 
     forcegrasp train resume={run.path}        go on with it, should it have been interrupted
     {evaluate_command(run, config)}        compare it with the hand-written controller
     forcegrasp curves {run.path}        its learning curves as a picture
 
-**Custom scalars** has one page per question: is it learning, does it push the object, is PPO healthy, how fast is it.
-**Scalars** has everything, what matters first; the numbers in the names only sort. All are means over a batch of
-episodes with exploring actions, so `forcegrasp evaluate` finds a little more.
+**Custom scalars** has one page per question: is it learning, does it push the object, is the algorithm healthy, how
+fast is it. **Scalars** has everything, what matters first; the numbers in the names only sort. All are means over a
+batch of episodes with exploring actions, so `forcegrasp evaluate` finds a little more.
 
 {meanings}
 * `return`: sum of all rewards, with the weights of the day: the curriculum changes them
 * `3_reward`: terms of the reward, per step and unweighted
-* `4_ppo`: in trainings that went well `kl_approx` stayed below 0.02 and `clip_fraction` below 0.2 (0.06 and 0.35 with
-  `budget=quick`); `action_std` and `entropy` fall as the policy makes up its mind; `ESS` is the effective share of a
-  minibatch
+* `4_{config.algorithm.name}`: {algorithm_of(config).ADVICE}
 * `5_curriculum`: what is annealed; `6_speed`: frames per second, and the share of time that the updates take
 """

@@ -1,4 +1,4 @@
-"""Who simulates the grasps of a batch: this process, or workers of a Ray cluster. Both are told apart here alone."""
+"""Who simulates the grasps of a batch: this process, or workers of a Ray cluster. Nothing else knows which."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def training_env(config: TrainConfig, model: Model | None = None, worker: int = 
     """A worker's share of the grasps, with seeds of its own."""
     threads = config.physics.threads if config.collector.kind == "direct" else cluster.cores(config)
     return build_env(
-        config.ppo.grasps // config.collector.workers,
+        config.algorithm.grasps // config.collector.workers,
         gripper=config.gripper,
         physics=dataclasses.replace(config.physics, threads=threads),
         grasp=config.grasp,
@@ -105,23 +105,24 @@ def make_collector(
     env: TransformedEnv,
     policy: ProbabilisticActor,
     schedule: LinearSchedule,
+    frames_per_batch: int,
     model: Model | None = None,
 ) -> GraspCollector | RayCollector:
-    """Returns what collects with this policy, and is spoken to by ``map_fn``.
+    """Returns a collector with this policy; ``map_fn`` calls a method of every worker's.
 
     Args:
       config: says who collects.
       env: the first worker's env, for collecting in this process.
       policy: this process's own; workers have copies.
       schedule: the curriculum.
+      frames_per_batch: grasps times steps of an episode.
       model: what workers simulate.
 
     Raises:
       ConfigError: if Ray is not installed, does not answer or has no room.
     """
-    frames = config.ppo.grasps * config.grasp.steps
     if config.collector.kind == "direct":
-        return GraspCollector(env, policy, schedule=schedule, frames_per_batch=frames)
+        return GraspCollector(env, policy, schedule=schedule, frames_per_batch=frames_per_batch)
     cluster.join(config)
     # weights travel with the curriculum, by Ray: torch's own way needs host names that every machine resolves
     warnings.filterwarnings("ignore", "RayCollector iteration started before weight synchronization")
@@ -135,7 +136,7 @@ def make_collector(
             policy,
             collector_class=cast(Any, GraspCollector),  # annotated as a function of a batch, which it isn't
             collector_kwargs={"schedule": schedule},
-            frames_per_batch=frames,
+            frames_per_batch=frames_per_batch,
             total_frames=sys.maxsize,  # it ends at once with -1
             reset_at_each_iter=True,
             sync=True,

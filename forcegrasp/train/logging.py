@@ -20,6 +20,7 @@ from forcegrasp.evaluate.video import grasp_video
 from forcegrasp.physics import load_gripper
 from forcegrasp.physics.scene_renderer import NoRendererError
 from forcegrasp.runs.run_dir import RunDir
+from forcegrasp.train.algorithms import algorithm_of
 from forcegrasp.train.board import card, layout, tag
 
 #: Episodes drawn in a figure of force traces.
@@ -27,7 +28,7 @@ TRACES = 6
 
 
 class TrainingLog:
-    """Writes one batch's figures under TensorBoard's tags and into metrics.csv. A context manager.
+    """Writes one batch's metrics under TensorBoard's tags and into metrics.csv. A context manager.
 
     Raises:
       CheckpointError: where the disk is full or not writable; the run's checkpoints are as they were.
@@ -35,7 +36,7 @@ class TrainingLog:
 
     def __init__(self, run: RunDir, config: TrainConfig, frames: int) -> None:
         self.run, self.config, self.frames = run, config, frames
-        self._told_no_renderer = False
+        self._no_renderer = False
         self._gripper = load_gripper(config.gripper)
         self._colour = policy_colours([run.path.name])[run.path.name]  # as evaluate will draw it
 
@@ -45,7 +46,7 @@ class TrainingLog:
             self._open()
         except OSError as error:
             threading.excepthook = self._hook
-            raise self._told(error) from error
+            raise self._checkpoint_error(error) from error
         return self
 
     def _open(self) -> None:
@@ -58,7 +59,7 @@ class TrainingLog:
         if not frames:
             self.writer.add_text("1_about_this_run", card(run, config))
             self.writer.add_text("2_config", "```\n" + run.config_path.read_text("utf-8") + "```")
-            self.writer.add_custom_scalars(layout())
+            self.writer.add_custom_scalars(layout(algorithm_of(config)))
 
     def batch(self, number: int, frames: int, groups: dict[str, dict[str, float]], episodes: TensorDictBase) -> None:
         """Logs one batch.
@@ -95,7 +96,7 @@ class TrainingLog:
 
     def video(self, episode: TensorDictBase, frames: int) -> Path | None:
         """Renders one episode, as GIF and in TensorBoard; says so and goes on where nothing can render."""
-        if self._told_no_renderer:
+        if self._no_renderer:
             return None
         path = self.run.figures / f"grasp_{frames:012d}.gif"
         title = f"after {frames:,} frames"
@@ -105,7 +106,7 @@ class TrainingLog:
             )
         except NoRendererError as error:
             print(f"forcegrasp: no video: {error}", file=sys.stderr)
-            self._told_no_renderer = True
+            self._no_renderer = True
             return None
         path.write_bytes(data)
         _add_gif(self.writer, "grasps/video", data, frames)
@@ -116,13 +117,13 @@ class TrainingLog:
             if error is None:
                 self.writer.close()
         except OSError as late:
-            raise self._told(late) from late
+            raise self._checkpoint_error(late) from late
         finally:
             threading.excepthook = self._hook
         if isinstance(error, OSError):
-            raise self._told(error) from error
+            raise self._checkpoint_error(error) from error
 
-    def _told(self, error: OSError) -> CheckpointError:
+    def _checkpoint_error(self, error: OSError) -> CheckpointError:
         return CheckpointError(
             f"{self.run.path}: could not write ({error.strerror or error}); free space, then go on with: forcegrasp"
             f" train resume={self.run.path}"

@@ -10,9 +10,9 @@ import torch
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from torch import Tensor
 from torchrl.envs import TransformedEnv
+from torchrl.modules import ProbabilisticActor
 
 from forcegrasp.config import TrainConfig
-from forcegrasp.controllers.policy import make_policy
 from forcegrasp.curriculum import CurriculumValues, LinearSchedule
 from forcegrasp.env.episodes import summarise
 from forcegrasp.errors import CheckpointError
@@ -21,9 +21,9 @@ from forcegrasp.models.variation import with_noise_of
 from forcegrasp.physics import load_gripper
 from forcegrasp.physics.completion import complete
 from forcegrasp.runs.run_dir import RunDir
+from forcegrasp.train.algorithms import algorithm_of
 from forcegrasp.train.collector import collecting, make_collector, random_states, set_random_states, training_env
 from forcegrasp.train.logging import TrainingLog
-from forcegrasp.train.ppo import PPO, entropy, make_value
 from forcegrasp.train.stop import stop_signals
 
 
@@ -46,30 +46,25 @@ class Trainer:
         self.gripper = load_gripper(config.gripper)
         config = self.config = complete(config, with_noise_of(self.gripper, model))
         self.env: TransformedEnv = training_env(config, model)
-        self.schedule = LinearSchedule(config.curriculum, config.grasp, config.reward, config.ppo.total_frames)
-        device = self.env.device
-        self.shuffle = torch.Generator(device).manual_seed(config.seed)
-        size = self.env.observation_spec["observation"].shape[-1]
-        self.policy = make_policy(size, config.ppo, self.gripper)
-        self.value = make_value(size, config.ppo, self.gripper)
-        for net in (self.policy, self.value):
-            net.to(device)
-        self.ppo = PPO(self.policy, self.value, config.ppo)
-        self.collector = make_collector(config, self.env, self.policy, self.schedule, model)
+        self.algorithm = algorithm_of(config)(config, self.env, self.gripper)
+        total, frames = self.algorithm.total_frames, self.algorithm.frames_per_batch
+        self.schedule = LinearSchedule(config.curriculum, config.grasp, config.reward, total)
+        self.collector = make_collector(config, self.env, self.policy, self.schedule, frames, model)
+
+    @property
+    def policy(self) -> ProbabilisticActor:
+        """What the algorithm has learned so far."""
+        return self.algorithm.policy
 
     def prepare(self) -> CurriculumValues:
-        """Tells whoever collects the next batch its curriculum and its policy; returns the curriculum's values."""
-        told = (self.frames, self.policy.state_dict())
-        return self.collector.map_fn("prepare", [told] * self.config.collector.workers)[0]
+        """Sets curriculum and weights of whoever collects the next batch; returns the curriculum's values."""
+        frames_and_weights = (self.frames, self.policy.state_dict())
+        return self.collector.map_fn("prepare", [frames_and_weights] * self.config.collector.workers)[0]
 
     def state(self) -> tuple[dict[str, Tensor], dict[str, Any]]:
         """All that changes while training, as tensors and as JSON."""
-        tensors = {f"policy.{k}": v for k, v in self.policy.state_dict().items()}
-        tensors |= {f"value.{k}": v for k, v in self.value.state_dict().items()}
-        for index, moments in self.ppo.optimizer.state_dict()["state"].items():
-            tensors |= {f"optimizer.{index}.{k}": v for k, v in moments.items()}
         generators, facts = random_states(self.collector)
-        tensors |= generators | {"rng.shuffle": self.shuffle.get_state()}
+        tensors = self.algorithm.state_dict() | generators
         facts |= {"batches": self.batches, "curriculum": self.schedule(self.frames).scalars()}
         return {k: v.detach().cpu().contiguous().clone() for k, v in tensors.items()}, facts
 
@@ -85,23 +80,13 @@ class Trainer:
             raise CheckpointError("the checkpoint does not hold the state of such a training; start anew") from error
 
     def _restore(self, tensors: dict[str, Tensor], facts: dict[str, Any]) -> None:
-        def part(name: str) -> dict[str, Tensor]:
-            return {k.removeprefix(name): v for k, v in tensors.items() if k.startswith(name)}
-
-        self.policy.load_state_dict(part("policy."))
-        self.value.load_state_dict(part("value."))
-        optimizer = self.ppo.optimizer.state_dict()
-        for key, value in part("optimizer.").items():
-            index, moment = key.split(".")
-            optimizer["state"].setdefault(int(index), {})[moment] = value
-        self.ppo.optimizer.load_state_dict(optimizer)
+        self.algorithm.load_state_dict(tensors)
         self.frames, self.batches = int(facts["frames"]), int(facts["batches"])
-        self.shuffle.set_state(tensors["rng.shuffle"])
         set_random_states(self.collector, self.config.collector.workers, tensors, facts)
 
 
 def train(config: TrainConfig, run: RunDir, resume: bool = False) -> bool:
-    """Trains until ``ppo.total_frames``; saves into the run directory. Returns False if it was interrupted.
+    """Trains until the algorithm has had its frames; saves into the run directory. Returns False if interrupted.
 
     Ctrl-C, SIGTERM, SIGHUP or SIGUSR1 end it after the batch at work, with a checkpoint; a further Ctrl-C at once.
 
@@ -114,8 +99,8 @@ def train(config: TrainConfig, run: RunDir, resume: bool = False) -> bool:
 
 def _train(config: TrainConfig, run: RunDir, resume: bool) -> bool:
     trainer = Trainer(config, run.model(config))
-    config, period_s = trainer.config, trainer.gripper.period_s
-    total = config.ppo.total_frames
+    config, algorithm, period_s = trainer.config, trainer.algorithm, trainer.gripper.period_s
+    total = algorithm.total_frames
     if resume and run.has_checkpoint:
         trainer.restore(*run.load())
     batch = None
@@ -132,9 +117,9 @@ def _train(config: TrainConfig, run: RunDir, resume: bool) -> bool:
             batch = next(batches)
             collected = time.perf_counter()
             summary = summarise(batch, config.sensors, period_s)
-            figures = {name: float(value.mean()) for name, value in summary.items()}
-            rate = trainer.ppo.set_progress(trainer.frames / total)
-            losses = trainer.ppo.update(batch, trainer.shuffle)
+            metrics = {name: float(value.mean()) for name, value in summary.items()}
+            algorithm.set_progress(trainer.frames / total)
+            learning = algorithm.update(batch)
             ended = time.perf_counter()
 
             whole_task = trainer.frames >= trainer.schedule.end_frames  # before, the batch was easier
@@ -142,14 +127,9 @@ def _train(config: TrainConfig, run: RunDir, resume: bool) -> bool:
             trainer.batches += 1
             terms = batch.get(("next", "reward_terms"))
             groups = {
-                "episode": {"return": float(batch.get(("next", "reward")).sum((1, 2)).mean()), **figures},
+                "episode": {"return": float(batch.get(("next", "reward")).sum((1, 2)).mean()), **metrics},
                 "reward": {name: float(terms[name].mean()) for name in sorted(terms.keys())},
-                "ppo": {
-                    **losses,
-                    "learning_rate": rate,
-                    "action_std": float(batch["scale"].mean()),
-                    "entropy": float(entropy(batch["scale"])),
-                },
+                config.algorithm.name: learning,
                 "curriculum": values.scalars(),
                 "speed": {
                     "frames_per_s": batch.numel() / (ended - started),
@@ -163,9 +143,9 @@ def _train(config: TrainConfig, run: RunDir, resume: bool) -> bool:
                 log.video(batch[0], trainer.frames)
             last = trainer.frames >= total or bool(stop)
             if last or trainer.batches % every.checkpoint_every == 0:
-                score = figures["force_reward_normalised"] if whole_task else None
+                score = metrics["force_reward_normalised"] if whole_task else None
                 run.save(trainer.frames, *trainer.state(), keep=every.keep, score=score)
-            progress(trainer.frames, figures)
+            progress(trainer.frames, metrics)
         if batch is not None and not stop:
             if config.log.figures_every:
                 log.traces(batch[:6], trainer.frames)
@@ -176,7 +156,7 @@ def _train(config: TrainConfig, run: RunDir, resume: bool) -> bool:
 
 @contextmanager
 def _progress(total: int, done: int, steps: int):
-    """Yields a function that shows progress: ``(frames, episode figures)``."""
+    """Yields a function that shows progress: ``(frames, metrics of the episodes)``."""
     columns = [
         BarColumn(bar_width=16),
         TextColumn("{task.percentage:3.0f} % of {task.total:,} frames"),
@@ -186,8 +166,8 @@ def _progress(total: int, done: int, steps: int):
     with Progress(*columns) as bar:
         task = bar.add_task("training", total=total, completed=done, reached="")
 
-        def show(frames: int, figures: dict[str, float]) -> None:
-            reward, moved = figures["force_reward_normalised"], figures["displacement_until_grasped_mm"]
+        def show(frames: int, metrics: dict[str, float]) -> None:
+            reward, moved = metrics["force_reward_normalised"], metrics["displacement_until_grasped_mm"]
             reached = f"force reward {reward:.0f}/{steps} moved {moved:.2f} mm"
             bar.update(task, completed=min(frames, total), reached=reached)
 

@@ -21,7 +21,7 @@ def stop_signals(also: Callable[[], None] = lambda: None) -> Iterator[list[int]]
     asked: list[int] = []
 
     def ask(number: int, _frame: Any) -> None:
-        if asked and number == signal.SIGINT:  # others come twice unasked: shell and system both tell of a hang-up
+        if asked and number == signal.SIGINT:  # shell and system both send a hang-up
             raise KeyboardInterrupt
         asked.append(number)
         if number == signal.SIGHUP:
@@ -47,7 +47,7 @@ def _is_free(handler: Any) -> bool:
 
 
 def tell_workers() -> None:
-    """Asks the processes that this one started to save and end; those that a terminal told, too, are told twice."""
+    """Asks the processes that this one started to save and end; a terminal's signal may reach them as well."""
     for worker in multiprocessing.active_children():
         worker.terminate()
 
@@ -56,7 +56,7 @@ def _silence_lost_outputs() -> None:
     """What is printed to a terminal or reader that is gone goes nowhere from now on, instead of failing."""
     outputs = select.poll()
     for descriptor in (1, 2):
-        outputs.register(descriptor, 0)  # errors and hang-ups are always told
+        outputs.register(descriptor, 0)  # errors and hang-ups are always reported
     nowhere = os.open(os.devnull, os.O_WRONLY)
     for descriptor, _ in outputs.poll(0):
         os.dup2(nowhere, descriptor)

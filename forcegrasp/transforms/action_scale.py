@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from jaxtyping import Float
 from tensordict.utils import NestedKey
 from torch import Tensor
 from torchrl.data import Bounded, Composite
@@ -23,7 +24,7 @@ class ActionScale(Transform):
         super().__init__(in_keys_inv=[delta_key], out_keys_inv=[action_key])
         self.max_delta = max_delta
 
-    def _inv_apply_transform(self, state: Tensor) -> Tensor:
+    def _inv_apply_transform(self, state: Float[Tensor, "*B motors"]) -> Float[Tensor, "*B motors"]:
         return state.clamp(-1, 1) * self.max_delta
 
     def transform_input_spec(self, input_spec: Composite) -> Composite:

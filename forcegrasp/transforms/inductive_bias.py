@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import torch
+from jaxtyping import Float
 from tensordict import TensorDictBase
 from tensordict.utils import NestedKey
 from torch import Tensor
@@ -10,8 +11,13 @@ from torchrl.envs.transforms import Transform
 
 
 def contact_bias(
-    had_contact: Tensor, force_error: Tensor, goal_force: Tensor, one: float, floor: float, motors: int
-) -> Tensor:
+    had_contact: Float[Tensor, "*B channels"],
+    force_error: Float[Tensor, "*B channels"],
+    goal_force: Float[Tensor, "*B 1"],
+    one: float,
+    floor: float,
+    motors: int,
+) -> Float[Tensor, "*B {motors}"]:
     """φ of each motor (paper, eq. 7).
 
     Where each motor has a force reading of its own: 1 before its finger's first contact; ``one`` for a finger that

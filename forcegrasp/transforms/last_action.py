@@ -15,7 +15,7 @@ class LastAction(Transform):
     Args:
       action_key: the policy's action, ``(*B, d)``.
       out_key: where it is remembered, ``(*B, d)``.
-      like: an observation that tells batch size and dtype, with as many entries as there are actions.
+      like: an observation of the same batch size and dtype, with as many entries as there are actions.
     """
 
     def __init__(

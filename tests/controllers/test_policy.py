@@ -29,7 +29,7 @@ def swap(pairs: torch.Tensor) -> torch.Tensor:
 
 def trained(config: PPOConfig, size: int = 30):
     """A policy whose last layer is not near zero any more."""
-    policy = make_policy(size, config)
+    policy = make_policy([2] * (size // 2), config)
     with torch.no_grad():
         for parameter in policy.parameters():
             parameter.add_(0.3 * torch.randn_like(parameter))
@@ -40,7 +40,7 @@ def trained(config: PPOConfig, size: int = 30):
 def test_starts_at_the_initial_action_and_deviation(mirrored):
     config = PPOConfig(initial_action=-0.4, log_std=-0.7, mirrored=mirrored)
     with set_exploration_type(ExplorationType.RANDOM):
-        td = make_policy(30, config)(observe(5000))
+        td = make_policy([2] * 15, config)(observe(5000))
     assert td["loc"].shape == td["scale"].shape == td["action"].shape == (5000, 2)
     assert td["action_log_prob"].shape == (5000,)
     torch.testing.assert_close(td["loc"], torch.full_like(td["loc"], -0.4), rtol=0, atol=0.1)
@@ -74,7 +74,7 @@ def test_plain_policy_need_not():
 
 @pytest.mark.parametrize("mirrored", [True, False])
 def test_layers(mirrored):
-    policy = make_policy(12, PPOConfig(hidden=[7, 5], mirrored=mirrored))
+    policy = make_policy([2] * 6, PPOConfig(hidden=[7, 5], mirrored=mirrored))
     shapes = [(*parameter.shape,) for parameter in policy.parameters() if parameter.ndim == 2]
     assert shapes == [(7, 12), (5, 7), (2, 5)]
     activations = [module for module in policy.modules() if isinstance(module, torch.nn.Tanh)]

@@ -11,7 +11,7 @@ import pytest
 import torch
 
 from forcegrasp.config import ActionConfig, GraspConfig, PhysicsConfig, PPOConfig, SensorConfig, TrainConfig
-from forcegrasp.controllers.policy import make_policy, observation_size
+from forcegrasp.controllers.policy import policy_of
 from forcegrasp.physics import default_gripper, load_gripper
 from forcegrasp.runs.export import export_policy
 from forcegrasp.runs.run_dir import RunDir
@@ -31,7 +31,7 @@ def make_run(tmp_path_factory) -> Make:
         config = replace(TRAINING, **parts)
         torch.manual_seed(0)
         gripper = load_gripper(config.gripper)
-        policy = make_policy(observation_size(gripper, config.observation), config.ppo, gripper)
+        policy = policy_of(config, gripper)
         with torch.no_grad():
             for tensor in policy.parameters():  # much of [-1, 1], and beyond
                 tensor.normal_(0.0, 0.4)

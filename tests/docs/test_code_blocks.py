@@ -15,11 +15,15 @@ from xml.etree import ElementTree
 import matplotlib as mpl
 import numpy as np
 import pytest
+import torch
 import yaml
 from doc_pages import PAGES, blocks, program, unpack
 
+from forcegrasp.config import ObservationConfig, PhysicsConfig
 from forcegrasp.deploy import Contract, controller
+from forcegrasp.env import build_env
 from forcegrasp.errors import ConfigError
+from forcegrasp.observation import PARTS, Part
 from forcegrasp.physics.gripper_file import load_gripper
 from forcegrasp.physics.plant import Plant
 
@@ -99,6 +103,17 @@ def test_tests_of_the_transform_page_pass(page):
     assert len(tests) == 5
     for test in tests:
         test()
+
+
+def test_transform_of_the_page_becomes_a_part_by_the_line_that_it_gives(page, monkeypatch):
+    page("docs/write-a-transform.md")
+    (line,) = [block.code for block in blocks("docs/write-a-transform.md") if block.code.startswith("Part(")]
+    (part,) = eval(f"({line})", {"Part": Part})
+    monkeypatch.setitem(sys.modules, f"forcegrasp.transforms.{part.transform}", importlib.import_module(part.transform))
+    monkeypatch.setitem(PARTS, part.name, part)
+    env = build_env(2, physics=PhysicsConfig("fast", 1), observation=ObservationConfig(["force", part.name], 1))
+    seen = env.rollout(2)
+    torch.testing.assert_close(seen["next", "observation"][..., 2:], seen["next", "filtered_force"])
 
 
 def test_effect_of_the_page_is_found_once_it_is_installed(page, tmp_path):

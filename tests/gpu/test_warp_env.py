@@ -60,7 +60,7 @@ def test_training():
     before = [p.clone() for p in trainer.policy.parameters()]
     batch = next(iter(trainer.collector))
     assert batch.shape == (4, 12)
-    losses = trainer.ppo.update(batch, trainer.shuffle)
+    losses = trainer.algorithm.update(batch)
     assert all(torch.isfinite(torch.tensor(value)) for value in losses.values())
     assert any(not torch.equal(a, b) for a, b in zip(before, trainer.policy.parameters(), strict=True))
     tensors, facts = trainer.state()

@@ -10,7 +10,7 @@ from torchrl.envs.utils import check_env_specs
 
 from forcegrasp.config import GraspConfig, ObservationConfig, PhysicsConfig
 from forcegrasp.controllers import ForcePI, make_controller
-from forcegrasp.controllers.policy import observation_size
+from forcegrasp.controllers.policy import part_sizes
 from forcegrasp.effects.for_gripper import effect_of
 from forcegrasp.env import build_env
 from forcegrasp.models.model_file import Fitted, FoundEffect, Model
@@ -37,9 +37,9 @@ def test_specs_and_sizes(gripper):
     env, observation = build(gripper, steps=4), ObservationConfig(["force", "position", "had_contact"], 2)
     check_env_specs(env, seed=0)
     for one, parts in ((env, ObservationConfig()), (build(gripper, observation=observation), observation)):
-        assert one.observation_spec["observation"].shape == (3, observation_size(gripper, parts))
+        assert one.observation_spec["observation"].shape == (3, sum(part_sizes(gripper, parts)))
     motors, channels = len(gripper.motors), len(gripper.forces)
-    assert observation_size(gripper, observation) == 2 * (motors + 2 * channels)
+    assert sum(part_sizes(gripper, observation)) == 2 * (motors + 2 * channels)
     assert env.full_action_spec["action"].shape == (3, motors)
 
 

@@ -28,10 +28,9 @@ from forcegrasp.train.loop import train
 class SideBySide:
     """Direct collectors that take turns in this process, each with a torch generator and a policy of its own."""
 
-    def __init__(self, config, env, policy, schedule, model) -> None:
+    def __init__(self, config, env, policy, schedule, frames_per_batch, model) -> None:
         self.torch_states = [torch.get_rng_state()]
         self.members = []
-        frames = config.ppo.grasps // config.collector.workers * config.grasp.steps
         for worker in range(config.collector.workers):
             if worker:
                 seeded = torch.Generator().manual_seed(worker_seed(config.seed, worker))
@@ -40,7 +39,7 @@ class SideBySide:
                 training_env(config, model, worker),
                 copy.deepcopy(policy),
                 schedule=schedule,
-                frames_per_batch=frames,
+                frames_per_batch=frames_per_batch // config.collector.workers,
             )
             self.members.append(member)
 

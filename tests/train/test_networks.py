@@ -12,7 +12,7 @@ from torchrl.envs.utils import ExplorationType, set_exploration_type
 
 from forcegrasp.config import PPOConfig
 from forcegrasp.controllers.policy import make_policy
-from forcegrasp.train.ppo import make_value
+from forcegrasp.train.algorithms.value_network import make_value
 
 
 def act(policy, observation: torch.Tensor, mode=ExplorationType.RANDOM) -> TensorDict:
@@ -39,7 +39,7 @@ def seed():
 @pytest.mark.parametrize("mirrored", [True, False])
 @pytest.mark.parametrize("hidden", [[7], [9, 5], [4, 4, 4]])
 def test_sizes(hidden, mirrored):
-    policy = make_policy(12, PPOConfig(hidden=hidden, mirrored=mirrored))
+    policy = make_policy([2] * 6, PPOConfig(hidden=hidden, mirrored=mirrored))
     matrices = [p for name, p in policy.named_parameters() if name.endswith("weight")]
     widths = [12, *hidden, 2]
     assert [tuple(m.shape) for m in matrices] == [(b, a) for a, b in pairwise(widths)]
@@ -47,7 +47,7 @@ def test_sizes(hidden, mirrored):
 
 
 def test_one_finger_does_what_the_other_would(seed):
-    policy = shaken(make_policy(30, PPOConfig(mirrored=True)))
+    policy = shaken(make_policy([2] * 15, PPOConfig(mirrored=True)))
     observation = torch.randn(64, 30)
     mean = act(policy, observation)["loc"]
     torch.testing.assert_close(act(policy, swap(observation))["loc"], mean.flip(-1))
@@ -59,21 +59,21 @@ def test_one_finger_does_what_the_other_would(seed):
 
 
 def test_without_mirror_the_fingers_are_free():
-    policy = shaken(make_policy(30, PPOConfig(mirrored=False)))
+    policy = shaken(make_policy([2] * 15, PPOConfig(mirrored=False)))
     observation = torch.randn(64, 30)
     assert (act(policy, swap(observation))["loc"] - act(policy, observation)["loc"].flip(-1)).abs().mean() > 0.01
 
 
 @pytest.mark.parametrize("mirrored", [True, False])
 def test_start(mirrored):
-    policy = make_policy(30, PPOConfig(mirrored=mirrored, initial_action=-0.4, log_std=-1.2))
+    policy = make_policy([2] * 15, PPOConfig(mirrored=mirrored, initial_action=-0.4, log_std=-1.2))
     drawn = act(policy, torch.randn(200, 30))
     assert (drawn["loc"] + 0.4).abs().max() < 0.1
     torch.testing.assert_close(drawn["scale"], torch.full((200, 2), -1.2).exp())
 
 
 def test_probability_of_actions():
-    policy = shaken(make_policy(30, PPOConfig(log_std=0.5)))
+    policy = shaken(make_policy([2] * 15, PPOConfig(log_std=0.5)))
     drawn = act(policy, torch.randn(500, 30))
     expected = norm(drawn["loc"], drawn["scale"]).logpdf(drawn["action"]).sum(-1)
     torch.testing.assert_close(drawn["action_log_prob"].double(), torch.as_tensor(expected), rtol=1e-4, atol=1e-4)
@@ -82,7 +82,7 @@ def test_probability_of_actions():
 
 
 def test_deterministic_action_is_the_mean():
-    drawn = act(make_policy(30, PPOConfig()), torch.randn(5, 30), ExplorationType.DETERMINISTIC)
+    drawn = act(make_policy([2] * 15, PPOConfig()), torch.randn(5, 30), ExplorationType.DETERMINISTIC)
     assert torch.equal(drawn["action"], drawn["loc"])
 
 

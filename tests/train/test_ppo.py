@@ -7,8 +7,8 @@ import pytest
 import torch
 from scipy.stats import multivariate_normal
 
+from forcegrasp.train.algorithms.ppo import entropy
 from forcegrasp.train.loop import Trainer
-from forcegrasp.train.ppo import entropy
 
 HORIZON_OF = {0.9: 10.0, 0.97: 100 / 3}
 
@@ -79,7 +79,7 @@ def numpy_frames(batch) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
 
 def advantages(trainer: Trainer, batch) -> tuple[np.ndarray, np.ndarray]:
     """Generalised advantages and value targets of episodes that are cut off, not ended, ``(n, T)``."""
-    config, weights = trainer.config.ppo, parameters(trainer.value)
+    config, weights = trainer.config.ppo, parameters(trainer.algorithm.value)
     now, after = numpy_frames(batch)
     value, next_value = state_value(weights, now, config), state_value(weights, after, config)
     delta = numpy(batch["next", "reward"])[..., 0] + config.discount * next_value - value
@@ -99,7 +99,7 @@ def trainer(request, tiny) -> Trainer:
     made = Trainer(tiny(grasp={"steps": 40}, ppo=one_update | ppo | networks))
     with torch.no_grad():
         # away from the start, where the policy's mean hardly depends on what it sees
-        for parameter in [*made.policy.parameters(), *made.value.parameters()]:
+        for parameter in [*made.policy.parameters(), *made.algorithm.value.parameters()]:
             parameter += 0.1 * torch.randn_like(parameter)
     return made
 
@@ -128,6 +128,8 @@ def objective(trainer, frames, advantage, target, policy, value) -> dict[str, fl
         "kl_approx": -log_ratio.mean(),
         "clip_fraction": (clipped != ratio).mean(),
         "ESS": ratio.sum() ** 2 / (ratio**2).sum() / ratio.size,
+        "learning_rate": config.learning_rate,
+        "action_std": np.exp(log_std(policy)).mean(),
     }
     parts["total"] = (
         parts["loss_objective"]
@@ -139,7 +141,7 @@ def objective(trainer, frames, advantage, target, policy, value) -> dict[str, fl
 
 def test_advantages(trainer, batch):
     with torch.no_grad():
-        trainer.ppo.advantage(batch)
+        trainer.algorithm.advantage(batch)
     advantage, target = advantages(trainer, batch)
     np.testing.assert_allclose(numpy(batch["advantage"])[..., 0], advantage, rtol=1e-4, atol=1e-4)
     np.testing.assert_allclose(numpy(batch["value_target"])[..., 0], target, rtol=1e-4, atol=1e-4)
@@ -151,9 +153,9 @@ def test_what_an_update_reports(trainer, batch):
         numpy_frames(batch)[0],
         *advantages(trainer, batch),
         parameters(trainer.policy),
-        parameters(trainer.value),
+        parameters(trainer.algorithm.value),
     )
-    reported = trainer.ppo.update(batch, trainer.shuffle)
+    reported = trainer.algorithm.update(batch)
     assert 0.1 < reported["clip_fraction"] < 0.9
     assert set(reported) <= set(expected)
     for name, value in reported.items():
@@ -161,27 +163,27 @@ def test_what_an_update_reports(trainer, batch):
 
 
 def test_advantages_are_normalised_over_the_batch_and_not_the_minibatch(trainer, batch):
-    config = trainer.ppo.config
+    config = trainer.algorithm.config
     config.learning_rate, config.minibatch, config.epochs = 0.0, 8, 2
-    trainer.ppo.set_progress(0.0)
+    trainer.algorithm.set_progress(0.0)
     expected = objective(
         trainer,
         numpy_frames(batch)[0],
         *advantages(trainer, batch),
         parameters(trainer.policy),
-        parameters(trainer.value),
+        parameters(trainer.algorithm.value),
     )
-    reported = trainer.ppo.update(batch, trainer.shuffle)
+    reported = trainer.algorithm.update(batch)
     for name in ("loss_objective", "loss_critic", "kl_approx", "clip_fraction"):
         assert reported[name] == pytest.approx(expected[name], rel=1e-3, abs=1e-5), name
 
 
 def test_gradient(trainer, batch):
     frames, (advantage, target) = numpy_frames(batch)[0], advantages(trainer, batch)
-    policy, value = parameters(trainer.policy), parameters(trainer.value)
-    trainer.ppo.update(batch, trainer.shuffle)
+    policy, value = parameters(trainer.policy), parameters(trainer.algorithm.value)
+    trainer.algorithm.update(batch)
     rng = np.random.default_rng(0)
-    for module, weights in ((trainer.policy, policy), (trainer.value, value)):
+    for module, weights in ((trainer.policy, policy), (trainer.algorithm.value, value)):
         for name, parameter in module.named_parameters():
             place = tuple(rng.integers(size) for size in weights[name].shape)
             centre, slopes = weights[name][place], []
@@ -194,19 +196,19 @@ def test_gradient(trainer, batch):
 
 
 def test_gradients_are_scaled_down(trainer, batch, tiny):
-    trainer.ppo.config.max_grad_norm = 0.01
-    trainer.ppo.update(batch, trainer.shuffle)
-    for net in (trainer.policy, trainer.value):
+    trainer.algorithm.config.max_grad_norm = 0.01
+    trainer.algorithm.update(batch)
+    for net in (trainer.policy, trainer.algorithm.value):
         norm = torch.stack([parameter.grad.norm() for parameter in net.parameters()]).norm()
         assert float(norm) == pytest.approx(0.01, rel=1e-3)
 
 
 @pytest.mark.parametrize("minibatch", [32, 60, 120, 10_000])
 def test_every_epoch_sees_every_frame_once(trainer, batch, minibatch):
-    trainer.ppo.config.minibatch, trainer.ppo.config.epochs = minibatch, 3
+    trainer.algorithm.config.minibatch, trainer.algorithm.config.epochs = minibatch, 3
     seen = []
-    trainer.ppo.loss.register_forward_pre_hook(lambda _, inputs: seen.append(inputs[0]["action_log_prob"]))
-    trainer.ppo.update(batch, trainer.shuffle)
+    trainer.algorithm.loss.register_forward_pre_hook(lambda _, inputs: seen.append(inputs[0]["action_log_prob"]))
+    trainer.algorithm.update(batch)
     per_epoch = -(-120 // minibatch)
     assert len(seen) == 3 * per_epoch
     epochs = [torch.cat(seen[first : first + per_epoch]) for first in range(0, len(seen), per_epoch)]
@@ -215,31 +217,33 @@ def test_every_epoch_sees_every_frame_once(trainer, batch, minibatch):
     assert not torch.equal(epochs[0], epochs[1])
 
 
-def test_order_of_frames_comes_from_the_given_generator(trainer, batch):
-    trainer.ppo.config.minibatch = 30
+def test_order_of_frames_comes_from_its_own_generator(trainer, batch):
+    trainer.algorithm.config.minibatch = 30
     firsts = []
-    trainer.ppo.loss.register_forward_pre_hook(lambda _, inputs: firsts.append(inputs[0]["action_log_prob"]))
+    trainer.algorithm.loss.register_forward_pre_hook(lambda _, inputs: firsts.append(inputs[0]["action_log_prob"]))
     before = torch.get_rng_state()
-    trainer.ppo.update(batch, torch.Generator().manual_seed(1))
-    trainer.ppo.update(batch, torch.Generator().manual_seed(1))
+    trainer.algorithm.shuffle.manual_seed(1)
+    trainer.algorithm.update(batch)
+    trainer.algorithm.shuffle.manual_seed(1)
+    trainer.algorithm.update(batch)
     assert torch.equal(firsts[0], firsts[4])
     assert torch.equal(before, torch.get_rng_state())
 
 
 @pytest.mark.parametrize("share", [-1.0, 0.0, 0.25, 0.5, 1.0, 1.5])
 def test_learning_rate_falls_linearly(tiny, share):
-    ppo = Trainer(tiny(ppo={"learning_rate": 0.01, "learning_rate_end": 0.1})).ppo
+    ppo = Trainer(tiny(ppo={"learning_rate": 0.01, "learning_rate_end": 0.1})).algorithm
     expected = np.interp(share, [0, 1], [0.01, 0.001])
-    assert ppo.set_progress(share) == pytest.approx(expected, rel=1e-12)
-    assert [group["lr"] for group in ppo.optimizer.param_groups] == pytest.approx([expected])
+    ppo.set_progress(share)
+    assert [group["lr"] for group in ppo.optimizer.param_groups] == pytest.approx([expected], rel=1e-12)
 
 
 def test_a_rate_of_zero_changes_no_weight(trainer, batch):
-    trainer.ppo.config.learning_rate = 0.0
-    trainer.ppo.set_progress(0.0)
-    before = parameters(trainer.policy) | parameters(trainer.value)
-    trainer.ppo.update(batch, trainer.shuffle)
-    after = parameters(trainer.policy) | parameters(trainer.value)
+    trainer.algorithm.config.learning_rate = 0.0
+    trainer.algorithm.set_progress(0.0)
+    before = parameters(trainer.policy) | parameters(trainer.algorithm.value)
+    trainer.algorithm.update(batch)
+    after = parameters(trainer.policy) | parameters(trainer.algorithm.value)
     assert all(np.array_equal(before[name], after[name]) for name in before)
 
 
@@ -257,11 +261,11 @@ def test_the_value_network_sees_the_true_gaps(tiny):
     )
     trainer = Trainer(config)
     seen = []
-    trainer.value.module.net.register_forward_pre_hook(lambda _, inputs: seen.append(inputs[0]))
+    trainer.algorithm.value.module.net.register_forward_pre_hook(lambda _, inputs: seen.append(inputs[0]))
     trainer.prepare()
     with torch.no_grad():
         episodes = trainer.env.rollout(60, lambda td: td.set("action", -torch.ones(2, 2)))
-        trainer.value(episodes)
+        trainer.algorithm.value(episodes)
     force, gap_cm = episodes["force"], seen[0][..., -3:-1]
     free = force == 0
     assert free.any(dim=1).all()

@@ -315,8 +315,8 @@ def test_seed_decides_everything_random(tiny):
 
     def streams(seed: int) -> dict[str, torch.Tensor]:
         trainer = Trainer(tiny(seed=seed))
-        first = {"weights": trainer.value.module.net[0].weight.detach().clone()}
-        first["order"] = torch.randperm(100, generator=trainer.shuffle)
+        first = {"weights": trainer.algorithm.value.module.net[0].weight.detach().clone()}
+        first["order"] = torch.randperm(100, generator=trainer.algorithm.shuffle)
         start = trainer.env.reset()
         noise = start["sensed_force"] - start["force"]
         with torch.no_grad():

@@ -57,7 +57,7 @@ CHANGED = [
     (InductiveBias, "delta_key", "spare"),
     (InductiveBias, "had_contact_key", "spare"),
     (InductiveBias, "force_error_key", "spare"),
-    (InductiveBias, "goal_key", "spare"),
+    (InductiveBias, "goal_key", "spare_goal"),
     (ActionScale, "max_delta", 0.004),
     (ActionScale, "delta_key", "spare_delta"),
     (ActionScale, "action_key", "spare"),
@@ -67,7 +67,7 @@ NEEDED = {(HadContact, "position_key"): {"stall": 0.2}}
 SIZES = {
     **dict.fromkeys(["joint_position", "sensed_position", "force", "sensed_force", "force_error"], 2),
     **dict.fromkeys(["last_action", "had_contact", "spare"], 2),
-    "goal_force": 1,
+    **dict.fromkeys(["goal_force", "spare_goal"], 1),
 }
 
 

@@ -42,8 +42,8 @@ def ours(tier: str, grasps: int, report: Report) -> None:
         batch = next(batches)
         reward = float(summarise(batch, config.sensors)["force_reward_normalised"].mean())
         report(trainer.frames + batch.numel(), reward)
-        trainer.ppo.set_progress(trainer.frames / total)
-        trainer.ppo.update(batch, trainer.shuffle)
+        trainer.algorithm.set_progress(trainer.frames / total)
+        trainer.algorithm.update(batch)
         trainer.frames += batch.numel()
 
 

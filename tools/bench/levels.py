@@ -97,7 +97,7 @@ def training(case: Case) -> Run:
 
     def run() -> int:
         batch = next(batches)
-        trainer.ppo.update(batch, trainer.shuffle)
+        trainer.algorithm.update(batch)
         return batch.numel()
 
     return run
@@ -132,5 +132,5 @@ def _closing_trainer(case: Case) -> Trainer:
     trainer = Trainer(config)
     last = [module for module in trainer.policy.modules() if isinstance(module, torch.nn.Linear)][-1]
     torch.nn.init.constant_(last.bias, -1.0)
-    trainer.ppo.set_progress(1.0)  # small steps: it should go on closing
+    trainer.algorithm.set_progress(1.0)  # small steps: it should go on closing
     return trainer

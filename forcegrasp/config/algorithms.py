@@ -1,0 +1,56 @@
+"""Options of learning algorithms: those that every one has, and each one's own. The only home of their defaults."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from forcegrasp.config.option import option
+
+
+@dataclass
+class AlgorithmConfig:
+    """What every algorithm has: how long it trains, with how many grasps at once, and the policy's network."""
+
+    name: ClassVar[str]  #: of its section, and of its columns in metrics.csv
+
+    total_frames: int = option(
+        4_500_000, "control steps to train for, over all grasps", source="authors' code", low=1, high=10**12
+    )
+    grasps: int = option(256, "grasps simulated at once; a batch is one episode of each", low=1, high=100_000)
+    hidden: list[int] = option(
+        [50, 50], "width of each hidden layer, policy and value alike", source="authors' code", low=1, high=10_000
+    )
+    log_std: float = option(-0.5, "logarithm of the policy's initial standard deviation", low=-10, high=2)
+    initial_action: float = option(
+        -0.5, "the policy's mean action at the start: closing, lest training never meets the object", low=-1, high=1
+    )
+    mirrored: bool = option(
+        True,
+        "average the policy with its mirror image where the gripper is its own, so that it treats both fingers alike",
+    )
+
+
+@dataclass
+class PPOConfig(AlgorithmConfig):
+    """Proximal policy optimisation (Schulman et al. 2017)."""
+
+    name: ClassVar[str] = "ppo"
+
+    epochs: int = option(2, "passes over each batch; the authors had 10", low=1, high=1000)
+    minibatch: int = option(512, "frames per gradient step; the authors had 64", low=1, high=10**9)
+    learning_rate: float = option(6e-4, "Adam's step size at the start", source="authors' code", low=0, high=1)
+    learning_rate_end: float = option(0.05, "what is left of it at the end, linearly, as a fraction", low=0, high=1)
+    discount: float = option(0.97, "γ; the authors had 0.99", low=0, high=1)
+    gae_lambda: float = option(0.95, "λ of the advantage estimate", source="authors' code", low=0, high=1)
+    clip: float = option(0.2, "largest change of the probability ratio", source="authors' code", low=0.001, high=1)
+    entropy_weight: float = option(0.0, "weight of the entropy bonus", source="authors' code", low=0, high=10)
+    value_weight: float = option(0.5, "weight of the value loss", source="authors' code", low=0, high=100)
+    max_grad_norm: float = option(
+        0.5, "gradients are scaled down to this norm", source="authors' code", low=0, high=1000
+    )
+    critic: str = option(
+        "privileged",
+        "what the value network sees while training: the policy's observation, or also the grasp's true state",
+        choices=("observation", "privileged"),
+    )

@@ -1,0 +1,74 @@
+"""The network that estimates a state's value, from what the policy sees or also from the grasp's true state."""
+
+from __future__ import annotations
+
+import torch
+from tensordict.nn import TensorDictModule
+from torch import Tensor, nn
+from torchrl.modules import MLP
+
+from forcegrasp.config import PPOConfig
+from forcegrasp.physics.gripper import Gripper
+from forcegrasp.physics.gripper_file import default_gripper
+
+#: Entries of the true state that a privileged critic sees.
+PRIVILEGED = ["grasp_parameters", "force", "joint_position", "object_position"]
+
+
+class Value(nn.Module):
+    """State value. Its output is scaled by the horizon 1 / (1 − γ), so that the network's own stays about 1."""
+
+    middle: Tensor
+    half_width: Tensor
+
+    def __init__(
+        self, observation_size: int, hidden: list[int], discount: float, privileged: bool, gripper: Gripper
+    ) -> None:
+        super().__init__()
+        ranges = _parameter_ranges(gripper)
+        self.direct, self.stroke, self.force = gripper.is_direct, gripper.stroke, _large_force(gripper)
+        extra = len(ranges) + 2 + len(gripper.motors) + 1 if privileged else 0
+        self.net = MLP(
+            in_features=observation_size + extra, out_features=1, num_cells=list(hidden), activation_class=nn.Tanh
+        )
+        self.horizon = 1 / max(1 - discount, 1e-3)
+        self.register_buffer("middle", torch.tensor([(low + high) / 2 for low, high in ranges]), persistent=False)
+        half = [max((high - low) / 2, 1e-6) for low, high in ranges]
+        self.register_buffer("half_width", torch.tensor(half), persistent=False)
+
+    def forward(self, observation: Tensor, *state: Tensor) -> Tensor:
+        if state:
+            parameters, force, position, object_position = state
+            true = (parameters - self.middle) / self.half_width
+            moved = (object_position - parameters[..., 3:4]) * 1000
+            features = [true, force / self.force, self._gap(position, object_position, parameters[..., 2:3]), moved]
+            observation = torch.cat([observation, *features], dim=-1)
+        return self.horizon * self.net(observation)
+
+    def _gap(self, position: Tensor, object_position: Tensor, radius: Tensor) -> Tensor:
+        """True gap between each finger and the object's surface, in centimetres; else where the motors are."""
+        if not self.direct:
+            return 2 * position / self.stroke - 1
+        side = torch.tensor([-1.0, 1.0], device=position.device)
+        return (position - side * object_position - radius) * 100
+
+
+def _parameter_ranges(gripper: Gripper) -> list[tuple[float, float]]:
+    """Where kappa, b2, radius, offset and goal force of a grasp usually lie, to bring them to about [-1, 1]."""
+    training = gripper.training
+    middle, depth = sum(training.offset_m) / 2, training.deformation_m
+    offset = (middle - depth, middle + depth)
+    return [(0.0, 1.0), training.servo_gain_range, training.radius_m, offset, (0.0, _large_force(gripper))]
+
+
+def _large_force(gripper: Gripper) -> float:
+    """Two thirds of the largest force of any object, newtons: few goals lie above."""
+    training = gripper.training
+    return training.max_force_n * max(float(training.force_scale(kappa)) for kappa in (0.0, 1.0)) / 3 * 2
+
+
+def make_value(observation_size: int, config: PPOConfig, gripper: Gripper | None = None) -> TensorDictModule:
+    """The value network: reads ``observation`` (and the true state, if privileged), writes ``state_value``."""
+    privileged = config.critic == "privileged"
+    net = Value(observation_size, config.hidden, config.discount, privileged, gripper or default_gripper())
+    return TensorDictModule(net, in_keys=["observation", *(PRIVILEGED if privileged else [])], out_keys=["state_value"])
