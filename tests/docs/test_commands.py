@@ -12,7 +12,7 @@ from doc_pages import PAGES, ROOT, blocks
 
 from forcegrasp.cli.main import VERBS, main
 from forcegrasp.cli.options import SCHEMAS, compose
-from forcegrasp.cli.train import single_runs
+from forcegrasp.cli.sweep import single_runs
 from forcegrasp.controllers import CONTROLLERS
 from forcegrasp.effects import get_effect
 from forcegrasp.policies import shipped_policies
