@@ -31,9 +31,8 @@ def simulate(name: str) -> dict[str, Any]:
 
     gripper = load_gripper(name)
     training = gripper.training
-    gain = gripper.parameters[training.servo_gain].nominal if training.servo_gain else 0.0
     offset = sum(training.start_offset_m) / 2
-    grasp = GraspParameters(*np.array([[0.0], [gain], [training.start_radius_m[0]], [offset], [0.1]]))
+    grasp = GraspParameters(*np.array([[0.0], [gripper.nominal_gain], [training.start_radius_m[0]], [offset], [0.1]]))
     found: dict[str, Any] = {"unit": gripper.unit}
     for tier in TIERS:
         simulator = GraspSimulator(1, tier, threads=1, gripper=gripper)
