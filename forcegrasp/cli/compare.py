@@ -7,7 +7,7 @@ from pathlib import Path
 
 from forcegrasp.cli.results import default_out, need, print_table, progress_printer
 from forcegrasp.cli.verb import Verb
-from forcegrasp.config import CompareConfig
+from forcegrasp.config.verbs import CompareConfig
 
 NOTES = """
   SET              the same as data=SET

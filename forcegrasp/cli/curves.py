@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from forcegrasp.cli.verb import Verb
-from forcegrasp.config import CurvesConfig
+from forcegrasp.config.verbs import CurvesConfig
 from forcegrasp.errors import ConfigError
 
 NOTES = """

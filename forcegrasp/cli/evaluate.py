@@ -6,7 +6,7 @@ import time
 from pathlib import Path
 
 from forcegrasp.cli.verb import Verb
-from forcegrasp.config import EvaluateConfig
+from forcegrasp.config.verbs import EvaluateConfig
 from forcegrasp.errors import ConfigError
 from forcegrasp.policies import shipped_policies
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from forcegrasp.cli.measuring import check_folder
 from forcegrasp.cli.results import default_out
 from forcegrasp.cli.verb import Verb
-from forcegrasp.config import ExportConfig
+from forcegrasp.config.verbs import ExportConfig
 from forcegrasp.errors import ConfigError
 
 NOTES = """

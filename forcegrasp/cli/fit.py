@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from forcegrasp.cli.results import default_out, need, print_table, progress_printer
 from forcegrasp.cli.verb import Verb
-from forcegrasp.config import FitConfig
+from forcegrasp.config.verbs import FitConfig
 
 NOTES = """
   SET              the same as data=SET

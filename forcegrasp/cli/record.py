@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from forcegrasp.cli.results import default_out
 from forcegrasp.cli.verb import Verb
-from forcegrasp.config import RecordConfig
+from forcegrasp.config.verbs import RecordConfig
 from forcegrasp.errors import ConfigError
 
 NOTES = """

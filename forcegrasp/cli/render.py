@@ -6,7 +6,7 @@ import time
 from pathlib import Path
 
 from forcegrasp.cli.verb import Verb
-from forcegrasp.config import RenderConfig
+from forcegrasp.config.verbs import RenderConfig
 from forcegrasp.errors import ConfigError
 
 NOTES = """

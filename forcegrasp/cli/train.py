@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from forcegrasp.cli.verb import Verb
-from forcegrasp.config import TrainConfig
+from forcegrasp.config.verbs import TrainConfig
 from forcegrasp.errors import ConfigError
 
 NOTES = """
