@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import importlib
 import re
 import shlex
 
@@ -70,7 +69,7 @@ def understood(verb: str, words: list[str], monkeypatch):
         made.append(composed(name, *overrides))
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(importlib.import_module(f"forcegrasp.cli.{verb}"), "compose", stop)
+    monkeypatch.setattr("forcegrasp.cli.main.compose", stop)
     assert main([verb, *words]) == 130
     return made[0]
 
