@@ -70,5 +70,5 @@ VERB = Verb(
     run=run,
     notes=NOTES,
     schema=AddConfig,
-    plain=("data", "SET"),
+    positional=("data", "SET"),
 )

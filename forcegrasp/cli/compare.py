@@ -67,5 +67,5 @@ VERB = Verb(
     run=run,
     notes=NOTES,
     schema=CompareConfig,
-    plain=("data", "SET"),
+    positional=("data", "SET"),
 )

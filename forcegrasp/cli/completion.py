@@ -49,7 +49,7 @@ def script(shell: str) -> str:
 
 
 def table() -> Iterator[list[str]]:
-    """Rows ``VERB KEY VALUE ...``: what may follow ``KEY=``, or stand plainly after the verb where the key is ``-``."""
+    """Rows ``VERB KEY VALUE ...``: what may follow ``KEY=``, or stand alone after the verb where the key is ``-``."""
     from forcegrasp.cli.options import HYDRA_OPTIONS, LAUNCHERS, groups, leaves
     from forcegrasp.cli.verbs import VERBS
     from forcegrasp.effects import catalogue
@@ -67,7 +67,7 @@ def table() -> Iterator[list[str]]:
         "shell": list(SHELLS),
     }
     for verb in VERBS.values():
-        option, _ = verb.plain
+        option, _ = verb.positional
         flags = ["--help", *(["--all"] if verb.schema else []), *(["-m"] if verb.multirun else [])]
         yield [verb.name, "-", *flags, *(named.get(option, [FILES]) if option else [])]
         for name, entry, _ in leaves(verb.schema) if verb.schema else []:
@@ -91,5 +91,5 @@ VERB = Verb(
     "print a script that completes verbs, options and values in bash, zsh or fish",
     run=run,
     notes=NOTES,
-    plain=("shell", "|".join(SHELLS)),
+    positional=("shell", "|".join(SHELLS)),
 )

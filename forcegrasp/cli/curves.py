@@ -36,5 +36,5 @@ VERB = Verb(
     run=run,
     notes=NOTES,
     schema=CurvesConfig,
-    plain=("folders", "FOLDER"),
+    positional=("folders", "FOLDER"),
 )

@@ -88,5 +88,5 @@ VERB = Verb(
     run=run,
     notes=NOTES,
     schema=DiagnoseConfig,
-    plain=("data", "SET"),
+    positional=("data", "SET"),
 )

@@ -118,6 +118,6 @@ VERB = Verb(
     "list the physical effects that a simulator may lack, or explain one",
     run=run,
     notes=NOTES,
-    plain=("effect", "NAME"),
+    positional=("effect", "NAME"),
     usage="[gripper=GRIPPER]",
 )

@@ -44,5 +44,5 @@ VERB = Verb(
     run=run,
     notes=NOTES,
     schema=ExportConfig,
-    plain=("run", "RUN"),
+    positional=("run", "RUN"),
 )

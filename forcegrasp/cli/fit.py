@@ -57,5 +57,5 @@ VERB = Verb(
     run=run,
     notes=NOTES,
     schema=FitConfig,
-    plain=("data", "SET"),
+    positional=("data", "SET"),
 )

@@ -1,4 +1,4 @@
-"""Other ways to type an option: plainly, under its other name, or one value where a list is wanted."""
+"""Other ways to type an option: by its position, under its other name, or one value where a list is wanted."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ def spell_out(
     Raises:
       ConfigError: if one thing is given twice.
     """
-    key, word = verb.plain
-    plain = [a for a in arguments if key and _is_plain(a)]
-    named = [_rename(a, options) for a in arguments if a not in plain]
+    key, word = verb.positional
+    positional = [a for a in arguments if key and _is_positional(a)]
+    named = [_rename(a, options) for a in arguments if a not in positional]
     _refuse_both_names(verb.name, arguments, options)
     lists = {name for name, default in options.items() if isinstance(default, (list, tuple))}
     spelled = [_bracket(a, parse, sweep) if a.partition("=")[0] in lists else a for a in named]
-    if not plain:
+    if not positional:
         return spelled
     given = [a for a in spelled if a.startswith(f"{key}=")]
     if key in lists:
@@ -44,15 +44,15 @@ def spell_out(
             raise ConfigError(
                 f"{' '.join(given)}: {key} are a list, written '{key}=[a,b]'; or give them without {key}="
             )
-        value = f"[{','.join(map(quote, [*plain, *(str(one) for value in listed for one in value)]))}]"
-    elif len(plain + given) > 1:
-        raise ConfigError(f"{verb.name}: one {word.lower()} at a time, not {' and '.join(plain + given)}")
+        value = f"[{','.join(map(quote, [*positional, *(str(one) for value in listed for one in value)]))}]"
+    elif len(positional + given) > 1:
+        raise ConfigError(f"{verb.name}: one {word.lower()} at a time, not {' and '.join(positional + given)}")
     else:
-        value = quote(plain[0])
+        value = quote(positional[0])
     return [*(a for a in spelled if a not in given), f"{key}={value}"]
 
 
-def _is_plain(argument: str) -> bool:
+def _is_positional(argument: str) -> bool:
     # Hydra names folders seed=0
     return Path(argument).is_dir() or ("=" not in argument and not argument.startswith("-"))
 

@@ -20,7 +20,7 @@ class Verb:
     run: Callable[[Any], int | None]
     notes: str = ""  #: what its help says below the usage
     schema: type | None = None  #: dataclass of its options, see forcegrasp/config/verbs.py
-    plain: tuple[str, str] = ("", "")  #: the option that may be typed without ``key=``, and the word for its value
+    positional: tuple[str, str] = ("", "")  #: the option that may be given without ``key=``, and a word for its value
     usage: str = ""  #: what else may follow it, if not options of a schema
     multirun: bool = False  #: whether it takes ``-m`` and options of Hydra's own
     needs_mujoco: bool = True
@@ -33,7 +33,7 @@ class Verb:
     @property
     def usage_line(self) -> str:
         """How it is called."""
-        option, word = self.plain
+        option, word = self.positional
         several = any(f.name == option and "list" in str(f.type) for f in fields(self.schema)) if self.schema else False
         words = [f"[{word}{' ...' * several}]"] if word else []
         options = "[key=value ...]" if self.schema else self.usage

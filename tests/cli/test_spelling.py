@@ -44,9 +44,9 @@ def test_alike(verb, option, value, typed, tmp_path, monkeypatch):
         assert spelled(verb, *(text.split(" ") if verb == "curves" else [text])) == {option: value}
 
 
-def test_every_verb_that_takes_something_plainly_takes_it_by_its_name():
+def test_every_verb_that_takes_something_by_position_takes_it_by_its_name():
     for verb in SCHEMAS:
-        option, _ = VERBS[verb].plain
+        option, _ = VERBS[verb].positional
         if not option:
             continue
         assert spelled(verb, "a/b") in ({option: "a/b"}, {option: ["a/b"]})

@@ -29,7 +29,7 @@ def test_a_verb_is_the_file_of_its_name(name):
 @pytest.mark.parametrize("verb", [verb for verb in VERBS.values() if verb.schema], ids=lambda verb: verb.name)
 def test_its_options_are_shown_to_change_something(verb):
     validate(verb.schema())
-    option, word = verb.plain
+    option, word = verb.positional
     assert bool(option) == bool(word)
     assert not option or option in {name for name, _, _ in leaves(verb.schema)}
     tests = "".join(path.read_text("utf-8") for path in (TESTS / "config").glob("test_options_of_*.py"))
