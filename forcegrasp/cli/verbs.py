@@ -8,18 +8,8 @@ from forcegrasp.cli.verb import Verb
 
 #: Files of this folder, in the order of the help.
 _FILES = (
-    "record",
-    "compare",
-    "fit",
-    "diagnose",
-    "add",
-    "train",
-    "evaluate",
-    "curves",
-    "export",
-    "render",
-    "effects",
-    "doctor",
-    "completion",
+    *("record", "compare", "fit", "diagnose", "add"),
+    *("train", "evaluate", "curves", "export", "render"),
+    *("effects", "doctor", "completion"),
 )
 VERBS: dict[str, Verb] = {name: importlib.import_module(f"forcegrasp.cli.{name}").VERB for name in _FILES}
