@@ -15,13 +15,13 @@ from forcegrasp.physics import default_gripper
 PACKAGE = Path(__file__).parents[1] / "forcegrasp"
 #: Data, and where presets are.
 DATA = {"assets", "policies", "conf"}
-#: Rooms that still have some; to be emptied.
-NOT_YET = {"evaluate", "measure", "compare", "doctor", "runs", "reports"}
 #: Numbers of its description that no other quantity of the package happens to have.
-NUMBERS = {default_gripper().stroke, default_gripper().stroke / 2, default_gripper().max_step}
+GRIPPER = default_gripper()
+NUMBERS = {GRIPPER.stroke, GRIPPER.stroke / 2, GRIPPER.max_step, GRIPPER.training.position_std}
+NUMBERS |= {GRIPPER.training.force_std_n, GRIPPER.training.assumed_stiffness}
 #: Sizes of effects are given for the paper's gripper, and scaled for others.
 SIZES = "effects/"
-FILES = sorted(path for path in PACKAGE.rglob("*.py") if path.relative_to(PACKAGE).parts[0] not in DATA | NOT_YET)
+FILES = sorted(path for path in PACKAGE.rglob("*.py") if path.relative_to(PACKAGE).parts[0] not in DATA)
 
 
 def names_in_code(text: str) -> list[str]:

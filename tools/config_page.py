@@ -17,8 +17,8 @@ from typing import Any
 
 import yaml
 
-from forcegrasp.cli.main import VERBS
 from forcegrasp.cli.options import SCHEMAS, groups
+from forcegrasp.cli.verbs import VERBS
 from forcegrasp.config import is_left_out
 
 #: Upper bounds from here on only keep out what can be no number of anything.
@@ -55,7 +55,8 @@ def page() -> str:
         inner = dict(parts(schema))
         shared |= inner
         own = [entry for entry in dataclasses.fields(schema) if entry.name not in inner]
-        lines += [f"### {verb}\n", f"{VERBS[verb][0].upper()}{VERBS[verb][1:]}.\n", table(own), presets(verb)]
+        purpose = VERBS[verb].purpose
+        lines += [f"### {verb}\n", f"{purpose[0].upper()}{purpose[1:]}.\n", table(own), presets(verb)]
         if inner:
             names = ", ".join(f"[{name}](#{name})" for name in inner)
             lines += [f"And the options of {names}{differing(schema)}\n"]

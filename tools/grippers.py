@@ -93,19 +93,19 @@ def evaluate(gripper: str, policies: dict[str, str], trials: int) -> dict[str, d
     """Mean figures of policies, by name, over the same grasps of 11 softness values."""
     from forcegrasp.config import EvaluateConfig
     from forcegrasp.env.episodes import summarise
-    from forcegrasp.evaluate.contestants import gripper_of, load_contestants
     from forcegrasp.evaluate.grids import kappa_grid
+    from forcegrasp.evaluate.policies import gripper_of, load_policies
     from forcegrasp.evaluate.rollouts import roll_out
     from forcegrasp.physics.completion import complete
 
     hand = gripper_of(list(policies.values()), gripper)
     config = complete(EvaluateConfig(), hand)
     grid, found = kappa_grid(config.grasp, config.kappas, trials, config.seed, hand), {}
-    for name, contestant in zip(policies, load_contestants(list(policies.values()), hand), strict=True):
-        parts = {"action": contestant.action, "observation": contestant.observation}
+    for name, evaluated in zip(policies, load_policies(list(policies.values()), hand), strict=True):
+        parts = {"action": evaluated.action, "observation": evaluated.observation}
         sensors = config.sensors
         episodes = roll_out(
-            contestant.policy, grid.grasps, config.grasp, config.seed, gripper=hand, sensors=sensors, **parts
+            evaluated.policy, grid.grasps, config.grasp, config.seed, gripper=hand, sensors=sensors, **parts
         )
         figures = {key: float(value.mean()) for key, value in summarise(episodes, sensors, hand.period_s).items()}
         found[name] = {

@@ -71,7 +71,7 @@ raise SystemExit(main(["evaluate", f"policies=[{{names}}]", *{SMALL}, "out=shipp
 STEPS = [
     Step("doctor", ["forcegrasp", "doctor"]),
     Step("effects", ["forcegrasp", "effects"]),
-    Step("effects NAME", ["forcegrasp", "effects", "backlash"]),
+    Step("effects NAME", ["forcegrasp", "effects", "backlash", "gripper=franka_hand"]),
     Step("completion", ["forcegrasp", "completion", "bash"]),
     Step("train", ["forcegrasp", "train", *TINY, "hydra.run.dir=run"], ("run/run.json", "run/metrics.csv")),
     Step("train resume=", ["forcegrasp", "train", "resume=run"], prepare=interrupt),

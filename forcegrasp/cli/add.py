@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from forcegrasp.cli.options import compose, help_text
 from forcegrasp.cli.results import default_out, need, print_table, progress_printer
+from forcegrasp.cli.verb import Verb
+from forcegrasp.config.verbs import AddConfig
 
-PURPOSE = "add an effect to a model, fit it again, and see the error fall"
 NOTES = """
   SET              the same as data=SET
   data=my_set      the grasps to fit to
@@ -15,12 +15,8 @@ NOTES = """
 """
 
 
-def main(arguments: list[str]) -> int:
-    """Runs the verb; returns the exit status."""
-    if any(a in ("-h", "--help") for a in arguments):
-        print(help_text("add", PURPOSE, NOTES, "SET"), end="")
-        return 0
-    config = compose("add", arguments)
+def run(config: AddConfig) -> None:
+    """Runs the verb."""
     data = need(config.data, "data", "my_set")
     old = need(config.model, "model", "model.yaml")
     need(config.effect, "effect", "backlash")
@@ -66,4 +62,13 @@ def main(arguments: list[str]) -> int:
         fit_report.add_sections(added, effect),
         loaded,
     )
-    return 0
+
+
+VERB = Verb(
+    "add",
+    "add an effect to a model, fit it again, and see the error fall",
+    run=run,
+    notes=NOTES,
+    schema=AddConfig,
+    positional=("data", "SET"),
+)

@@ -5,10 +5,10 @@ from __future__ import annotations
 import dataclasses
 from pathlib import Path
 
-from forcegrasp.cli.options import compose, help_text
 from forcegrasp.cli.results import default_out, need, print_table, progress_printer
+from forcegrasp.cli.verb import Verb
+from forcegrasp.config.verbs import CompareConfig
 
-PURPOSE = "show where a model fails on measured grasps, in units and as a multiple of the sensor noise"
 NOTES = """
   SET              the same as data=SET
   data=my_set      a folder with meta.yaml, grasps.csv and samples.csv (or samples.parquet); or, for a table of final
@@ -17,12 +17,8 @@ NOTES = """
 """
 
 
-def main(arguments: list[str]) -> int:
-    """Runs the verb; returns the exit status."""
-    if any(a in ("-h", "--help") for a in arguments):
-        print(help_text("compare", PURPOSE, NOTES, "SET"), end="")
-        return 0
-    config = compose("compare", arguments)
+def run(config: CompareConfig) -> None:
+    """Runs the verb."""
     data = need(config.data, "data", "my_set")
 
     from forcegrasp.cli.measuring import (
@@ -42,7 +38,7 @@ def main(arguments: list[str]) -> int:
     loaded = loading.load(data)
     if is_table(loaded):
         report_table(loaded, "compare", out, model=config.model)
-        return 0
+        return
     model, loaded = take_model(Path(config.model), loaded) if config.model else (None, loaded)
     tell_warnings(loaded)
     found, used, notes = comparison.compare(loaded, model, config.seed, progress_printer())
@@ -63,4 +59,13 @@ def main(arguments: list[str]) -> int:
         comparison_report.sections(found, notes),
         loaded,
     )
-    return 0
+
+
+VERB = Verb(
+    "compare",
+    "show where a model fails on measured grasps, in units and as a multiple of the sensor noise",
+    run=run,
+    notes=NOTES,
+    schema=CompareConfig,
+    positional=("data", "SET"),
+)

@@ -8,14 +8,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from importlib.resources import files
 
+from forcegrasp.cli.verb import Verb
 from forcegrasp.errors import ConfigError, closest
 
-PURPOSE = "print a script that completes verbs, options and values in bash, zsh or fish"
 SHELLS = ("bash", "zsh", "fish")
-HELP = f"""forcegrasp completion: {PURPOSE}
-
-usage: forcegrasp completion [{"|".join(SHELLS)}]
-
+NOTES = """
 Once, and again when another version or other effects have been installed:
 
   bash    forcegrasp completion bash > ~/.local/share/bash-completion/completions/forcegrasp
@@ -32,35 +29,32 @@ CONTROLLERS = ("close", "force_pi", "informed", "nothing")
 FILES, SEVERAL = "@", ","
 
 
-def main(arguments: list[str]) -> int:
-    """Runs the verb; returns the exit status."""
-    if {"-h", "--help"} & set(arguments):
-        print(HELP, end="")
-        return 0
+def run(arguments: list[str]) -> None:
+    """Runs the verb."""
     if len(arguments) != 1:
         raise ConfigError(f"which shell? forcegrasp completion {'|'.join(SHELLS)}")
     if arguments[0] not in SHELLS:
         raise ConfigError(f"no completion for {arguments[0]!r}{closest(arguments[0], SHELLS)}")
     print(script(arguments[0]), end="")
-    return 0
 
 
 def script(shell: str) -> str:
     """The shell's script; ``forcegrasp/cli/completion.SHELL`` with what can be completed in it."""
-    from forcegrasp.cli.main import VERBS
+    from forcegrasp.cli.verbs import VERBS
 
     template = (files("forcegrasp.cli") / f"completion.{shell}").read_text("utf-8")
-    verbs = "\n".join(f"{verb}:{purpose.replace(':', ',')}" for verb, purpose in VERBS.items())
+    verbs = "\n".join(f"{verb.name}:{verb.purpose.replace(':', ',')}" for verb in VERBS.values())
     rows = "\n".join(" ".join(row) for row in table())
     return template.replace("@VERBS@", verbs.replace("'", "'\\''")).replace("@TABLE@", rows)
 
 
 def table() -> Iterator[list[str]]:
-    """Rows ``VERB KEY VALUE ...``: what may follow ``KEY=``, or stand plainly after the verb where the key is ``-``."""
-    from forcegrasp.cli.main import VERBS
-    from forcegrasp.cli.options import HYDRA_OPTIONS, LAUNCHERS, SCHEMAS, groups, leaves
+    """Rows ``VERB KEY VALUE ...``: what may follow ``KEY=``, or stand alone after the verb where the key is ``-``."""
+    from forcegrasp.cli.options import HYDRA_OPTIONS, LAUNCHERS, groups, leaves
+    from forcegrasp.cli.verbs import VERBS
     from forcegrasp.effects import catalogue
     from forcegrasp.models.model_file import SHIPPED
+    from forcegrasp.physics import shipped_grippers
     from forcegrasp.policies import shipped_policies
 
     policies, effects = [*shipped_policies(), *CONTROLLERS, FILES], list(catalogue())
@@ -70,21 +64,21 @@ def table() -> Iterator[list[str]]:
         "gripper": [*shipped_grippers(), FILES],
         "model": [SHIPPED, FILES],
         "objects": ["paper", FILES],
+        "shell": list(SHELLS),
     }
-    plain = {"effects": effects, "export": policies, "completion": list(SHELLS)}
-    for verb in VERBS:
-        flags = ["--help", *(["--all"] if verb in SCHEMAS else []), *(["-m"] if verb == "train" else [])]
-        options = list(leaves(SCHEMAS[verb])) if verb in SCHEMAS else []
-        takes_files = [FILES] if {"data", "folders"} & {name for name, _, _ in options} else []
-        yield [verb, "-", *flags, *plain.get(verb, takes_files)]
-        for name, entry, _ in options:
+    for verb in VERBS.values():
+        option, _ = verb.positional
+        flags = ["--help", *(["--all"] if verb.schema else []), *(["-m"] if verb.multirun else [])]
+        yield [verb.name, "-", *flags, *(named.get(option, [FILES]) if option else [])]
+        for name, entry, _ in leaves(verb.schema) if verb.schema else []:
             kind, choices = str(entry.type), entry.metadata["choices"]
             values = choices or {"bool": ["true", "false"]}.get(kind, [])
             if "str" in kind and not choices:
                 values = named.get(name, [FILES])
-            yield [verb, name, *([SEVERAL] if kind.startswith("list") else []), *values]
-        for group, choices in (groups(verb) if verb in SCHEMAS else {}).items():
-            yield [verb, group, *choices]
+            yield [verb.name, name, *([SEVERAL] if kind.startswith("list") else []), *values]
+        for group, choices in (groups(verb.name) if verb.schema else {}).items():
+            yield [verb.name, group, *choices]
+    yield ["effects", "gripper", *named["gripper"]]
     yield ["render", "policy", *policies]
     yield ["train", "resume", FILES]
     yield ["train", "hydra/launcher", *LAUNCHERS]
@@ -92,7 +86,10 @@ def table() -> Iterator[list[str]]:
         yield ["train", name, *([FILES] if name.endswith(".dir") else [])]
 
 
-def shipped_grippers() -> list[str]:
-    """Names of the grippers that come with the package: a description beside its scene."""
-    names = {file.name for file in files("forcegrasp.assets").iterdir()}
-    return sorted(name.removesuffix(".yaml") for name in names if name.replace(".yaml", ".xml") in names - {name})
+VERB = Verb(
+    "completion",
+    "print a script that completes verbs, options and values in bash, zsh or fish",
+    run=run,
+    notes=NOTES,
+    positional=("shell", "|".join(SHELLS)),
+)

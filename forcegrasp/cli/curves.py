@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from forcegrasp.cli.options import compose, help_text
+from forcegrasp.cli.verb import Verb
+from forcegrasp.config.verbs import CurvesConfig
 from forcegrasp.errors import ConfigError
 
-PURPOSE = "draw the learning curves of a sweep, mean and interval over seeds"
 NOTES = """
   FOLDER     a sweep's folder, a run's, or any folder with runs below it; several are drawn together
 
@@ -15,12 +15,8 @@ Runs that differ in nothing but the seed become one curve: the mean of the finis
 """
 
 
-def main(arguments: list[str]) -> int:
-    """Runs the verb; returns the exit status."""
-    if any(a in ("-h", "--help") for a in arguments):
-        print(help_text("curves", PURPOSE, NOTES, "FOLDER ..."), end="")
-        return 0
-    config = compose("curves", arguments)
+def run(config: CurvesConfig) -> None:
+    """Runs the verb."""
     folders = [Path(folder) for folder in config.folders]
     if not folders:
         raise ConfigError("which runs? forcegrasp curves runs/SWEEP")
@@ -32,4 +28,13 @@ def main(arguments: list[str]) -> int:
         learning_curves(folders, out)
     except OSError as error:
         raise ConfigError(f"out={out}: could not write ({error.strerror})") from error
-    return 0
+
+
+VERB = Verb(
+    "curves",
+    "draw the learning curves of a sweep, mean and interval over seeds",
+    run=run,
+    notes=NOTES,
+    schema=CurvesConfig,
+    positional=("folders", "FOLDER"),
+)

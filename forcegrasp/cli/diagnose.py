@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from forcegrasp.cli.options import compose, help_text
 from forcegrasp.cli.results import default_out, need, print_table, progress_printer
+from forcegrasp.cli.verb import Verb
+from forcegrasp.config.verbs import DiagnoseConfig
 
-PURPOSE = "find out which physical effect a model lacks, and which grasp to record next"
 NOTES = """
   SET              the same as data=SET
   data=my_set      a folder with meta.yaml, grasps.csv and samples.csv (or samples.parquet); or, for a table of final
@@ -22,12 +22,8 @@ NOTES = """
 """
 
 
-def main(arguments: list[str]) -> int:
-    """Runs the verb; returns the exit status."""
-    if any(a in ("-h", "--help") for a in arguments):
-        print(help_text("diagnose", PURPOSE, NOTES, "SET"), end="")
-        return 0
-    config = compose("diagnose", arguments)
+def run(config: DiagnoseConfig) -> None:
+    """Runs the verb."""
     data = need(config.data, "data", "my_set")
 
     from forcegrasp.cli.measuring import (
@@ -53,7 +49,7 @@ def main(arguments: list[str]) -> int:
     loaded = loading.load(data)
     if is_table(loaded):
         report_table(loaded, "diagnosis", out, model=config.model, effects=config.effects)
-        return 0
+        return
     tried = diagnose_set.chosen_effects(loaded.gripper, config.effects)
     model, loaded = take_model(Path(config.model), loaded) if config.model else (None, loaded)
     tell_warnings(loaded)
@@ -83,4 +79,13 @@ def main(arguments: list[str]) -> int:
         diagnosis_report.sections(diagnosis, advice, tried),
         loaded,
     )
-    return 0
+
+
+VERB = Verb(
+    "diagnose",
+    "find out which physical effect a model lacks, and which grasp to record next",
+    run=run,
+    notes=NOTES,
+    schema=DiagnoseConfig,
+    positional=("data", "SET"),
+)

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
+from forcegrasp.cli.verb import Verb
 from forcegrasp.errors import ConfigError
 
-PURPOSE = "check this installation and say what to do where something is wrong"
-HELP = f"""forcegrasp doctor: {PURPOSE}
-
-usage: forcegrasp doctor [--help]
-
-Looks at Python and packages, at the physics (one known grasp), the renderer of videos, cores, memory, disk, and at
-variables of the environment. A line each:
+NOTES = """
+Looks at Python and packages, at the physics (a grasp of each gripper that comes with the package), the renderer of
+videos, cores, memory, disk, and at variables of the environment. A line each:
 
   fine      as it should be
   note      good to know
@@ -21,11 +18,8 @@ Exit status: 0, or 1 if something must be mended.
 """
 
 
-def main(arguments: list[str]) -> int:
+def run(arguments: list[str]) -> int:
     """Runs the verb; returns the exit status."""
-    if {"-h", "--help"} & set(arguments):
-        print(HELP, end="")
-        return 0
     if arguments:
         raise ConfigError(f"doctor takes no options, not {' '.join(arguments)!r}; see forcegrasp doctor --help")
     from forcegrasp.doctor import examine
@@ -38,3 +32,13 @@ def main(arguments: list[str]) -> int:
     warnings = f" ({odd} warning{'s'[: odd != 1]})" if odd else ""
     print(f"{bad} thing{'s'[: bad != 1]} to mend{warnings}" if bad else f"all that is needed is fine{warnings}")
     return int(bad > 0)
+
+
+VERB = Verb(
+    "doctor",
+    "check this installation and say what to do where something is wrong",
+    run=run,
+    notes=NOTES,
+    usage="[--help]",
+    needs_mujoco=False,
+)

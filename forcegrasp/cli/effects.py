@@ -6,49 +6,72 @@ import inspect
 import textwrap
 from typing import TYPE_CHECKING
 
-from forcegrasp.errors import ConfigError
+from forcegrasp.cli.verb import Verb
+from forcegrasp.errors import ConfigError, closest
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from forcegrasp.effects import Effect, Parameter
 
-PURPOSE = "list the physical effects that a simulator may lack, or explain one"
-HELP = f"""forcegrasp effects: {PURPOSE}
-
-usage: forcegrasp effects [NAME]
-
+NOTES = """
   without a name   every effect by stage: symptom, and parameters with unit, bounds and a size worth noticing
   NAME             one in full: formula, source, variants, what looks like it, and what separates them
+  gripper=GRIPPER  as that gripper has them, by name or the path of a description: as many parameters as it has motors
+                   or force readings, in its units, with its sizes; without it those of the catalogue
 
 examples
   forcegrasp effects
   forcegrasp effects backlash
+  forcegrasp effects backlash gripper=so101_gripper
 
 Other packages add effects under the entry point group forcegrasp.effects. Pictures of the symptoms: docs/effects/.
 """
 WIDTH = 110
 
 
-def main(arguments: list[str]) -> int:
-    """Runs the verb; returns the exit status."""
-    if {"-h", "--help"} & set(arguments):
-        print(HELP, end="")
-        return 0
-    from forcegrasp.effects import get_effect
+def run(arguments: list[str]) -> None:
+    """Runs the verb."""
+    from forcegrasp.effects import catalogue, get_effect
 
-    if len(arguments) > 1:
-        raise ConfigError(f"effects: one name at a time, not {' '.join(arguments)!r}; see forcegrasp effects --help")
-    print(in_full(get_effect(arguments[0])) if arguments else overview(), end="")
-    return 0
+    names, given = [], []
+    for argument in arguments:
+        key, equals, value = argument.partition("=")
+        if equals and key != "gripper":
+            raise ConfigError(f"no option {key!r}{closest(key, ['gripper'])}")
+        (given if equals else names).append(value if equals else argument)
+    for what, several in (("name", names), ("gripper", given)):
+        if len(several) > 1:
+            raise ConfigError(
+                f"effects: one {what} at a time, not {' '.join(several)!r}; see forcegrasp effects --help"
+            )
+    if not given:
+        print(in_full(get_effect(names[0])) if names else overview(catalogue().values()), end="")
+        return
+    from forcegrasp.effects.for_gripper import effect_of, effects_of
+    from forcegrasp.physics import load_gripper
+
+    gripper = load_gripper(given[0])
+    if names:
+        print(in_full(effect_of(names[0], gripper)), end="")
+        return
+    known = effects_of(gripper)
+    left_out = ", ".join(name for name in catalogue() if name not in known)
+    print(overview(known.values()), end="")
+    if left_out:
+        print(
+            f"Left out, as they need more force readings than {gripper.name} has ({len(gripper.forces)}): {left_out}."
+        )
 
 
-def overview() -> str:
-    """Every effect by stage, with its symptom and parameters."""
-    from forcegrasp.effects import STAGES, catalogue
+def overview(effects: Iterable[type[Effect]]) -> str:
+    """The effects by stage, with their symptoms and parameters."""
+    from forcegrasp.effects import STAGES
 
-    lines = []
+    lines, effects = [], list(effects)
     for stage in STAGES:
         lines += ["", stage] if lines else [stage]
-        for effect in catalogue().values():
+        for effect in effects:
             if effect.stage == stage:
                 lines += ["", f"  {effect.name}", *_wrapped(effect.symptom)]
                 lines += [_parameter(p) for p in effect.parameters]
@@ -88,3 +111,13 @@ def _parameter(p: Parameter, indent: int = 4) -> str:
 
 def _wrapped(text: str, indent: int = 4) -> list[str]:
     return textwrap.wrap(text, WIDTH, initial_indent=" " * indent, subsequent_indent=" " * indent)
+
+
+VERB = Verb(
+    "effects",
+    "list the physical effects that a simulator may lack, or explain one",
+    run=run,
+    notes=NOTES,
+    positional=("effect", "NAME"),
+    usage="[gripper=GRIPPER]",
+)

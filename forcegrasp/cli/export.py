@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from forcegrasp.cli.measuring import check_folder
-from forcegrasp.cli.options import compose, help_text
 from forcegrasp.cli.results import default_out
+from forcegrasp.cli.verb import Verb
+from forcegrasp.config.verbs import ExportConfig
 from forcegrasp.errors import ConfigError
 
-PURPOSE = "write a trained policy as a folder that runs on a robot, without torch"
 NOTES = """
   RUN        a run directory of forcegrasp train, the name of a policy that comes with the package, or force_pi,
              the hand-written controller
@@ -18,12 +18,8 @@ contract.json alone, without that extra; gripper= says for which gripper.
 """
 
 
-def main(arguments: list[str]) -> int:
-    """Runs the verb; returns the exit status."""
-    if any(a in ("-h", "--help") for a in arguments):
-        print(help_text("export", PURPOSE, NOTES, "RUN"), end="")
-        return 0
-    config = compose("export", arguments)
+def run(config: ExportConfig) -> None:
+    """Runs the verb."""
     if not config.run.strip():
         raise ConfigError("which run? forcegrasp export runs/RUN")
     out = check_folder(default_out("export", config.out))
@@ -40,4 +36,13 @@ def main(arguments: list[str]) -> int:
         print(f"{out}: policy.onnx and contract.json ({done.contract})")
         print(f"acts like the policy in torch: to {done.difference:.1g} over {CHECKS} random observations")
     print(f"a step takes {done.step_us:.0f} µs here (median of {CHECKS})")
-    return 0
+
+
+VERB = Verb(
+    "export",
+    "write a trained policy as a folder that runs on a robot, without torch",
+    run=run,
+    notes=NOTES,
+    schema=ExportConfig,
+    positional=("run", "RUN"),
+)

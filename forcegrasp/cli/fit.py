@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from forcegrasp.cli.options import compose, help_text
 from forcegrasp.cli.results import default_out, need, print_table, progress_printer
+from forcegrasp.cli.verb import Verb
+from forcegrasp.config.verbs import FitConfig
 
-PURPOSE = "fit a gripper's base model to measured grasps and write it as a file"
 NOTES = """
   SET              the same as data=SET
   data=my_set      a folder with meta.yaml, grasps.csv and samples.csv (or samples.parquet)
@@ -13,12 +13,8 @@ NOTES = """
 """
 
 
-def main(arguments: list[str]) -> int:
-    """Runs the verb; returns the exit status."""
-    if any(a in ("-h", "--help") for a in arguments):
-        print(help_text("fit", PURPOSE, NOTES, "SET"), end="")
-        return 0
-    config = compose("fit", arguments)
+def run(config: FitConfig) -> None:
+    """Runs the verb."""
     data = need(config.data, "data", "my_set")
 
     from forcegrasp.cli.measuring import (
@@ -53,4 +49,13 @@ def main(arguments: list[str]) -> int:
         fit_report.fit_sections(base, target, model),
         loaded,
     )
-    return 0
+
+
+VERB = Verb(
+    "fit",
+    "fit a gripper's base model to measured grasps and write it as a file",
+    run=run,
+    notes=NOTES,
+    schema=FitConfig,
+    positional=("data", "SET"),
+)

@@ -1,4 +1,4 @@
-"""``forcegrasp VERB [key=value ...]``. Verbs are imported only when used, so that help comes up at once."""
+"""``forcegrasp VERB [key=value ...]``. What a verb needs is imported when it runs, so that help comes up at once."""
 
 from __future__ import annotations
 
@@ -7,24 +7,11 @@ import os
 import sys
 
 from forcegrasp import __version__
+from forcegrasp.cli.help import help_text
+from forcegrasp.cli.options import compose
 from forcegrasp.cli.terminal import in_a_line, show_everything
+from forcegrasp.cli.verbs import VERBS
 from forcegrasp.errors import ForcegraspError, closest
-
-VERBS = {
-    "record": "make a measurement set from the simulator, with effects hidden in it if you like",
-    "compare": "show where a model fails on measured grasps, in units and as a multiple of the sensor noise",
-    "fit": "fit a gripper's base model to measured grasps and write it as a file",
-    "diagnose": "find out which physical effect a model lacks, and which grasp to record next",
-    "add": "add an effect to a model, fit it again, and see the error fall",
-    "train": "learn a grasp-force policy with PPO, or resume a run",
-    "evaluate": "compare policies and controllers on the same simulated grasps",
-    "curves": "draw the learning curves of a sweep, mean and interval over seeds",
-    "export": "write a trained policy as a folder that runs on a robot, without torch",
-    "render": "play one grasp and show it as a video: the scene, the forces, the object's displacement",
-    "effects": "list the physical effects that a simulator may lack, or explain one",
-    "doctor": "check this installation and say what to do where something is wrong",
-    "completion": "print a script that completes verbs, options and values in bash, zsh or fish",
-}
 
 USAGE = """forcegrasp {version}: simulate tactile grasping, train grasp-force controllers, compare them
 
@@ -63,25 +50,29 @@ def main(arguments: list[str] | None = None) -> int:
     show_everything()
     arguments = sys.argv[1:] if arguments is None else arguments
     if not arguments or arguments[0] in ("-h", "--help", "help"):
-        verbs = "\n".join(f"  {name:<11} {what}" for name, what in VERBS.items())
+        verbs = "\n".join(f"  {verb.name:<11} {verb.purpose}" for verb in VERBS.values())
         print(USAGE.format(version=__version__, verbs=verbs), end="")
         return 0 if arguments else 2
     if arguments[0] == "--version":
         print(__version__)
         return 0
-    verb, *rest = arguments
+    name, *rest = arguments
     if "--all" in rest:
         rest.append("--help")  # --all alone asks for all of the help, too
     try:
-        if verb not in VERBS:
-            raise ForcegraspError(f"no verb {verb!r}{closest(verb, VERBS)}")
+        if name not in VERBS:
+            raise ForcegraspError(f"no verb {name!r}{closest(name, VERBS)}")
         for argument in rest:
             if argument != in_a_line(argument):
                 told = "a line break, a control character, or bytes that are no text in this locale"
                 raise ForcegraspError(f"{argument!r}: has {told}; rename what it names")
-        if verb not in ("doctor", "completion") and not {"-h", "--help"} & set(rest):
+        verb = VERBS[name]
+        if {"-h", "--help"} & set(rest):
+            print(help_text(verb, everything="--all" in rest), end="")
+            return 0
+        if verb.needs_mujoco:
             import_mujoco()
-        return importlib.import_module(f"forcegrasp.cli.{verb}").main(rest)
+        return verb.run(rest if verb.reads_arguments else compose(name, rest)) or 0
     except ImportError as error:
         if (error.name or "").startswith("forcegrasp"):
             raise  # a fault of this project's, not of the installation

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from forcegrasp.cli.options import compose, help_text
 from forcegrasp.cli.results import default_out
+from forcegrasp.cli.verb import Verb
+from forcegrasp.config.verbs import RecordConfig
 from forcegrasp.errors import ConfigError
 
-PURPOSE = "make a measurement set from the simulator, with effects hidden in it if you like"
 NOTES = """
   "effects=[backlash,'force_lag time_constant_s=0.1']"
                    effects of a typical size, or of the size given; forcegrasp effects lists them. The set does not tell
@@ -14,12 +14,8 @@ NOTES = """
 """
 
 
-def main(arguments: list[str]) -> int:
-    """Runs the verb; returns the exit status."""
-    if any(a in ("-h", "--help") for a in arguments):
-        print(help_text("record", PURPOSE, NOTES), end="")
-        return 0
-    config = compose("record", arguments)
+def run(config: RecordConfig) -> None:
+    """Runs the verb."""
 
     from forcegrasp.measure import write_set
     from forcegrasp.models.variation import read_model_of, with_noise_of
@@ -54,4 +50,12 @@ def main(arguments: list[str]) -> int:
     )
     write_set(recorded.measured, out, config.samples)
     print(f"wrote {out}. See where the model fails: forcegrasp compare data={out}")
-    return 0
+
+
+VERB = Verb(
+    "record",
+    "make a measurement set from the simulator, with effects hidden in it if you like",
+    run=run,
+    notes=NOTES,
+    schema=RecordConfig,
+)

@@ -5,10 +5,10 @@ from __future__ import annotations
 import time
 from pathlib import Path
 
-from forcegrasp.cli.options import compose, help_text
+from forcegrasp.cli.verb import Verb
+from forcegrasp.config.verbs import RenderConfig
 from forcegrasp.errors import ConfigError
 
-PURPOSE = "play one grasp and show it as a video: the scene, the forces, the object's displacement"
 NOTES = """
   policy=NAME        a run directory, a shipped policy or a controller
   'policies=[A,B]'   several, on the same grasp, one below the other
@@ -17,12 +17,8 @@ What is not given of the grasp is drawn from the seed.
 """
 
 
-def main(arguments: list[str]) -> int:
-    """Runs the verb; returns the exit status."""
-    if any(a in ("-h", "--help") for a in arguments):
-        print(help_text("render", PURPOSE, NOTES, everything="--all" in arguments), end="")
-        return 0
-    config = compose("render", arguments)
+def run(config: RenderConfig) -> None:
+    """Runs the verb."""
     out = Path(config.out or f"runs/render_{time.strftime('%Y-%m-%d_%H-%M-%S')}.gif")
     if out.suffix.lower() != ".gif":
         raise ConfigError(f"out={out}: videos are written as GIF; name a file that ends with .gif")
@@ -35,4 +31,12 @@ def main(arguments: list[str]) -> int:
         render(config, out)
     except OSError as error:
         raise ConfigError(f"out={out}: could not write ({error.strerror})") from error
-    return 0
+
+
+VERB = Verb(
+    "render",
+    "play one grasp and show it as a video: the scene, the forces, the object's displacement",
+    run=run,
+    notes=NOTES,
+    schema=RenderConfig,
+)

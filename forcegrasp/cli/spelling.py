@@ -1,4 +1,4 @@
-"""Other ways to type an option: plainly, under its other name, or one value where a list is wanted."""
+"""Other ways to type an option: by its position, under its other name, or one value where a list is wanted."""
 
 from __future__ import annotations
 
@@ -7,20 +7,15 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+from forcegrasp.cli.verb import Verb
 from forcegrasp.errors import ConfigError
 
-#: What a verb takes without ``key=``: the option, and what it is called in a message.
-PLAIN = {
-    **dict.fromkeys(("compare", "fit", "diagnose", "add"), ("data", "set")),
-    "curves": ("folders", "folder"),
-    "export": ("run", "run"),
-}
 #: How else an option may be called, where a verb has it under the second name only.
 OTHER_NAMES = {"policy": "policies", "effect": "effects", "effects": "effect"}
 
 
 def spell_out(
-    verb: str, arguments: list[str], options: Mapping[str, Any], parse: Callable[[str], Any], sweep: bool = False
+    verb: Verb, arguments: list[str], options: Mapping[str, Any], parse: Callable[[str], Any], sweep: bool = False
 ) -> list[str]:
     """Returns the arguments as ``key=value``, with lists in brackets.
 
@@ -34,14 +29,14 @@ def spell_out(
     Raises:
       ConfigError: if one thing is given twice.
     """
-    plain = [a for a in arguments if verb in PLAIN and _is_plain(a)]
-    named = [_rename(a, options) for a in arguments if a not in plain]
-    _refuse_both_names(verb, arguments, options)
+    key, word = verb.positional
+    positional = [a for a in arguments if key and _is_positional(a)]
+    named = [_rename(a, options) for a in arguments if a not in positional]
+    _refuse_both_names(verb.name, arguments, options)
     lists = {name for name, default in options.items() if isinstance(default, (list, tuple))}
     spelled = [_bracket(a, parse, sweep) if a.partition("=")[0] in lists else a for a in named]
-    if not plain:
+    if not positional:
         return spelled
-    key, what = PLAIN[verb]
     given = [a for a in spelled if a.startswith(f"{key}=")]
     if key in lists:
         listed = [parse(a).value() for a in given]
@@ -49,15 +44,15 @@ def spell_out(
             raise ConfigError(
                 f"{' '.join(given)}: {key} are a list, written '{key}=[a,b]'; or give them without {key}="
             )
-        value = f"[{','.join(map(quote, [*plain, *(str(one) for value in listed for one in value)]))}]"
-    elif len(plain + given) > 1:
-        raise ConfigError(f"{verb}: one {what} at a time, not {' and '.join(plain + given)}")
+        value = f"[{','.join(map(quote, [*positional, *(str(one) for value in listed for one in value)]))}]"
+    elif len(positional + given) > 1:
+        raise ConfigError(f"{verb.name}: one {word.lower()} at a time, not {' and '.join(positional + given)}")
     else:
-        value = quote(plain[0])
+        value = quote(positional[0])
     return [*(a for a in spelled if a not in given), f"{key}={value}"]
 
 
-def _is_plain(argument: str) -> bool:
+def _is_positional(argument: str) -> bool:
     # Hydra names folders seed=0
     return Path(argument).is_dir() or ("=" not in argument and not argument.startswith("-"))
 

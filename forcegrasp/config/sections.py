@@ -50,6 +50,11 @@ class GraspConfig:
         low=-1e6,
         high=1e6,
     )
+    servo_gain: str = option(
+        "drawn",
+        "what stands in for b2 where it is left out: the gripper's range to draw from, or its nominal value",
+        choices=("drawn", "nominal"),
+    )
     radius_m: list[float] = of_gripper(
         [], "radius_m", "object radius; the paper's w_o", unit="m", source="paper, Table 2", low=1e-4, high=1
     )

@@ -94,7 +94,7 @@ class RecordConfig:
 class CompareConfig:
     """`forcegrasp compare`."""
 
-    data: str = option("", "folder of the measurement set; also given plainly, without data=")
+    data: str = option("", "folder of the measurement set; also given without data=")
     model: str = option("", "model file; the gripper's base model, fitted to the set, if empty")
     out: str = option("", "where to write report.html, compare.json and base_model.yaml; runs/compare_TIME if empty")
     seed: int = option(0, "seed of the fit's starts", low=0, high=2**31 - 1)
@@ -104,7 +104,7 @@ class CompareConfig:
 class FitConfig:
     """`forcegrasp fit`."""
 
-    data: str = option("", "folder of the measurement set; also given plainly, without data=")
+    data: str = option("", "folder of the measurement set; also given without data=")
     out: str = option("", "model file to write; runs/fit_TIME/model.yaml if empty")
     seed: int = option(0, "seed of the fit's starts", low=0, high=2**31 - 1)
 
@@ -113,7 +113,7 @@ class FitConfig:
 class DiagnoseConfig:
     """`forcegrasp diagnose`."""
 
-    data: str = option("", "folder of the measurement set; also given plainly, without data=")
+    data: str = option("", "folder of the measurement set; also given without data=")
     model: str = option("", "model file to start from; the base model is fitted to the set if empty")
     out: str = option("", "where to write report.html, diagnosis.json and models; runs/diagnose_TIME if empty")
     effects: list[str] = option([], "effects to consider; all of the catalogue if empty")
@@ -124,7 +124,7 @@ class DiagnoseConfig:
 class AddConfig:
     """`forcegrasp add`."""
 
-    data: str = option("", "folder of the measurement set; also given plainly, without data=")
+    data: str = option("", "folder of the measurement set; also given without data=")
     model: str = option("", "model file to add to")
     effect: str = option("", "effect to add, see forcegrasp effects")
     out: str = option("", "model file to write; runs/add_TIME/model.yaml if empty")
@@ -172,7 +172,7 @@ class EvaluateConfig:
 class CurvesConfig:
     """`forcegrasp curves`."""
 
-    folders: list[str] = option([], "folders with runs in or below them; also given plainly, without folders=")
+    folders: list[str] = option([], "folders with runs in or below them; also given without folders=")
     out: str = option("", "where to write curves.png and curves.json; the first folder if empty")
 
 
@@ -180,7 +180,7 @@ class CurvesConfig:
 class ExportConfig:
     """`forcegrasp export`."""
 
-    run: str = option("", "run directory or shipped policy, or force_pi; also given plainly, without run=")
+    run: str = option("", "run directory or shipped policy, or force_pi; also given without run=")
     out: str = option("", "folder to write; must not exist or be empty; runs/export_TIME if empty")
     gripper: str = option(
         "", "gripper of force_pi by name, or the path of a description; the paper's if empty. A run has its own"

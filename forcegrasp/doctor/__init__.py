@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 
+from forcegrasp.doctor.environment_variables import check_mujoco_gl, check_python_path
 from forcegrasp.doctor.finding import LEVELS, Finding, warning
 from forcegrasp.doctor.installation import check_data, check_installation
 from forcegrasp.doctor.machine import check_cores, check_memory, check_runs_folder
@@ -19,7 +20,6 @@ from forcegrasp.doctor.packages import (
     check_torch_family,
 )
 from forcegrasp.doctor.physics import check_physics, check_renderer
-from forcegrasp.doctor.surroundings import check_mujoco_gl, check_python_path
 
 __all__ = ["CHECKS", "LEVELS", "Check", "Finding", "examine"]
 

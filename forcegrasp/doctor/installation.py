@@ -13,12 +13,13 @@ from urllib.request import url2pathname
 
 import forcegrasp
 from forcegrasp.doctor.finding import Finding, fine, mend, warning
+from forcegrasp.doctor.known_grasps import known_grasps
 from forcegrasp.doctor.packages import installed
 
 #: Files that the code reads, by package; some of each kind.
 DATA = {
     "conf": ("train.yaml", "evaluate.yaml", "experiment/ib.yaml", "budget/quick.yaml"),
-    "assets": ("tiago.xml", "tiago.yaml"),
+    "assets": ("known_grasps.json",),
     "reports": ("report.html",),
 }
 AGAIN = "install it again: pip install . in a checkout, or make setup"
@@ -61,16 +62,27 @@ def _newer(found: Distribution, pyproject: Path) -> set[str]:
     return {str(Requirement(text)) for text in asked} ^ {str(r) for r in known}
 
 
+def needed_files() -> dict[str, tuple[str, ...]]:
+    """:data:`DATA`, with scene and description of each gripper that comes with the package."""
+    try:
+        grippers = known_grasps()
+    except (OSError, ValueError):
+        return DATA
+    own = (f"{name}{suffix}" for name in grippers for suffix in (".xml", ".yaml"))
+    return {**DATA, "assets": (*DATA["assets"], *own)}
+
+
 def check_data() -> Iterator[Finding]:
-    """That presets, scene, report and policies came with the code."""
-    lost = [f"{package}/{name}" for package, names in DATA.items() for name in names if not _is_there(package, name)]
+    """That presets, grippers, report and policies came with the code."""
+    needed = needed_files()
+    lost = [f"{package}/{name}" for package, names in needed.items() for name in names if not _is_there(package, name)]
     if lost:
         yield mend("files", f"missing in the package: {', '.join(lost)}", AGAIN)
     policies = [e.name for e in files("forcegrasp.policies").iterdir() if (e / "config.yaml").is_file()]
     if not policies:
         yield warning("files", "no trained policy came with the package", "train one: forcegrasp train budget=quick")
     if policies and not lost:
-        yield fine("files", f"presets, scene and report; trained policies: {', '.join(sorted(policies))}")
+        yield fine("files", f"presets, grippers and report; trained policies: {', '.join(sorted(policies))}")
 
 
 def _is_there(package: str, name: str) -> bool:

@@ -5,31 +5,15 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Iterator
+from typing import Any
 
 from forcegrasp.doctor.child import run_python
 from forcegrasp.doctor.finding import Finding, fine, mend, note, warning
+from forcegrasp.doctor.known_grasps import TIERS, known_grasps
 
-#: Positions (m) and forces (N) of both fingers at the end of the grasp below; the first of ``tests/golden``.
-KNOWN = {
-    "reference": ((0.018816480, 0.018814660), (1.525113, 1.485271)),
-    "fast": ((0.018788274, 0.018788274), (1.521927, 1.486833)),
-}
-#: Rounding moves the reference tier's contact points a little from machine to machine, see ``tools/golden.py``.
-TOLERANCES = (2e-6, 0.03)
-#: Closes at full speed on a hard object and squeezes it.
-_GRASP = """
-import json
-import numpy as np
-from forcegrasp.physics import GraspParameters, GraspSimulator
-ends = {}
-for tier in ("reference", "fast"):
-    simulator = GraspSimulator(1, tier, threads=1)
-    simulator.reset(GraspParameters([0.0], [-9.0], [0.020], [0.0], [0.1]))
-    for _ in range(120):
-        simulator.step(np.full((1, 2), -0.003))
-    ends[tier] = simulator.joint_position[0].tolist(), simulator.force[0].tolist()
-print(json.dumps(ends))
-"""
+#: Rounding moves the reference tier's contact points a little from machine to machine, see ``tools/golden.py``:
+#: a share of the positions, and newtons.
+POSITION_TOLERANCE, FORCE_TOLERANCE_N = 1e-4, 0.03
 _RENDER = """
 import mujoco
 model = mujoco.MjModel.from_xml_string("<mujoco><worldbody><geom size='1'/></worldbody></mujoco>")
@@ -41,23 +25,31 @@ print("rendered")
 
 
 def check_physics() -> Iterator[Finding]:
-    """One grasp on both tiers, against known numbers."""
-    child = run_python("-c", _GRASP)
+    """One grasp of each gripper that comes with the package, on both tiers, against known numbers."""
+    known = known_grasps()
+    child = run_python("-c", "from forcegrasp.doctor.known_grasps import main; main()")
     if child.failure:
-        yield mend("physics", f"a grasp can't be simulated ({child.failure})", "see what is said of MuJoCo and imports")
+        about = next((name for name in known if f'"{name}"' not in child.output), "the package's grippers")
+        told = f"a grasp can't be simulated ({child.failure}, with {about})"
+        yield mend("physics", told, "see what is said of MuJoCo and imports")
         return
-    ends = json.loads(child.output)
-    wrong = []
-    for tier, known in KNOWN.items():
-        for end, right, tolerance, unit in zip(ends[tier], known, TOLERANCES, ("m", "N"), strict=True):
-            if not all(abs(a - b) <= tolerance for a, b in zip(end, right, strict=True)):
-                now, then = (" and ".join(f"{value:.6g}" for value in pair) for pair in (end, right))
-                wrong.append(f"{tier}: {now} {unit} instead of {then} {unit}")
+    found = json.loads(child.output)
+    wrong = [text for name in known for tier in TIERS for text in _unlike(name, tier, found[name], known[name])]
     if wrong:
-        told = f"a known grasp ends differently ({'; '.join(wrong)}), so results can't be compared"
+        told = f"known grasps end differently ({'; '.join(wrong)}), so results can't be compared"
         yield mend("physics", told, "install the version of MuJoCo that is needed, in a fresh environment")
     else:
-        yield fine("physics", f"a known grasp ends with {ends['reference'][1][0]:.3f} N, as it should")
+        forces = ", ".join(f"{name} with {now['reference'][1][0]:.3f} N" for name, now in found.items())
+        yield fine("physics", f"a known grasp of each gripper ends as it should: {forces}")
+
+
+def _unlike(name: str, tier: str, found: dict[str, Any], known: dict[str, Any]) -> Iterator[str]:
+    """How the end of a gripper's grasp differs from the known one."""
+    for now, right, unit in zip(found[tier], known[tier], (known["unit"], "N"), strict=True):
+        limits = [FORCE_TOLERANCE_N if unit == "N" else POSITION_TOLERANCE * abs(value) for value in right]
+        if not all(abs(a - b) <= limit for a, b, limit in zip(now, right, limits, strict=True)):
+            end, then = (" and ".join(f"{value:.6g}" for value in values) for values in (now, right))
+            yield f"{name}, {tier}: {end} {unit} instead of {then} {unit}"
 
 
 def check_renderer() -> Iterator[Finding]:

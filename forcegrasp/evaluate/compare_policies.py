@@ -16,10 +16,10 @@ from tensordict import TensorDictBase
 from forcegrasp.config import EvaluateConfig, RewardConfig
 from forcegrasp.env.episodes import METRICS, summarise
 from forcegrasp.evaluate.colours import policy_colours
-from forcegrasp.evaluate.contestants import gripper_of, load_contestants
 from forcegrasp.evaluate.grids import Grid, kappa_grid, object_grid, read_objects
 from forcegrasp.evaluate.page import write_page
 from forcegrasp.evaluate.plots import cell_boxes, force_traces
+from forcegrasp.evaluate.policies import gripper_of, load_policies
 from forcegrasp.evaluate.rollouts import roll_out
 from forcegrasp.evaluate.statistics import Bootstrap
 from forcegrasp.evaluate.summary import print_summary, simulator_notes
@@ -29,7 +29,7 @@ from forcegrasp.models.variation import read_model_of, with_noise_of
 from forcegrasp.physics import Gripper
 from forcegrasp.physics.completion import complete
 
-#: Figures of which more is better; of the others less is.
+#: Metrics of which more is better; of the others less is.
 _MORE_IS_BETTER = ("force_reward_normalised", "force_reward_paper", "force_reward_measured")
 
 
@@ -48,15 +48,15 @@ def evaluate(config: EvaluateConfig, out: str | Path, console: Console | None = 
     gripper = gripper_of(config.policies, config.gripper)
     model = read_model_of(gripper, config.model) if config.model else None
     config = complete(config, with_noise_of(gripper, model))
-    contestants = load_contestants(config.policies, gripper)
-    baseline = config.baseline if config.baseline in {c.name for c in contestants} else ""
-    grid, colours = _grid(config, gripper), policy_colours(c.name for c in contestants)
+    policies = load_policies(config.policies, gripper)
+    baseline = config.baseline if config.baseline in {c.name for c in policies} else ""
+    grid, colours = _grid(config, gripper), policy_colours(c.name for c in policies)
     out.mkdir(parents=True, exist_ok=True)
-    figures: dict[str, dict[str, np.ndarray]] = {}
+    metrics: dict[str, dict[str, np.ndarray]] = {}
     traces: dict[str, Figure] = {}
-    for contestant in track(contestants, description="evaluating", console=console, transient=True):
+    for evaluated in track(policies, description="evaluating", console=console, transient=True):
         episodes = roll_out(
-            contestant.policy,
+            evaluated.policy,
             grid.grasps,
             config.grasp,
             config.seed,
@@ -65,13 +65,13 @@ def evaluate(config: EvaluateConfig, out: str | Path, console: Console | None = 
             sensors=config.sensors,
             model=model,
             reward=RewardConfig(speed_threshold_m=config.speed_threshold_m),
-            action=contestant.action,
-            observation=contestant.observation,
+            action=evaluated.action,
+            observation=evaluated.observation,
         )
         summary = summarise(episodes, config.sensors, gripper.period_s)
-        figures[contestant.name] = {k: v.double().numpy().reshape(len(grid.cells), -1) for k, v in summary.items()}
-        traces[contestant.name] = force_traces(
-            _spread(episodes), contestant.name, colours[contestant.name], gripper.period_s
+        metrics[evaluated.name] = {k: v.double().numpy().reshape(len(grid.cells), -1) for k, v in summary.items()}
+        traces[evaluated.name] = force_traces(
+            _spread(episodes), evaluated.name, colours[evaluated.name], gripper.period_s
         )
     report = {
         "seed": config.seed,
@@ -83,13 +83,13 @@ def evaluate(config: EvaluateConfig, out: str | Path, console: Console | None = 
         "what": grid.what,
         "cells": grid.cells,
         "baseline": baseline,
-        "notes": simulator_notes(config.model, contestants),
-        "policies": _describe(figures, baseline, config.seed),
+        "notes": simulator_notes(config.model, policies),
+        "policies": _describe(metrics, baseline, config.seed),
     }
     (out / "tables.md").write_text(markdown(report), "utf-8")
     (out / "evaluation.json").write_text(json.dumps(report, indent=1, ensure_ascii=False) + "\n", "utf-8")
-    _write_trials(out / "trials.csv", grid, figures)
-    boxes = _boxes(figures, grid, config.grasp.steps)
+    _write_trials(out / "trials.csv", grid, metrics)
+    boxes = _boxes(metrics, grid, config.grasp.steps)
     for name, figure in boxes.items():
         figure.savefig(out / f"{name}.png", dpi=130)
     for name, figure in traces.items():
@@ -101,10 +101,10 @@ def evaluate(config: EvaluateConfig, out: str | Path, console: Console | None = 
     return report
 
 
-def _boxes(figures: dict[str, dict[str, np.ndarray]], grid: Grid, steps: int) -> dict[str, Figure]:
+def _boxes(metrics: dict[str, dict[str, np.ndarray]], grid: Grid, steps: int) -> dict[str, Figure]:
     """Box plots by the name of their file."""
-    rewards = {name: values["force_reward_normalised"] for name, values in figures.items()}
-    moved = {name: np.maximum(values["displacement_total_mm"], 1e-3) for name, values in figures.items()}
+    rewards = {name: values["force_reward_normalised"] for name, values in metrics.items()}
+    moved = {name: np.maximum(values["displacement_total_mm"], 1e-3) for name, values in metrics.items()}
     return {
         "force_reward": cell_boxes(rewards, grid.cells, grid.what, f"force reward of an episode ({steps} at best)"),
         "displacement": cell_boxes(moved, grid.cells, grid.what, "object moved in all [mm]", log=True),
@@ -123,26 +123,26 @@ def _spread(episodes: TensorDictBase, count: int = 6) -> TensorDictBase:
     return episodes[torch.linspace(0, len(episodes) - 1, count).long()]
 
 
-def _describe(figures: dict[str, dict[str, np.ndarray]], baseline: str, seed: int) -> dict[str, dict]:
-    cells, trials = next(iter(next(iter(figures.values())).values())).shape
+def _describe(metrics: dict[str, dict[str, np.ndarray]], baseline: str, seed: int) -> dict[str, dict]:
+    cells, trials = next(iter(next(iter(metrics.values())).values())).shape
     bootstrap = Bootstrap(cells, trials, seed)
     described = {}
-    for name, values in figures.items():
-        described[name] = {figure: bootstrap.describe(v) for figure, v in values.items()}
-        for figure, v in values.items() if baseline and name != baseline else ():
-            sign = 1 if figure in _MORE_IS_BETTER else -1
-            better = bootstrap.improvement(sign * v, sign * figures[baseline][figure])
-            described[name][figure]["improvement"] = better
+    for name, values in metrics.items():
+        described[name] = {metric: bootstrap.describe(v) for metric, v in values.items()}
+        for metric, v in values.items() if baseline and name != baseline else ():
+            sign = 1 if metric in _MORE_IS_BETTER else -1
+            better = bootstrap.improvement(sign * v, sign * metrics[baseline][metric])
+            described[name][metric]["improvement"] = better
     return described
 
 
-def _write_trials(path: Path, grid: Grid, figures: dict[str, dict[str, np.ndarray]]) -> None:
+def _write_trials(path: Path, grid: Grid, metrics: dict[str, dict[str, np.ndarray]]) -> None:
     columns = ["policy", "cell", "kappa", "b2", "radius_m", "offset_m", "goal_force_n", *METRICS]
     cells = np.repeat(grid.cells, grid.trials)
     with open(path, "w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file)
         writer.writerow(columns)
-        for name, values in figures.items():
-            per_trial = np.stack([values[figure].reshape(-1) for figure in METRICS], axis=1)
+        for name, values in metrics.items():
+            per_trial = np.stack([values[metric].reshape(-1) for metric in METRICS], axis=1)
             for cell, grasp, row in zip(cells, grid.grasps.as_array(), per_trial, strict=True):
                 writer.writerow([name, cell, *(f"{x:.9g}" for x in grasp), *(f"{x:.6g}" for x in row)])

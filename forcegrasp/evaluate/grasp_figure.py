@@ -55,7 +55,7 @@ def describe(episode: TensorDictBase) -> str:
     kappa, b2, radius, offset, goal = episode["grasp_parameters"][0].tolist()
     return (
         f"softness κ {kappa:.2f} · radius {radius * 1e3:.1f} mm · offset {offset * 1e3:+.1f} mm"
-        f" · goal {goal:.2f} N · b₂ {b2:.1f}"
+        f" · goal {goal:.2f} N · b₂ {b2:.3g}"
     )
 
 
@@ -97,11 +97,11 @@ def _draw_displacement(axes: Axes, episode: TensorDictBase, colour: str, period_
 
 def _mark_phases(forces: Axes, moved: Axes, episode: TensorDictBase, sensors: SensorConfig, period_s: float) -> None:
     sensors = complete(sensors, default_gripper())
-    figures = summarise(episode[None], sensors, period_s)
+    metrics = summarise(episode[None], sensors, period_s)
     end = len(episode) * period_s
     top = 1.0
-    for figure, text in (("first_contact_s", "first contact"), ("both_contact_s", "both in contact")):
-        time = float(figures[figure][0])
+    for metric, text in (("first_contact_s", "first contact"), ("both_contact_s", "both in contact")):
+        time = float(metrics[metric][0])
         if time >= end:
             continue
         for axes in (forces, moved):

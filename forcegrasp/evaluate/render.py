@@ -8,9 +8,9 @@ import torch
 
 from forcegrasp.config import GraspConfig, RenderConfig
 from forcegrasp.env.episodes import summarise
-from forcegrasp.evaluate.contestants import gripper_of, load_contestants
 from forcegrasp.evaluate.grasp_figure import describe
 from forcegrasp.evaluate.one_grasp import draw_one_grasp
+from forcegrasp.evaluate.policies import gripper_of, load_policies
 from forcegrasp.evaluate.rollouts import roll_out
 from forcegrasp.evaluate.video import grasp_video
 from forcegrasp.models.variation import read_model_of, with_noise_of
@@ -18,7 +18,7 @@ from forcegrasp.physics.completion import complete
 
 
 def render(config: RenderConfig, out: str | Path) -> dict[str, dict[str, float]]:
-    """Writes the video and prints what happened; returns every policy's figures of the episode.
+    """Writes the video and prints what happened; returns every policy's metrics of the episode.
 
     Raises:
       ConfigError, CheckpointError, PhysicsError: with what to do about it.
@@ -31,8 +31,8 @@ def render(config: RenderConfig, out: str | Path) -> dict[str, dict[str, float]]
     config = complete(config, with_noise_of(gripper, model))
     grasp = draw_one_grasp(config, gripper)
     episodes = {
-        contestant.name: roll_out(
-            contestant.policy,
+        evaluated.name: roll_out(
+            evaluated.policy,
             grasp,
             GraspConfig(steps=config.steps),
             config.seed,
@@ -40,30 +40,30 @@ def render(config: RenderConfig, out: str | Path) -> dict[str, dict[str, float]]
             physics=config.physics,
             sensors=config.sensors,
             model=model,
-            action=contestant.action,
-            observation=contestant.observation,
+            action=evaluated.action,
+            observation=evaluated.observation,
         )[0]
-        for contestant in load_contestants(config.policies, gripper)
+        for evaluated in load_policies(config.policies, gripper)
     }
     data = grasp_video(episodes, config.sensors, gripper=gripper)
     out.parent.mkdir(parents=True, exist_ok=True)
     out.write_bytes(data)
     found = {
         name: {
-            figure: float(value[0])
-            for figure, value in summarise(episode[None], config.sensors, gripper.period_s).items()
+            metric: float(value[0])
+            for metric, value in summarise(episode[None], config.sensors, gripper.period_s).items()
         }
         for name, episode in episodes.items()
     }
     print(describe(next(iter(episodes.values()))))
-    for name, figures in found.items():
-        touched = figures["both_contact_s"]
+    for name, metrics in found.items():
+        touched = metrics["both_contact_s"]
         never = touched >= config.steps * gripper.period_s
         when = "never in both fingers" if never else f"in both fingers after {touched:.2f} s"
         print(
-            f"{name}: force reward {figures['force_reward_normalised']:.1f} of {config.steps}, {when},"
-            f" object moved {figures['displacement_until_grasped_mm']:.3f} mm until then,"
-            f" {figures['displacement_total_mm']:.3f} mm in all"
+            f"{name}: force reward {metrics['force_reward_normalised']:.1f} of {config.steps}, {when},"
+            f" object moved {metrics['displacement_until_grasped_mm']:.3f} mm until then,"
+            f" {metrics['displacement_total_mm']:.3f} mm in all"
         )
     print(f"video: {out}")
     return found

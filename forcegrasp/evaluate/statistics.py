@@ -1,4 +1,4 @@
-"""What can be said about a figure from a number of trials: means, interquartile means, and how sure they are.
+"""What can be said about a metric from a number of trials: means, interquartile means, and how sure they are.
 
 Intervals are 95 % percentile bootstrap intervals, stratified: trials are drawn anew within each cell (a softness value,
 an object), never across cells (Agarwal et al. 2021, *Deep RL at the edge of the statistical precipice*).
@@ -13,7 +13,7 @@ RESAMPLES = 1000
 
 
 class Bootstrap:
-    """The same resamples for every figure and policy, which also makes all of it repeatable.
+    """The same resamples for every metric and policy, which also makes all of it repeatable.
 
     Args:
       cells: number of strata.

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from rich.console import Console
 
-from forcegrasp.evaluate.contestants import Contestant
+from forcegrasp.evaluate.policies import EvaluatedPolicy
 from forcegrasp.evaluate.tables import Sheet, half_interval, print_sheet, print_short, sheets
 
 REWARD = "force_reward_normalised"
@@ -22,14 +22,14 @@ def print_summary(report: dict, console: Console, detail: bool) -> None:
         print_sheet(sheet, console)
 
 
-def simulator_notes(model: str, contestants: Sequence[Contestant]) -> list[str]:
+def simulator_notes(model: str, policies: Sequence[EvaluatedPolicy]) -> list[str]:
     """A line for each policy that was trained with a model and is judged without one."""
     if model:
         return []
     return [
         f"{one.name} was trained with the model {one.model}, but is judged here on the nominal gripper"
         + (f"; to judge it on its own: model={one.model_file}" if one.model_file else "")
-        for one in contestants
+        for one in policies
         if one.model
     ]
 
@@ -43,7 +43,7 @@ def sentences(report: dict) -> list[str]:
     found = [
         f"{cells * report['trials']} grasps, the same for every policy: {cells} {kind} × {report['trials']}. Simulated:"
         f" {gripper}, physics={report['physics']}.",
-        _ranking({name: figures[REWARD] for name, figures in policies.items()}, report["steps"]),
+        _ranking({name: metrics[REWARD] for name, metrics in policies.items()}, report["steps"]),
     ]
     if cells > 1:
         found.append(f"Weakest: {', '.join(_weakest(n, f[REWARD], report, by_object) for n, f in policies.items())}.")
@@ -79,11 +79,11 @@ def short_sheet(report: dict) -> Sheet:
     judged = report["baseline"] and len(report["policies"]) > 1
     last = ("reward,\nmeasured", "force_reward_measured") if report["model"] else ("goal\nafter [s]", "reach_s")
     rows = []
-    for name, figures in report["policies"].items():
-        moved = f"{figures['displacement_until_grasped_mm']['mean']:.3f}"
-        row = [name, half_interval(figures[REWARD], 1), moved, f"{figures['overshoot_percent']['mean']:.0f}"]
-        row.append(half_interval(figures[last[1]], 1 if report["model"] else 2))
-        rows.append([*row, _probability(figures[REWARD].get("improvement"))] if judged else row)
+    for name, metrics in report["policies"].items():
+        moved = f"{metrics['displacement_until_grasped_mm']['mean']:.3f}"
+        row = [name, half_interval(metrics[REWARD], 1), moved, f"{metrics['overshoot_percent']['mean']:.0f}"]
+        row.append(half_interval(metrics[last[1]], 1 if report["model"] else 2))
+        rows.append([*row, _probability(metrics[REWARD].get("improvement"))] if judged else row)
     header = ["policy", "force\nreward", "moved\n[mm]", "over-\nshoot", last[0]]
     return Sheet("", [*header, "better than\nbaseline"] if judged else header, rows)
 

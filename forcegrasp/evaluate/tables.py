@@ -11,7 +11,7 @@ from rich.markup import escape
 from rich.table import Table
 
 _MEASURED = ("force_reward_measured", "normalised form, of measured forces", 1)
-#: Figures that are shown: name, heading, digits. The first ones, _BY_CELL, also cell by cell.
+#: Metrics that are shown: name, heading, digits. The first ones, _BY_CELL, also cell by cell.
 METRICS = (
     ("force_reward_normalised", "force reward, normalised form", 1),
     ("force_reward_paper", "force reward, paper's form", 1),
@@ -79,15 +79,15 @@ def sheets(report: dict) -> Iterator[Sheet]:
     policies = report["policies"]
     names = list(policies)
     # without a model the sensors say what is true
-    shown = [figure for figure in METRICS if figure != _MEASURED or report["model"]]
-    first = [figure for figure in shown if figure in METRICS[:_BY_CELL]]
+    shown = [metric for metric in METRICS if metric != _MEASURED or report["model"]]
+    first = [metric for metric in shown if metric in METRICS[:_BY_CELL]]
     yield Sheet(
         f"mean ± standard deviation; interquartile mean [its 95 % interval]; episodes of {report['steps']} steps",
         ["figure", *names],
-        [[heading, *(_overall(policies[name][figure], digits) for name in names)] for figure, heading, digits in shown],
+        [[heading, *(_overall(policies[name][metric], digits) for name in names)] for metric, heading, digits in shown],
     )
-    for figure, heading, digits in first:
-        cells = {name: policies[name][figure]["by_cell"] for name in names}
+    for metric, heading, digits in first:
+        cells = {name: policies[name][metric]["by_cell"] for name in names}
         yield Sheet(
             f"{heading}: mean ± half of its 95 % interval",
             [report["what"], *names],
@@ -104,8 +104,8 @@ def sheets(report: dict) -> Iterator[Sheet]:
             f"probability of being better than {report['baseline']} [95 % interval]",
             ["figure", *others],
             [
-                [heading, *(_probability(policies[name][figure]["improvement"]) for name in others)]
-                for figure, heading, _ in first
+                [heading, *(_probability(policies[name][metric]["improvement"]) for name in others)]
+                for metric, heading, _ in first
             ],
         )
 
@@ -113,9 +113,9 @@ def sheets(report: dict) -> Iterator[Sheet]:
 def _as_in_the_paper(report: dict) -> Sheet:
     """Rows and columns of the paper's Table 1."""
     rows = []
-    for name, figures in report["policies"].items():
-        for label, figure in (("reward", "force_reward_measured"), ("moved, mm", "displacement_total_mm")):
-            found = [*figures[figure]["by_cell"], figures[figure]]
+    for name, metrics in report["policies"].items():
+        for label, metric in (("reward", "force_reward_measured"), ("moved, mm", "displacement_total_mm")):
+            found = [*metrics[metric]["by_cell"], metrics[metric]]
             rows.append([f"{name}: {label}", *(f"{c['mean']:.1f} ± {c['std']:.1f}" for c in found)])
     return Sheet(
         "as in the paper's Table 1: mean ± standard deviation, reward of measured forces",

@@ -7,6 +7,7 @@ import shlex
 import stat
 from pathlib import Path
 
+from forcegrasp.assets import DEFAULT_GRIPPER
 from forcegrasp.errors import MeasurementError
 from forcegrasp.measure.schema import FORMAT
 
@@ -45,7 +46,7 @@ def _starter(path: Path) -> str:
     if path.name != "meta.yaml":
         return ""
     kind = "final_force" if (path.parent / "table.csv").exists() else "grasps"
-    text = f"format: {FORMAT}\\nkind: {kind}\\ngripper: tiago\\n"
+    text = f"format: {FORMAT}\\nkind: {kind}\\ngripper: {DEFAULT_GRIPPER}\\n"
     return f"; write it, with your gripper: printf '{text}' > {shlex.quote(show(path))}"
 
 

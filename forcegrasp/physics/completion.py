@@ -25,6 +25,10 @@ def _fill(config: Any, gripper: Gripper) -> None:
         if dataclasses.is_dataclass(value):
             _fill(value, gripper)
         elif name and is_left_out(value):
-            source = gripper if hasattr(gripper, name) else gripper.training
-            own: tuple[float, float] | float = getattr(source, name)
+            fixed = name == "servo_gain_range" and config.servo_gain == "nominal"
+            own = [gripper.nominal_gain] * 2 if fixed else _own(gripper, name)
             setattr(config, entry.name, list(own) if isinstance(own, tuple) else own)
+
+
+def _own(gripper: Gripper, name: str) -> tuple[float, ...] | float:
+    return getattr(gripper if hasattr(gripper, name) else gripper.training, name)

@@ -104,6 +104,12 @@ class Gripper(ShortRepr):
         return all(f.motor >= 0 and self.motors[f.motor].joint == f.joint for f in self.fingers) and self.unit == "m"
 
     @property
+    def nominal_gain(self) -> float:
+        """Nominal value of the servo gain that a training draws; 0 where it draws none."""
+        gain = self.training.servo_gain
+        return self.parameters[gain].nominal if gain else 0.0
+
+    @property
     def is_shipped(self) -> bool:
         """Whether it comes with the package, and so is known by its name."""
         return self.path.parent == shipped_folder()

@@ -162,10 +162,9 @@ class GraspSimulator:
 
 def nominal_grasps(gripper: Gripper, n: int) -> GraspParameters:
     """``n`` equal grasps: an object of middling softness and the description's radius in the middle."""
-    training, nominal = gripper.training, gripper.parameters
-    gain = nominal[training.servo_gain].nominal if training.servo_gain else 0.0
+    training, radius = gripper.training, gripper.parameters["radius_m"].nominal
     force = training.max_force_n * float(training.force_scale(0.5)) / 2
-    row = np.array([[0.5], [gain], [nominal["radius_m"].nominal], [0.0], [force]])
+    row = np.array([[0.5], [gripper.nominal_gain], [radius], [0.0], [force]])
     return GraspParameters(*np.broadcast_to(row, (5, n)))
 
 

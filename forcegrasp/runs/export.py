@@ -27,8 +27,8 @@ from forcegrasp.errors import ConfigError, DeployError
 from forcegrasp.physics import Gripper, load_gripper
 from forcegrasp.physics.completion import complete
 from forcegrasp.physics.gripper import NO_FORCES
+from forcegrasp.runs.config_file import fingerprint
 from forcegrasp.runs.policy import load_policy
-from forcegrasp.runs.run_dir import fingerprint
 
 #: The operator set that torch's exporter works in; any other would be converted.
 OPSET = 18

@@ -2,56 +2,28 @@
 
 from __future__ import annotations
 
-import csv
 import dataclasses
 import functools
-import hashlib
-import io
 import json
 import math
-import os
-import platform
-import subprocess
-import sys
 from contextlib import AbstractContextManager
-from importlib.metadata import version
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import yaml
-from omegaconf import OmegaConf
-from omegaconf.errors import OmegaConfBaseException
 from torch import Tensor
 
-from forcegrasp.config import TrainConfig, validate
-from forcegrasp.errors import CheckpointError, ConfigError
+from forcegrasp.config import TrainConfig
+from forcegrasp.errors import CheckpointError
 from forcegrasp.files import plain_yaml
 from forcegrasp.files.whole_file import write_whole
 from forcegrasp.models.model_file import Model, write_model
-from forcegrasp.models.variation import read_model_of, with_noise_of
+from forcegrasp.models.variation import read_model_of
 from forcegrasp.physics import load_gripper
-from forcegrasp.physics.completion import complete
-from forcegrasp.runs import checkpoint
+from forcegrasp.runs import checkpoint, metrics_file
+from forcegrasp.runs.config_file import MODEL, fingerprint, read_config
 from forcegrasp.runs.lock import only_writer
-
-_PACKAGES = ("torch", "torchrl", "tensordict", "mujoco", "gymnasium", "hydra-core", "numpy")
-
-
-def _refuse_interpolations(options: dict[str, Any], path: str = "") -> None:
-    """Raises ConfigError where a value asks for another one, such as a variable of the reader's environment."""
-    for name, value in options.items():
-        if isinstance(value, dict):
-            _refuse_interpolations(value, f"{path}{name}.")
-        elif "${" in str(value):
-            raise ConfigError(f"{path}{name}={value}: ${{...}} is not replaced in a file; write the value itself")
-
-
-def fingerprint(options: dict[str, Any]) -> str:
-    """Identifies a training by its options as config.yaml has them; checkpoints carry it.
-
-    Options that came into being after the run was made are not among them, so that old runs stay readable.
-    """
-    return hashlib.sha256(json.dumps(options, sort_keys=True).encode()).hexdigest()[:16]
+from forcegrasp.runs.provenance import provenance
 
 
 class RunDir:
@@ -61,7 +33,7 @@ class RunDir:
         self.path = Path(path)
         self.config_path = self.path / "config.yaml"
         self.metrics_path = self.path / "metrics.csv"
-        self.model_path = self.path / "model.yaml"
+        self.model_path = self.path / MODEL
         self.checkpoints = self.path / "checkpoints"
         self.best = self.checkpoints / "best.safetensors"
         self.tensorboard = self.path / "tensorboard"
@@ -86,7 +58,7 @@ class RunDir:
                 for folder in (run.checkpoints, run.tensorboard, run.figures):
                     folder.mkdir(parents=True, exist_ok=True)
                 run.model_path.unlink(missing_ok=True)  # of a run that is begun again: its source may have changed
-                facts = json.dumps(_provenance(config, overrides), indent=2) + "\n"
+                facts = json.dumps(provenance(config, overrides), indent=2) + "\n"
                 write_whole(run.path / "run.json", facts.encode())
                 text = yaml.safe_dump(dataclasses.asdict(config), sort_keys=False)
                 write_whole(run.config_path, text.encode())  # last: a folder without it is no run
@@ -151,21 +123,7 @@ class RunDir:
         Raises:
           CheckpointError: if config.yaml can't be read or holds unknown or invalid options.
         """
-        try:
-            loaded = plain_yaml.load(self.config_path)
-            if not isinstance(loaded, dict):  # text would be taken for more YAML
-                raise ConfigError("no options in it")
-            _refuse_interpolations(loaded)
-            merged = OmegaConf.merge(OmegaConf.structured(TrainConfig), loaded)
-            config = cast(TrainConfig, OmegaConf.to_object(merged))
-            validate(config)
-            gripper = load_gripper(config.gripper)
-            model = read_model_of(gripper, self.model_path) if config.model and self.model_path.exists() else None
-            config = complete(config, with_noise_of(gripper, model))
-        except (OSError, OmegaConfBaseException, ConfigError, ValueError) as error:
-            first_line = str(error).strip().splitlines()[0]
-            raise CheckpointError(f"{self.config_path}: not a valid configuration ({first_line})") from error
-        return config
+        return read_config(self.config_path)
 
     def save(
         self, frames: int, tensors: dict[str, Tensor], facts: dict[str, Any], keep: int, score: float | None = None
@@ -237,51 +195,9 @@ class RunDir:
         return sorted(self.checkpoints.glob("frames_*.safetensors"))
 
     def log_metrics(self, row: dict[str, float]) -> None:
-        """Appends a row to metrics.csv; the first row decides the columns."""
-        new = not self.metrics_path.exists()
-        with open(self.metrics_path, "a", encoding="utf-8", newline="") as file:
-            writer = csv.DictWriter(file, fieldnames=list(row))
-            if new:
-                writer.writeheader()
-            writer.writerow(row)
+        """Appends a row to metrics.csv, see :mod:`~forcegrasp.runs.metrics_file`."""
+        metrics_file.append_row(self.metrics_path, row)
 
     def drop_metrics_after(self, frames: int) -> None:
-        """Keeps the whole rows up to a checkpoint, so that a resumed run logs nothing twice and mends a torn line."""
-        if not self.metrics_path.exists():
-            return
-        with open(self.metrics_path, encoding="utf-8", newline="") as file:
-            header, *lines = list(csv.reader(file.read().replace("\0", "").splitlines())) or [[]]
-        kept = [line for line in lines if len(line) == len(header) and line[0].isdigit() and int(line[0]) <= frames]
-        if not kept:  # the header may be torn, too; the next row writes it anew
-            self.metrics_path.unlink()
-            return
-        text = io.StringIO(newline="")
-        csv.writer(text).writerows([header, *kept])
-        write_whole(self.metrics_path, text.getvalue().encode())
-
-
-def _provenance(config: TrainConfig, overrides: list[str]) -> dict[str, Any]:
-    return {
-        "command": ["forcegrasp", "train", *overrides],
-        "seed": config.seed,
-        "config": fingerprint(dataclasses.asdict(config)),
-        "git": _git_hash(),
-        "python": sys.version.split()[0],
-        "versions": {name: version(name) for name in _PACKAGES} | {"forcegrasp": version("forcegrasp")},
-        "machine": {"system": platform.platform(), "processor": platform.machine(), "cores": os.cpu_count()},
-    }
-
-
-def _git_hash() -> str | None:
-    """Commit of the source tree, with "+" where it has changes; None outside a checkout."""
-    root = Path(__file__).parents[2]
-    if not (root / ".git").exists():
-        return None
-
-    def git(*arguments: str) -> str:
-        return subprocess.run(["git", *arguments], cwd=root, capture_output=True, text=True, check=True).stdout.strip()
-
-    try:
-        return git("rev-parse", "HEAD") + ("+" if git("status", "--porcelain") else "")
-    except (OSError, subprocess.CalledProcessError):
-        return None
+        """Keeps the rows of metrics.csv up to a checkpoint."""
+        metrics_file.drop_rows_after(self.metrics_path, frames)

@@ -344,7 +344,7 @@ def test_ray_is_not_installed(sweep, folder, tiny, capsys, monkeypatch):
 
 
 def test_launcher_is_not_installed(folder, capsys, monkeypatch):
-    monkeypatch.setattr("forcegrasp.cli.train.find_spec", lambda name: None)
+    monkeypatch.setattr("forcegrasp.cli.sweep.find_spec", lambda name: None)
     before = contents(folder)
     assert main(["train", "-m", "seed=0,1", "hydra/launcher=submitit_slurm"]) == 2
     assert capsys.readouterr().err == (

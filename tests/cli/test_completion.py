@@ -9,12 +9,12 @@ from pathlib import Path
 
 import pytest
 
-from forcegrasp.cli.completion import CONTROLLERS, FILES, SEVERAL, SHELLS, script, shipped_grippers, table
+from forcegrasp.cli.completion import CONTROLLERS, FILES, SEVERAL, SHELLS, script, table
 from forcegrasp.cli.main import VERBS, main
 from forcegrasp.cli.options import SCHEMAS, groups, leaves
 from forcegrasp.controllers import CONTROLLERS as KNOWN_CONTROLLERS
 from forcegrasp.effects import catalogue
-from forcegrasp.physics.gripper_file import load_gripper
+from forcegrasp.physics import shipped_grippers
 from forcegrasp.policies import shipped_policies
 
 #: What is typed, and what may then follow: the whole last word each, as far as its shell replaces it.
@@ -96,8 +96,7 @@ def test_table_holds_every_verb_option_and_preset():
     assert set(rows["effects", "-"]) == {*catalogue(), "--help"}
     assert {*shipped_policies(), *KNOWN_CONTROLLERS, FILES} <= set(rows["evaluate", "policies"])
     assert sorted(CONTROLLERS) == sorted(KNOWN_CONTROLLERS)
-    assert all(load_gripper(name).is_shipped for name in shipped_grippers())
-    assert rows["record", "gripper"] == [*shipped_grippers(), FILES]
+    assert rows["record", "gripper"] == rows["effects", "gripper"] == [*shipped_grippers(), FILES]
     assert rows["record", "objects"] == []
 
 

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 
 import pytest
 
+from forcegrasp.assets import DEFAULT_GRIPPER
 from forcegrasp.cli.main import main
 from forcegrasp.effects import STAGES, catalogue, get_effect
+from forcegrasp.effects.for_gripper import effects_of
+from forcegrasp.physics import load_gripper, shipped_grippers
 
 
 def printed(capsys, *arguments: str) -> str:
@@ -48,6 +52,52 @@ def test_one_in_full(capsys, name):
     assert all(word in out for word in (*effect.variants, *effect.look_alikes))
     for p in effect.parameters:
         assert f"{p.name} {p.doc}: {p.low:g} to {p.high:g}" in out
+
+
+@pytest.mark.parametrize("name", shipped_grippers())
+def test_as_a_gripper_has_them(name, capsys):
+    gripper = load_gripper(name)
+    known, out = effects_of(gripper), printed(capsys, f"gripper={name}")
+    assert re.findall(r"^  (\w+)$", out, re.MULTILINE) == [
+        e.name for s in STAGES for e in known.values() if e.stage == s
+    ]
+    for effect in known.values():
+        part = words(out.partition(f"\n  {effect.name}\n")[2].partition("\n\n")[0])
+        for p in effect.parameters:
+            unit = "" if p.unit == "1" else f" {p.unit}"
+            assert f"{p.name} {p.doc}: {p.low:g} to {p.high:g}{unit}, typical {p.typical:g}" in part
+    left_out = [effect for effect in catalogue() if effect not in known]
+    told = f"Left out, as they need more force readings than {name} has ({len(gripper.forces)}): {', '.join(left_out)}."
+    assert (told in words(out)) == bool(left_out)
+    assert bool(left_out) == (len(gripper.forces) < 2)
+
+
+def test_of_the_default_gripper_they_are_the_catalogue(capsys):
+    assert printed(capsys, f"gripper={DEFAULT_GRIPPER}") == printed(capsys)
+
+
+def test_one_as_a_gripper_has_it(capsys):
+    (parameter,) = effects_of(load_gripper("so101_gripper"))["backlash"].parameters
+    out = words(printed(capsys, "gripper=so101_gripper", "backlash"))
+    assert f"{parameter.name} {parameter.doc}: {parameter.low:g} to {parameter.high:g} rad" in out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["backlash", "gripper=franka_hnd"], "gripper=franka_hnd: no such gripper"),
+        (["backlash", "griper=tiago"], "no option 'griper'; did you mean gripper?"),
+        (["gripper=tiago", "gripper=so101_gripper"], "effects: one gripper at a time, not 'tiago so101_gripper'"),
+        (["gripper=so101_gripper", "force_crosstalk"], "effect force_crosstalk: needs 2 force readings"),
+        (["gripper=so101_gripper", "backlsh"], "effect backlsh: no such effect"),
+    ],
+)
+def test_mistakes(arguments, told, capsys):
+    assert main(["effects", *arguments]) == 2
+    out, err = capsys.readouterr()
+    assert not out
+    assert told in err
+    assert err.count("\n") == 1
 
 
 @pytest.mark.parametrize("arguments", [["--help"], ["-h"], ["backlash", "--help"]])

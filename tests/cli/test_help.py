@@ -10,8 +10,9 @@ import time
 import pytest
 
 from forcegrasp import __version__
+from forcegrasp.cli.help import COMMON
 from forcegrasp.cli.main import VERBS, main
-from forcegrasp.cli.options import COMMON, SCHEMAS, groups, leaves
+from forcegrasp.cli.options import SCHEMAS, groups, leaves
 from forcegrasp.config import is_left_out
 
 
@@ -25,8 +26,9 @@ def printed(capsys, *arguments: str) -> str:
 @pytest.mark.parametrize("flag", ["--help", "-h", "help"])
 def test_help_names_every_verb(capsys, flag):
     out = printed(capsys, flag)
-    for verb, purpose in VERBS.items():
-        assert re.search(rf"^ +{verb} +{re.escape(purpose)}$", out, re.MULTILINE)
+    for name, verb in VERBS.items():
+        assert verb.name == name
+        assert re.search(rf"^ +{name} +{re.escape(verb.purpose)}$", out, re.MULTILINE)
 
 
 def test_no_verb_shows_the_same_help_and_fails(capsys):

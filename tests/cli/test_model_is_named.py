@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import re
 import shlex
+import shutil
+import sys
 from pathlib import Path
 
 import pytest
 
+from forcegrasp.assets import DEFAULT_GRIPPER
 from forcegrasp.cli.main import main
 from forcegrasp.cli.options import compose_run
-from forcegrasp.cli.train import _run_name
 from forcegrasp.config import TrainConfig
 from forcegrasp.runs.run_dir import RunDir
 from forcegrasp.train.board import card, evaluate_command
 
-MODEL = Path(__file__).parents[1] / "config" / "model.yaml"
+MODEL = Path(__file__).parents[1] / "config" / "model.yaml"  # is said by the name of its folder
 
 
 @pytest.mark.parametrize(
@@ -26,12 +28,31 @@ MODEL = Path(__file__).parents[1] / "config" / "model.yaml"
         (["model=better.yaml"], "ib_better_s0"),
         (["model=runs/diagnose_1/model.yaml", "experiment=no_ib", "seed=3"], "no_ib_diagnose_1_s3"),
         (["model='my models/a $b c.yaml'"], "ib_a__b_c_s0"),
-        (["model=a.yaml,b.yaml"], "ib_s0"),  # of several, each run's config.yaml tells
+        ([f"gripper={DEFAULT_GRIPPER}"], "ib_s0"),
+        (["gripper=far/my_hand.yaml"], "ib_my_hand_s0"),
+        (["model=a/lag.yaml", "gripper=franka_hand"], "ib_franka_hand_lag_s0"),
     ],
 )
 def test_name_of_a_run(given, name):
-    folder = compose_run("train", [text for text in given if "," not in text], _run_name(given))[1]
+    folder = compose_run("train", given)[1]
     assert re.fullmatch(rf"runs/\d{{4}}-\d\d-\d\d_\d\d-\d\d-\d\d_{name}", folder)
+
+
+@pytest.mark.parametrize("launcher", ["basic", "joblib"])
+def test_names_of_a_sweeps_runs(launcher, tiny, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "argv", sys.argv)
+    monkeypatch.setenv("HYDRA_FULL_ERROR", "0")
+    monkeypatch.setattr("forcegrasp.cli.sweep._draw_curves", lambda folder: None)
+    Path("far").mkdir()
+    shutil.copy(MODEL, "far/lag.yaml")
+    if launcher == "joblib":  # each run is named by a process of the launcher's
+        swept, names = [f"model={MODEL},far/lag.yaml"], ["ib_config_s0_0", "ib_lag_s0_1"]
+    else:
+        swept, names = [f"gripper={DEFAULT_GRIPPER},franka_hand"], ["ib_franka_hand_s0_1", "ib_s0_0"]
+    options = [*tiny["train"], f"hydra/launcher={launcher}", "hydra.sweep.dir=sweep"]
+    assert main(["train", "-m", *swept, *options]) == 0
+    assert sorted(path.parent.name for path in Path("sweep").glob("*/config.yaml")) == names
 
 
 def test_hint_and_card_name_the_model(tmp_path):

@@ -7,7 +7,8 @@ import os
 import pytest
 
 from forcegrasp.cli.options import SCHEMAS, compose, leaves, parse_override, spell_sweep
-from forcegrasp.cli.spelling import PLAIN, quote, spell_out
+from forcegrasp.cli.spelling import quote, spell_out
+from forcegrasp.cli.verbs import VERBS
 from forcegrasp.config import DiagnoseConfig
 from forcegrasp.errors import ConfigError
 
@@ -31,7 +32,7 @@ ALIKE = [
 def spelled(verb: str, *typed: str) -> dict[str, object]:
     """Option → value, as Hydra reads what was typed."""
     defaults = {name: value for name, _, value in leaves(SCHEMAS[verb])}
-    read = [parse_override(text) for text in spell_out(verb, list(typed), defaults, parse_override)]
+    read = [parse_override(text) for text in spell_out(VERBS[verb], list(typed), defaults, parse_override)]
     return {one.get_key_element(): one.value() for one in read}
 
 
@@ -43,8 +44,11 @@ def test_alike(verb, option, value, typed, tmp_path, monkeypatch):
         assert spelled(verb, *(text.split(" ") if verb == "curves" else [text])) == {option: value}
 
 
-def test_every_verb_that_takes_something_plainly_takes_it_by_its_name():
-    for verb, (option, _) in PLAIN.items():
+def test_every_verb_that_takes_something_by_position_takes_it_by_its_name():
+    for verb in SCHEMAS:
+        option, _ = VERBS[verb].positional
+        if not option:
+            continue
         assert spelled(verb, "a/b") in ({option: "a/b"}, {option: ["a/b"]})
         assert option in {name for name, _, _ in leaves(SCHEMAS[verb])}
 

@@ -14,8 +14,8 @@ import pytest
 import yaml
 
 from forcegrasp.cli.main import main
+from forcegrasp.cli.one_training import begin_or_resume
 from forcegrasp.cli.options import compose
-from forcegrasp.cli.train import _begin_or_resume
 from forcegrasp.errors import CheckpointError
 from forcegrasp.runs.lock import only_writer
 from forcegrasp.runs.run_dir import RunDir
@@ -108,7 +108,7 @@ def test_the_same_sweep_again_goes_on(tiny, tmp_path, monkeypatch, capsys, numbe
             signal.raise_signal(number)
 
     monkeypatch.setattr(TrainingLog, "batch", batch)
-    monkeypatch.setattr("forcegrasp.cli.train._draw_curves", lambda folder: None)
+    monkeypatch.setattr("forcegrasp.cli.sweep._draw_curves", lambda folder: None)
     options = [*tiny["train"], "ppo.total_frames=24"]
     sweep = ["train", "-m", "seed=0,1", *options, "hydra.sweep.dir=cut"]
     interrupt[0] = True
@@ -121,7 +121,7 @@ def test_the_same_sweep_again_goes_on(tiny, tmp_path, monkeypatch, capsys, numbe
     assert main(["train", "seed=1", *options, "hydra.run.dir=alone"]) == 0
     assert final(RunDir("cut/ib_s1_1")) == final(RunDir("alone"))
     with pytest.raises(CheckpointError, match="already holds a run"):  # not the same: left alone
-        _begin_or_resume(Path("alone"), compose("train", [*options, "seed=1", "ppo.epochs=3"]), [])
+        begin_or_resume(Path("alone"), compose("train", [*options, "seed=1", "ppo.epochs=3"]), [])
 
 
 def test_a_run_that_another_sweep_trains_is_named_and_the_others_are_trained(tiny, tmp_path, capsys):

@@ -59,6 +59,7 @@ SHARED_CASES: dict[str, Any] = {
     "physics.device": "cuda",
     "grasp.kappa": [0.0, 0.5],
     "grasp.b2": [-9.0, -9.0],
+    "grasp.servo_gain": "nominal",
     "grasp.radius_m": [0.03, 0.035],
     "grasp.offset_m": [0.001, 0.002],
     "grasp.deformation_m": 0.008,

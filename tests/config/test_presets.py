@@ -7,8 +7,11 @@ from pathlib import Path
 import pytest
 import yaml
 
+from forcegrasp.assets import DEFAULT_GRIPPER
 from forcegrasp.cli.options import SCHEMAS, compose, compose_sweep, groups, leaves
 from forcegrasp.config import EvaluateConfig, TrainConfig, is_left_out
+from forcegrasp.physics import load_gripper, shipped_grippers
+from forcegrasp.physics.completion import complete
 from forcegrasp.runs.provenance import DEFAULT_EXPERIMENT
 
 CONF = Path(__file__).parents[2] / "conf"
@@ -103,9 +106,10 @@ def test_defaults_live_in_the_dataclasses(verb, group, choice):
     assert not repeated
 
 
-@pytest.mark.parametrize("verb", SCHEMAS)
-def test_a_verbs_own_file_sets_no_option(verb):
-    assert set(yaml.safe_load((CONF / f"{verb}.yaml").read_text())) <= {"defaults", "hydra"}
+@pytest.mark.parametrize("path", sorted(CONF.glob("*.yaml")), ids=lambda path: path.stem)
+def test_a_verbs_own_file_brings_presets_and_sets_no_option(path):
+    assert set(yaml.safe_load(path.read_text())) <= {"defaults", "hydra"}
+    assert groups(path.stem)
 
 
 def test_no_ib_differs_from_ib_in_the_bias_alone():
@@ -115,8 +119,18 @@ def test_no_ib_differs_from_ib_in_the_bias_alone():
 def test_no_rand_differs_from_no_ib_in_the_randomisation_alone():
     assert changed(train("experiment=no_ib"), train("experiment=no_rand")) == {
         "grasp.kappa": [0.5, 0.5],
-        "grasp.b2": [-9.0, -9.0],
+        "grasp.servo_gain": "nominal",
     }
+
+
+@pytest.mark.parametrize("name", shipped_grippers())
+def test_no_rand_fixes_the_servo_gain_of_each_gripper(name):
+    gripper = load_gripper(name)
+    grasp = complete(train("experiment=no_rand"), gripper).grasp
+    nominal = gripper.parameters[gripper.training.servo_gain].nominal
+    assert grasp.b2 == [nominal, nominal]
+    assert nominal == -9 or name != DEFAULT_GRIPPER
+    assert complete(train("experiment=no_rand", "grasp.b2=[-8,-7]"), gripper).grasp.b2 == [-8.0, -7.0]
 
 
 def test_no_curriculum_differs_from_ib_in_the_curriculum_alone():

@@ -19,6 +19,9 @@ import torch
 import yaml
 from doc_pages import PAGES, blocks, program, unpack
 
+from forcegrasp.cli.main import main
+from forcegrasp.cli.options import SCHEMAS
+from forcegrasp.cli.verbs import VERBS
 from forcegrasp.config import ObservationConfig, PhysicsConfig
 from forcegrasp.deploy import Contract, controller
 from forcegrasp.env import build_env
@@ -129,6 +132,22 @@ def test_effect_of_the_page_is_found_once_it_is_installed(page, tmp_path):
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert f"{name}: A force sensor whose sensitivity changes" in done.stdout
+
+
+def test_verb_of_the_page_is_a_verb_once_it_is_registered(page, monkeypatch, capsys):
+    page("docs/write-a-verb.md")
+    config = importlib.import_module("openings_config").OpeningsConfig
+    monkeypatch.setattr("forcegrasp.config.verbs.OpeningsConfig", config, raising=False)
+    verb = importlib.import_module("openings").VERB
+    monkeypatch.setitem(VERBS, verb.name, verb)
+    monkeypatch.setitem(SCHEMAS, verb.name, config)
+    assert main(["openings", "franka_hand", "points=3"]) == 0
+    assert capsys.readouterr().out.splitlines()[1].split() == ["0.0200", "m", "40.0", "mm"]
+    assert main(["openings", "--help"]) == 0
+    assert "usage: forcegrasp openings [GRIPPER] [key=value ...]" in capsys.readouterr().out
+    for wrong, told in (("pionts=3", "did you mean points?"), ("points=1", "must lie in [2, 1000]")):
+        assert main(["openings", wrong]) == 2
+        assert told in capsys.readouterr().err
 
 
 def test_gripper_of_the_page_does_what_the_page_says(page):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import importlib
 import re
 import shlex
 
@@ -12,7 +11,7 @@ from doc_pages import PAGES, ROOT, blocks
 
 from forcegrasp.cli.main import VERBS, main
 from forcegrasp.cli.options import SCHEMAS, compose
-from forcegrasp.cli.train import single_runs
+from forcegrasp.cli.sweep import single_runs
 from forcegrasp.controllers import CONTROLLERS
 from forcegrasp.effects import get_effect
 from forcegrasp.policies import shipped_policies
@@ -70,7 +69,7 @@ def understood(verb: str, words: list[str], monkeypatch):
         made.append(composed(name, *overrides))
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(importlib.import_module(f"forcegrasp.cli.{verb}"), "compose", stop)
+    monkeypatch.setattr("forcegrasp.cli.main.compose", stop)
     assert main([verb, *words]) == 130
     return made[0]
 

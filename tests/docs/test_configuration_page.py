@@ -35,7 +35,7 @@ def test_every_option_and_preset_of_every_verb_is_there(text):
         "| `grasp.radius_m` | the gripper's | m | 0.0001 to 1 |",
         "| `physics.tier` | `reference` |  | `reference` `fast` |",
         "| `ppo.total_frames` | `4500000` |  | 1 or more |",
-        "| `experiment=no_rand` | `experiment=no_ib`, `'grasp.kappa=[0.5,0.5]'`, `'grasp.b2=[-9,-9]'` |",
+        "| `experiment=no_rand` | `experiment=no_ib`, `'grasp.kappa=[0.5,0.5]'`, `grasp.servo_gain=nominal` |",
         "| `reward=goal_normalised` | `reward.form=goal_normalised` |",
         "| `sweep=parts` | `seed=0,1,2`, `experiment=ib,",
         "| `experiment=ib` | the defaults |",

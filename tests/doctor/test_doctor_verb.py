@@ -78,7 +78,7 @@ def test_works_where_nothing_else_does(tmp_path):
     assert not done.stderr
     (line,) = (line for line in done.stdout.splitlines() if "(RuntimeError: broken beyond belief); mend its" in line)
     assert all(f"{module}, " in line for module in ("numpy", "scipy.optimize", "torch", "torchrl.envs"))
-    assert "a grasp can't be simulated (RuntimeError: broken beyond belief)" in done.stdout
+    assert "a grasp can't be simulated (RuntimeError: broken beyond belief, with franka_hand)" in done.stdout
     assert "hides this environment's packages: " in done.stdout
     assert "runs can be written" in done.stdout
     assert not list((tmp_path / "work").iterdir())

@@ -55,7 +55,7 @@ def test_pyproject_has_changed_since(checkout, told, tmp_path):
 
 
 def files_of(tmp_path, *left_out: str):
-    for package, names in {**installation.DATA, "policies": ("mine/config.yaml",)}.items():
+    for package, names in {**installation.needed_files(), "policies": ("mine/config.yaml",)}.items():
         for name in names:
             path = tmp_path / package / name
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -69,7 +69,9 @@ def test_all_files(told, tmp_path, monkeypatch):
     assert "trained policies: mine" in told(check_data, "fine")
 
 
-@pytest.mark.parametrize("lost", ["conf/train.yaml", "assets/tiago.xml", "reports/report.html"])
+@pytest.mark.parametrize(
+    "lost", ["conf/train.yaml", "assets/franka_hand.xml", "assets/known_grasps.json", "reports/report.html"]
+)
 def test_a_file_is_missing(lost, told, tmp_path, monkeypatch):
     monkeypatch.setattr(installation, "files", files_of(tmp_path, lost))
     assert f"missing in the package: {lost}; install it again" in told(check_data, "mend")

@@ -1,4 +1,4 @@
-"""The known grasp is the golden one; what differs, fails, or can't be rendered is told."""
+"""Known grasps are what they were; what differs, fails, or can't be rendered is told."""
 
 from __future__ import annotations
 
@@ -8,9 +8,14 @@ import runpy
 import numpy as np
 import pytest
 
+from forcegrasp.assets import DEFAULT_GRIPPER
 from forcegrasp.doctor import physics
 from forcegrasp.doctor.child import Child
-from forcegrasp.doctor.physics import KNOWN, check_physics, check_renderer
+from forcegrasp.doctor.known_grasps import TIERS, known_grasps
+from forcegrasp.doctor.physics import check_physics, check_renderer
+from forcegrasp.physics import shipped_grippers
+
+KNOWN = known_grasps()
 
 
 def answers(monkeypatch, output: str = "", failure: str = "") -> list[dict[str, str]]:
@@ -25,37 +30,45 @@ def answers(monkeypatch, output: str = "", failure: str = "") -> list[dict[str, 
     return asked
 
 
-def test_the_known_grasp_is_the_golden_one(root):
+def test_the_paper_grippers_grasp_is_the_golden_one(root):
     tool = runpy.run_path(str(root / "tools" / "golden.py"))
-    for tier, (positions, forces) in KNOWN.items():
+    for tier in TIERS:
+        positions, forces = KNOWN[DEFAULT_GRIPPER][tier]
         first = tool["read"](tier)
         end = first[(first[:, 0] == 0) & (first[:, 1] == 119)][0]
         np.testing.assert_allclose(end[2:4], positions, atol=1e-9)
         np.testing.assert_allclose(end[4:6], forces, atol=1e-6)
 
 
-def test_this_machine_computes_it(told):
-    assert "1.5" in told(check_physics, "fine")
+def test_every_gripper_holds_its_object():
+    assert sorted(KNOWN) == shipped_grippers()
+    assert all(min(KNOWN[name][tier][1]) > 1 for name in KNOWN for tier in TIERS)
 
 
-@pytest.mark.parametrize("tier", KNOWN)
-@pytest.mark.parametrize(
-    ("which", "change", "unit"),
-    [(0, 3e-6, "m"), (0, -3e-6, "m"), (1, 0.04, "N"), (1, -0.04, "N"), (1, float("nan"), "N")],
-)
-def test_another_end(tier, which, change, unit, told, monkeypatch):
-    ends = json.loads(json.dumps(KNOWN))
-    ends[tier][which][1] += change
-    answers(monkeypatch, json.dumps(ends))
+def test_this_machine_computes_them(told):
+    line = told(check_physics, "fine")
+    assert all(f"{name} with " in line for name in KNOWN)
+
+
+@pytest.mark.parametrize("name", KNOWN)
+@pytest.mark.parametrize("tier", TIERS)
+@pytest.mark.parametrize(("which", "change"), [(0, 2e-4), (0, -2e-4), (1, 0.04), (1, -0.04), (1, float("nan"))])
+def test_another_end(name, tier, which, change, told, monkeypatch):
+    found = json.loads(json.dumps(KNOWN))
+    found[name][tier][which][-1] *= 1 + change * (1 if which == 0 else 1 / found[name][tier][which][-1])
+    answers(monkeypatch, json.dumps(found))
     line = told(check_physics, "mend")
-    assert f"{tier}: " in line
+    unit = KNOWN[name]["unit"] if which == 0 else "N"
+    assert f"{name}, {tier}: " in line
     assert f" {unit} instead of " in line
     assert "fresh environment" in line
 
 
 def test_no_physics(told, monkeypatch):
-    answers(monkeypatch, failure="ImportError: no MuJoCo")
-    assert "can't be simulated (ImportError: no MuJoCo); see what is said of MuJoCo" in told(check_physics, "mend")
+    first, second = sorted(KNOWN)[:2]
+    answers(monkeypatch, f'{{"{first}": {{}}', failure="ImportError: no MuJoCo")
+    told_of = f"can't be simulated (ImportError: no MuJoCo, with {second}); see what is said of MuJoCo"
+    assert told_of in told(check_physics, "mend")
 
 
 def test_renderer(told, monkeypatch):

@@ -17,8 +17,8 @@ from forcegrasp.config import ActionConfig, EvaluateConfig, GraspConfig, Physics
 from forcegrasp.env.episodes import METRICS, summarise
 from forcegrasp.errors import CheckpointError, ConfigError
 from forcegrasp.evaluate.compare_policies import evaluate
-from forcegrasp.evaluate.contestants import load_contestants
 from forcegrasp.evaluate.grids import kappa_grid
+from forcegrasp.evaluate.policies import load_policies
 from forcegrasp.evaluate.rollouts import roll_out
 from forcegrasp.policies import shipped_policies
 from forcegrasp.runs.policy import load_policy
@@ -141,10 +141,10 @@ def test_table_shows_the_means(compared):
 
 
 def test_trials_are_the_rollouts_own_figures(compared, trials):
-    contestant = load_contestants(["force_pi"])[0]
+    evaluated = load_policies(["force_pi"])[0]
     config = evaluate_config()
     grasps = kappa_grid(config.grasp, 3, 4, 5).grasps
-    episodes = roll_out(contestant.policy, grasps, config.grasp, 5, physics=FAST, action=contestant.action)
+    episodes = roll_out(evaluated.policy, grasps, config.grasp, 5, physics=FAST, action=evaluated.action)
     for figure, values in summarise(episodes, config.sensors).items():
         written = [row[figure] for row in trials if row["policy"] == "force_pi"]
         np.testing.assert_allclose(written, values, rtol=1e-5, atol=1e-9)
@@ -203,27 +203,27 @@ def test_loaded_policy_is_the_trained_one(tmp_path):
 
 
 def test_controllers_act_without_bias():
-    for contestant in load_contestants(["force_pi", "informed", "close", "nothing"]):
-        assert contestant.action == ActionConfig(inductive_bias=False)
+    for evaluated in load_policies(["force_pi", "informed", "close", "nothing"]):
+        assert evaluated.action == ActionConfig(inductive_bias=False)
 
 
-def test_names_of_contestants(tmp_path, monkeypatch):
+def test_names_of_policies(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     untrained_run(tmp_path / "mine")
-    assert [c.name for c in load_contestants(["./mine", "close"])] == ["mine", "close"]
+    assert [c.name for c in load_policies(["./mine", "close"])] == ["mine", "close"]
     with pytest.raises(ConfigError, match="mine is named twice"):
-        load_contestants(["mine", "./mine/"])
+        load_policies(["mine", "./mine/"])
     with pytest.raises(ConfigError, match="did you mean force_pi"):
-        load_contestants(["force_p"])
+        load_policies(["force_p"])
     with pytest.raises(CheckpointError, match="no such run directory"):
-        load_contestants(["runs/nowhere"])
+        load_policies(["runs/nowhere"])
 
 
 def test_runs_of_one_name_in_two_folders_are_compared(tmp_path):
     # such as the seeds of two sweeps, whose folders are named alike
     for folder in ("one", "two"):
         untrained_run(tmp_path / folder / "ib_s0")
-    names = [c.name for c in load_contestants([str(tmp_path / "one" / "ib_s0"), str(tmp_path / "two" / "ib_s0")])]
+    names = [c.name for c in load_policies([str(tmp_path / "one" / "ib_s0"), str(tmp_path / "two" / "ib_s0")])]
     assert len(set(names)) == 2
 
 
@@ -264,16 +264,16 @@ def test_objects_in_place_of_softness_values(tmp_path, undrawn):
 
 @pytest.mark.parametrize("name", shipped_policies())
 def test_shipped_policies_work_by_name(name):
-    contestant = load_contestants([name])[0]
-    assert contestant.name == name
+    evaluated = load_policies([name])[0]
+    assert evaluated.name == name
     grid = kappa_grid(GraspConfig(steps=STEPS), 1, 2, seed=0)
     episodes = roll_out(
-        contestant.policy,
+        evaluated.policy,
         grid.grasps,
         GraspConfig(steps=STEPS),
         physics=FAST,
-        action=contestant.action,
-        observation=contestant.observation,
+        action=evaluated.action,
+        observation=evaluated.observation,
     )
     assert episodes["next", "force"].any()
 

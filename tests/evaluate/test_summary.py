@@ -12,8 +12,8 @@ from matplotlib.figure import Figure
 from rich.console import Console
 
 from forcegrasp.env.episodes import METRICS
-from forcegrasp.evaluate.contestants import Contestant
 from forcegrasp.evaluate.page import write_page
+from forcegrasp.evaluate.policies import EvaluatedPolicy
 from forcegrasp.evaluate.statistics import Bootstrap
 from forcegrasp.evaluate.summary import print_summary, sentences, short_sheet, simulator_notes
 from forcegrasp.evaluate.tables import sheets
@@ -46,7 +46,9 @@ def printed(report: dict, width: int = 80, detail: bool = False) -> str:
 @pytest.mark.parametrize("facts", [{}, {"model": "runs/diagnose_2026-11-20_11-11-11/model.yaml"}])
 def test_everything_fits_into_80_columns(facts):
     report = made_up({LONG: 115, "ib_virtual_robot_measured": 110, "force_pi": 100}, **facts)
-    report["notes"] = simulator_notes("", [Contestant(LONG, *[None] * 3, "a.yaml", Path(f"runs/{LONG}/model.yaml"))])
+    report["notes"] = simulator_notes(
+        "", [EvaluatedPolicy(LONG, *[None] * 3, "a.yaml", Path(f"runs/{LONG}/model.yaml"))]
+    )
     text = printed(report)
     assert max(map(len, text.splitlines())) <= 80
     assert "…" not in text
@@ -103,9 +105,9 @@ def test_page_has_all_tables_and_pictures(tmp_path):
 
 
 def test_a_policy_of_a_model_says_on_which_simulator_it_is_judged():
-    kept = Contestant("mine", *[None] * 3, "better.yaml", Path("runs/mine/model.yaml"))
-    shipped = Contestant("ib_virtual_robot", *[None] * 3, "diag/model.yaml", None)
-    plain = Contestant("ib", *[None] * 3)
+    kept = EvaluatedPolicy("mine", *[None] * 3, "better.yaml", Path("runs/mine/model.yaml"))
+    shipped = EvaluatedPolicy("ib_virtual_robot", *[None] * 3, "diag/model.yaml", None)
+    plain = EvaluatedPolicy("ib", *[None] * 3)
     one, other = simulator_notes("", [kept, shipped, plain])
     assert one.startswith("mine was trained with the model better.yaml, but is judged here on the nominal gripper")
     assert one.endswith("model=runs/mine/model.yaml")

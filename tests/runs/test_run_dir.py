@@ -22,8 +22,9 @@ from forcegrasp.errors import CheckpointError
 from forcegrasp.physics import default_gripper
 from forcegrasp.physics.completion import complete
 from forcegrasp.runs import checkpoint
+from forcegrasp.runs.config_file import fingerprint
 from forcegrasp.runs.policy import load_policy
-from forcegrasp.runs.run_dir import RunDir, fingerprint
+from forcegrasp.runs.run_dir import RunDir
 
 
 def whole_config() -> TrainConfig:

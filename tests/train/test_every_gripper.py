@@ -7,9 +7,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from forcegrasp.assets import DEFAULT_GRIPPER
 from forcegrasp.cli.main import main
-from forcegrasp.cli.train import _run_name
 from forcegrasp.gpu import installation
 from forcegrasp.physics.gripper_file import load_gripper, shipped_folder, shipped_grippers
 from forcegrasp.runs.run_dir import RunDir
@@ -109,14 +107,3 @@ def test_a_run_says_its_gripper_and_holds_every_number(tmp_path, monkeypatch):
     assert config["sensors"]["force_std_n"] == training.force_std_n
     assert config["action"]["max_delta_m"] == load_gripper("franka_hand").max_step
     assert config["curriculum"]["offset_m"] == list(training.start_offset_m)
-
-
-def test_names_of_runs():
-    franka = "${hydra:runtime.choices.experiment}_franka_hand"
-    assert _run_name([]) == _run_name([f"gripper={DEFAULT_GRIPPER}"]) == []
-    assert _run_name(["gripper=franka_hand"]) == [f"hydra.job.name='{franka}'"]
-    assert _run_name(["gripper=far/my_hand.yaml"]) == [f"hydra.job.name='{franka.replace('franka', 'my')}'"]
-    assert _run_name(["model=a/lag.yaml", "gripper=franka_hand"]) == [f"hydra.job.name='{franka}_lag'"]
-    swept = "${hydra:runtime.choices.experiment}_${gripper}"
-    assert _run_name([f"gripper={DEFAULT_GRIPPER},franka_hand"]) == [f"hydra.job.name='{swept}'"]
-    assert _run_name(["gripper=a/b.yaml,franka_hand"]) == []

@@ -1,4 +1,4 @@
-"""Who takes part in a comparison: controllers by name, shipped policies by name, trained policies by run directory."""
+"""The policies of a comparison: controllers by name, shipped policies by name, trained policies by run directory."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from forcegrasp.runs.run_dir import RunDir
 
 
 @dataclass
-class Contestant:
+class EvaluatedPolicy:
     """A policy under evaluation."""
 
     name: str
@@ -28,7 +28,7 @@ class Contestant:
     model_file: Path | None = None  #: the run's own copy of it, if there is one
 
 
-def load_contestants(names: list[str], gripper: Gripper | None = None) -> list[Contestant]:
+def load_policies(names: list[str], gripper: Gripper | None = None) -> list[EvaluatedPolicy]:
     """Loads controllers and policies; a controller's name wins over a policy's, and that over a folder's.
 
     Args:
@@ -42,7 +42,7 @@ def load_contestants(names: list[str], gripper: Gripper | None = None) -> list[C
     if not all(names):
         raise ConfigError(f"policies={names}: a name is empty")
     paths = {name: Path(name).resolve() for name in names}
-    contestants: dict[str, Contestant] = {}
+    loaded: dict[str, EvaluatedPolicy] = {}
     for name, path in paths.items():
         known = [*CONTROLLERS, *shipped_policies()]
         if name not in known and not ("/" in name or path.exists()):
@@ -61,13 +61,13 @@ def load_contestants(names: list[str], gripper: Gripper | None = None) -> list[C
                 raise ConfigError(
                     f"policies: {name} was trained on gripper {trained.name}, and can't move {gripper.name}"
                 )
-        if label in contestants:
+        if label in loaded:
             raise ConfigError(f"policies: {label} is named twice")
         parts = config.action, config.observation
-        contestants[label] = Contestant(label, policy, *parts, config.model, _model_file(name, config))
+        loaded[label] = EvaluatedPolicy(label, policy, *parts, config.model, _model_file(name, config))
     if len(paths) < len(names):
         raise ConfigError(f"policies={names}: one is named twice")
-    return list(contestants.values())
+    return list(loaded.values())
 
 
 def gripper_of(names: list[str], asked: str) -> Gripper:

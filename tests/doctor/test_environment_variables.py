@@ -6,7 +6,7 @@ import os
 
 import pytest
 
-from forcegrasp.doctor.surroundings import check_mujoco_gl, check_python_path
+from forcegrasp.doctor.environment_variables import check_mujoco_gl, check_python_path
 
 
 @pytest.mark.parametrize(
