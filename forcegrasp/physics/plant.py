@@ -98,11 +98,11 @@ class Plant:
         self._hooked: dict[str, list[PlantEffect]] = {}
         self._reading_effects = ReadingEffects([])
         self.force_scale = np.ones(n)  #: f_α, factor from the force sensors to the reading, ``(n,)``
-        #: What effects add to in each step: friction of the motors ``(n, motors)``, displacement of the pads towards
-        #: opening (metres) and forces on them (newtons, positive opens), ``(n, 2)``, and forces on the object ``(n,)``.
+        #: What effects contribute to a step, all together: see :class:`~forcegrasp.physics.protocols.Contribution`.
         self.friction = np.zeros((n, self.motors))
         self.pad_shift_m, self.finger_push_n = np.zeros((2, n, 2))
         self.object_push_n = np.zeros(n)
+        self._contributed = (self.friction, self.pad_shift_m, self.finger_push_n, self.object_push_n)
         self.position = np.zeros((n, self.motors))  #: of the motors (left, right, or the one), m or rad; 0 is closed
         #: Sum of each finger's contact forces at the last physics step, before f_α, newtons, ``(n, 2)``.
         self.pad_force = np.zeros((n, 2))
@@ -261,11 +261,9 @@ class Plant:
         for name, field in self._fields.items():  # whatever effects made of it
             field[ids] = self._base[name][ids]
         self._friction_active = None
-        for effect in self._effects:
-            which = np.flatnonzero(np.isin(effect.rows, ids))
-            effect.reset(which)
-            if "change_model" in effect.hooks():
-                effect.change_model(self, which)
+        which = [np.flatnonzero(np.isin(effect.rows, ids)) for effect in self._effects]
+        for effect, of_effect in zip(self._effects, which, strict=True):
+            effect.change_model(self, of_effect)
         self.batch.set_const(ids)
         for name, index, frame in self._pad_frames:  # set_const finds them anew
             self.batch.expand(name)[ids, index] = frame
@@ -275,11 +273,11 @@ class Plant:
             self._place(ids, position)
         self._qpos[ids, self._object_qpos] = self._object_origin + offset_m
         self.batch.forward(ids)
-        for effect in self._effects:  # all rows are read, but only these anew
-            effect.new_reading[:] = np.isin(effect.rows, ids)[:, None]
-        self._read()
-        for effect in self._effects:
-            effect.new_reading[:] = True
+        self.position = self._motors_of(self._qpos)
+        self.pad_shift_m[ids] = 0
+        for effect, of_effect in zip(self._effects, which, strict=True):
+            effect.reset(of_effect)
+        self._read_anew(ids)
 
     def posed(self, position: np.ndarray, object_position: float) -> np.ndarray:
         """Generalised positions of the first row with its motors and its object somewhere else, ``(nq,)``."""
@@ -397,10 +395,12 @@ class Plant:
         effects = self._hooked["act"]
         if not effects:
             return
-        for total in (self.friction, self.pad_shift_m, self.finger_push_n, self.object_push_n):
+        for total in self._contributed:
             total[:] = 0
         for effect in effects:
-            effect.act()
+            for total, added in zip(self._contributed, effect.act(), strict=True):
+                if added is not None:
+                    total[effect.rows] += added
         self._write_friction()
         self._write_pad_shift()
         push = self.batch.bind("qfrc_applied")
@@ -447,6 +447,18 @@ class Plant:
             return self._signs[finger.motor] * self.model.joint(finger.joint).axis
         turned = self.batch.bind("xmat")[:, self._pads[side].body].reshape(-1, 3, 3)
         return turned[:, self.gripper.axis] * (-1.0, 1.0)[side]  # the world's axis, seen from the body
+
+    def _read_anew(self, ids: np.ndarray) -> None:
+        """Reads rows that were reset; of the others, readings and the memory of their effects stay as they are."""
+        others = np.delete(np.arange(self.n), ids)
+        readings = self.measured_position[others], self.measured_force[others]
+        kept = [np.flatnonzero(np.isin(effect.rows, others)) for effect in self._effects]
+        memories = [{k: v[rows] for k, v in e.state.items()} for e, rows in zip(self._effects, kept, strict=True)]
+        self._read()
+        self.measured_position[others], self.measured_force[others] = readings
+        for effect, rows, memory in zip(self._effects, kept, memories, strict=True):
+            for name, values in memory.items():
+                effect.state[name][rows] = values
 
     def _read(self) -> None:
         self.position, self.pad_force = self._motors_of(self._qpos), self._pads_of(self._sensors)
