@@ -72,3 +72,5 @@ def test_each_pad_has_a_shift_of_its_own(gripper):
     np.testing.assert_allclose(moved, np.where(right, 0.002, 0.0), atol=1e-12)
     assert left.any()
     assert right.any()
+    plant.reset(np.arange(1), np.zeros(1))
+    assert not plant.pad_shift_m.any()  # until the next step
