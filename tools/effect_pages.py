@@ -236,15 +236,14 @@ def index() -> str:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("names", nargs="*", metavar="NAME", help="effects; all of them, and the index, by default")
+    parser.add_argument("names", nargs="*", metavar="NAME", help="effects; all of them by default")
     parser.add_argument("--out", type=Path, default=Path(__file__).parents[1] / "docs/effects")
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
     for effect in map(get_effect, options.names) if options.names else catalogue().values():
         (options.out / f"{effect.name}.md").write_text(page(effect), encoding="utf-8")
         draw(effect, options.out / f"{effect.name}.png")
-    if not options.names:
-        (options.out / "README.md").write_text(index(), encoding="utf-8")
+    (options.out / "README.md").write_text(index(), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from forcegrasp.cli import measuring
 from forcegrasp.diagnosis.add_effect import Added
@@ -26,10 +26,8 @@ from forcegrasp.reports import comparison as comparison_report
 from forcegrasp.reports import diagnosis as diagnosis_report
 from forcegrasp.reports import final_force as final_force_report
 from forcegrasp.reports import fit as fit_report
+from forcegrasp.reports.html import Section
 from forcegrasp.short_repr import ShortRepr, counted, cut, some
-
-if TYPE_CHECKING:
-    from forcegrasp.reports.html import Section
 
 
 class Result(ShortRepr):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from forcegrasp.effects.base import Effect, Parameter, first_order_weight
+from forcegrasp.effects.base import Effect, Parameter, State, first_order_weight
 
 
 class ActuatorLag(Effect):
@@ -19,14 +19,10 @@ class ActuatorLag(Effect):
     separates = "fast steps: a lagged response has no corner"
     parameters = (Parameter("time_constant_s", "time constant τ", "s", 0.0, 0.5, 0.05, trials=(0.01, 0.04, 0.12)),)
 
-    def start(self) -> None:
-        self._held = np.zeros((len(self.values), self.motors))
-
-    def reset(self, which: np.ndarray) -> None:
-        self._held[which] = np.nan
+    def init(self, which: np.ndarray) -> State:
+        return {"held": self.position[which]}
 
     def command(self, command: np.ndarray, fresh: np.ndarray) -> np.ndarray:
-        held = np.where(np.isnan(self._held), self.position, self._held)
-        weight = first_order_weight(self.dt, self["time_constant_s"])
-        self._held = np.where(weight == 1, command, held + weight * (command - held))
-        return self._held
+        held, weight = self.state["held"], first_order_weight(self.dt, self["time_constant_s"])
+        self.state["held"] = held = np.where(weight == 1, command, held + weight * (command - held))
+        return held

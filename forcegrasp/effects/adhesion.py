@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from forcegrasp.effects.base import Effect, Parameter
-from forcegrasp.effects.touch import Touch
+from forcegrasp.effects.base import Contribution, Effect, Parameter, State
+from forcegrasp.effects.touch import contact_push, depth_in_object, untouched
 
 
 class Adhesion(Effect):
@@ -24,23 +24,17 @@ class Adhesion(Effect):
     )
     order = 2
 
-    def start(self) -> None:
-        self._touch, self._bonded = Touch(len(self.values)), np.zeros((len(self.values), 2), bool)
-
-    def reset(self, which: np.ndarray) -> None:
-        self._touch.reset(which)
-        self._bonded[which] = False
+    def init(self, which: np.ndarray) -> State:
+        return {"surface": untouched(which), "bonded": np.zeros((len(which), 2), bool)}
 
     def _pull(self, force: np.ndarray) -> np.ndarray:
-        gap = np.maximum(-self._touch.depth(self.plant, self.rows, force), 0.0)
+        gap = np.maximum(-depth_in_object(self, force), 0.0)
         distance = np.maximum(self["distance_m"], 1e-9)
-        self._bonded = (self._bonded | (force > 0)) & (gap < distance)
-        return np.where(self._bonded, self["force_n"] * (1 - np.minimum(gap / distance, 1.0)), 0.0)
+        self.state["bonded"] = bonded = (self.state["bonded"] | (force > 0)) & (gap < distance)
+        return np.where(bonded, self["force_n"] * (1 - np.minimum(gap / distance, 1.0)), 0.0)
 
-    def act(self) -> None:
-        pull = self._pull(self.pad_force)
-        self.plant.finger_push_n[self.rows] -= pull  # towards closing, onto the object
-        self.plant.object_push_n[self.rows] += pull[:, 1] - pull[:, 0]
+    def act(self) -> Contribution:
+        return contact_push(-self._pull(self.pad_force))
 
     def interaction(self, force: np.ndarray) -> np.ndarray:
         return force - self._pull(force)

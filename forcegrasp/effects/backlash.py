@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from forcegrasp.effects.base import Effect, Parameter
+from forcegrasp.effects.base import Contribution, Effect, Parameter, State
 
 
 class Backlash(Effect):
@@ -29,26 +29,22 @@ class Backlash(Effect):
     )
     variants = ("play", "loose", "command")
 
-    def start(self) -> None:
-        self._pad = np.zeros((len(self.values), self.motors))
-
-    def reset(self, which: np.ndarray) -> None:
-        self._pad[which] = np.nan
+    def init(self, which: np.ndarray) -> State:
+        return {"pad": self.position[which]}
 
     def command(self, command: np.ndarray, fresh: np.ndarray) -> np.ndarray:
         return self._follow(command) if self.variant == "command" else command
 
-    def act(self) -> None:
+    def act(self) -> Contribution:
         if self.variant == "command":
-            return
+            return Contribution()
         motor = self.position
         pad = self._follow(motor)
         if self.variant == "loose":
-            self._pad = pad = np.where(self.plant.presses(self.rows), motor + self["gap_m"] / 2, pad)
-        self.plant.pad_shift_m[self.rows] += self.plant.to_sides(pad - motor)
+            self.state["pad"] = pad = np.where(self.plant.presses(self.rows), motor + self["gap_m"] / 2, pad)
+        return Contribution(pad_shift_m=self.plant.to_sides(pad - motor))
 
     def _follow(self, motor: np.ndarray) -> np.ndarray:
         half = self["gap_m"] / 2
-        before = np.where(np.isnan(self._pad), self.position, self._pad)
-        self._pad = np.where(half == 0, motor, np.clip(before, motor - half, motor + half))
-        return self._pad
+        self.state["pad"] = pad = np.where(half == 0, motor, np.clip(self.state["pad"], motor - half, motor + half))
+        return pad

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import itertools
-import math
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
 from forcegrasp.physics.plant import Plant
+from forcegrasp.physics.protocols import Contribution, State
 
 #: Stages in the order in which they act.
 STAGES = ("command", "actuator", "transmission", "contact", "object", "sensor")
@@ -84,12 +84,18 @@ class Effect:
         if self.variant not in self.variants:
             raise ValueError(f"{self.name} has no variant {variant!r}: {', '.join(self.variants)}")
         self.dt = dt
-        self.largest = np.zeros(len(self.parameters)) if largest is None else np.asarray(largest, float)
+        self.largest = self.values.max(axis=0, initial=0.0)
+        if largest is not None:
+            self.largest = np.maximum(self.largest, largest)
         self.rows = np.arange(len(self.values))
-        #: Rows whose readings are new, ``(rows, 1)``; when others are reset, a row is read again where it stands.
-        self.new_reading = np.ones((len(self.values), 1), bool)
-        self.start()
-        self.reset(self.rows)
+        self._state: State | None = None
+
+    @property
+    def state(self) -> State:
+        """Its memory: what :meth:`init` returned at the start of each grasp, as hooks have changed it since."""
+        if self._state is None:
+            self._state = self.init(np.arange(len(self.values)))
+        return self._state
 
     def __getitem__(self, parameter: str) -> np.ndarray:
         """A parameter as a column ``(rows, 1)``, by the name it has in the class that defines it."""
@@ -98,8 +104,7 @@ class Effect:
 
     def longest(self, parameter: str) -> float:
         """The largest value that a parameter will have: what it has, unless it is drawn anew at resets."""
-        index = self.index(parameter)
-        return float(max(self.values[:, index].max(initial=0.0), self.largest[index]))
+        return float(self.largest[self.index(parameter)])
 
     def attach(self, plant: Plant, rows: np.ndarray) -> Effect:
         """Puts the effect into a plant, on these rows of it."""
@@ -127,13 +132,16 @@ class Effect:
         """Contact forces of the last physics step before any scale, newtons, ``(rows, 2)``."""
         return self.plant.pad_force[self.rows]
 
+    def reset(self, which: np.ndarray) -> None:
+        """Gives these of its rows (indices into the effect's own rows) the memory of a new grasp."""
+        for name, values in self.init(which).items():
+            self.state[name][which] = values
+
     # --- hooks -------------------------------------------------------------------------------------------------
 
-    def start(self) -> None:
-        """Makes its memory, once, before the first reset."""
-
-    def reset(self, which: np.ndarray) -> None:
-        """Forgets all memory of these of its rows (indices into the effect's own rows)."""
+    def init(self, which: np.ndarray) -> State:
+        """Memory of these of its rows at the start of a grasp, ``(len(which), ...)`` each; the plant stands there."""
+        return {}
 
     def change_model(self, plant: Plant, which: np.ndarray) -> None:
         """Changes MuJoCo's per-simulation fields for these of its rows, in which they are those of the base model."""
@@ -142,8 +150,9 @@ class Effect:
         """Commanded positions on their way to the motors, m or rad. ``fresh`` ``(rows,)``: this is a new command."""
         return command
 
-    def act(self) -> None:
-        """Adds to the plant's ``friction``, ``pad_shift_m``, ``finger_push_n`` or ``object_push_n`` of this step."""
+    def act(self) -> Contribution:
+        """What it adds to this step: friction of the motors, a shift of the pads, forces."""
+        return Contribution()
 
     def interaction(self, force: np.ndarray) -> np.ndarray:
         """True force between pads and object, before any scale, newtons."""
@@ -207,40 +216,32 @@ def first_order_weight(dt: float, time_constant: np.ndarray | float) -> np.ndarr
         return -np.expm1(-dt / np.asarray(time_constant, float))
 
 
-class DelayLine:
-    """Delays a signal ``(rows, width)`` by a real number of steps, mixing the two nearest samples.
+def delay_line(past: np.ndarray, steps: np.ndarray, longest: float) -> State:
+    """Memory of :func:`delayed` at the start.
 
     Args:
-      rows: number of rows.
-      width: numbers in each.
-      longest: longest delay that any of them will have, in steps.
+      past: what came before the first value, ``(rows, width)``; NaN stands for that value itself.
+      steps: real number of steps by which each row is delayed, ``(rows,)``.
+      longest: the longest delay that any row will have, in steps.
     """
+    whole = np.floor(steps)
+    return {
+        "past": np.repeat(past[:, None], int(longest) + 2, axis=1),  # a ring, ``(rows, length, width)``
+        "newest": np.zeros(len(past), int),
+        "whole": whole.astype(int),
+        "part": (steps - whole)[:, None],
+    }
 
-    def __init__(self, rows: int, width: int, longest: float) -> None:
-        self._length = int(longest) + 2
-        self._memory = np.full((self._length, rows, width), math.nan)
-        self._whole, self._now, self._rows = np.zeros(rows, int), np.zeros(rows, int), np.arange(rows)
-        self._part = np.zeros((rows, 1))
 
-    def reset(self, which: np.ndarray, steps: np.ndarray) -> None:
-        """Forgets the past of these rows and gives them a delay in steps, ``(len(which),)``."""
-        self._memory[:, which] = math.nan
-        self._whole[which] = np.floor(steps)
-        self._part[which, 0] = steps - np.floor(steps)
-
-    def __call__(self, signal: np.ndarray, past: np.ndarray | None = None, new: np.ndarray | bool = True) -> np.ndarray:
-        """Takes this step's value and returns the delayed one.
-
-        Args:
-          signal: the value, ``(rows, width)``.
-          past: stands for what came before the first value after a reset; by default that value itself.
-          new: False where it is the last step's value once more, ``(rows,)`` or for all.
-        """
-        unknown = np.isnan(self._memory[0, :, 0])
-        if unknown.any():
-            self._memory[:, unknown] = (signal if past is None else past)[unknown]
-        self._now = (self._now + np.asarray(new)) % self._length
-        self._memory[self._now, self._rows] = signal
-        near = self._memory[(self._now - self._whole) % self._length, self._rows]
-        far = self._memory[(self._now - self._whole - 1) % self._length, self._rows]
-        return np.where(self._part == 0, near, (1 - self._part) * near + self._part * far)
+def delayed(line: State, signal: np.ndarray) -> np.ndarray:
+    """Takes a step's value ``(rows, width)`` and returns the delayed one, between the two nearest steps."""
+    past, part = line["past"], line["part"]
+    rows, length = np.arange(len(past)), past.shape[1]
+    unknown = np.isnan(past[:, 0, 0])
+    if unknown.any():
+        past[unknown] = signal[unknown, None]
+    line["newest"] = newest = (line["newest"] + 1) % length
+    past[rows, newest] = signal
+    near = past[rows, (newest - line["whole"]) % length]
+    far = past[rows, (newest - line["whole"] - 1) % length]
+    return np.where(part == 0, near, (1 - part) * near + part * far)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from forcegrasp.effects.base import Effect, Parameter
+from forcegrasp.effects.base import Effect, Parameter, State
 
 
 class CommandDeadband(Effect):
@@ -35,15 +35,12 @@ class CommandDeadband(Effect):
     )
     variants = ("position", "held")
 
-    def start(self) -> None:
-        self._held = np.zeros((len(self.values), self.motors))
-
-    def reset(self, which: np.ndarray) -> None:
-        self._held[which] = np.nan
+    def init(self, which: np.ndarray) -> State:
+        return {"held": self.position[which]}
 
     def command(self, command: np.ndarray, fresh: np.ndarray) -> np.ndarray:
-        self._held = np.where(np.isnan(self._held), self.position, self._held)
-        from_where = self.encoder if self.variant == "position" else self._held
+        held = self.state["held"]
+        from_where = self.encoder if self.variant == "position" else held
         sent = (np.abs(command - from_where) > self["threshold_m"]) & fresh[:, None]
-        self._held = np.where(sent, command, self._held)
-        return np.where(self["threshold_m"] > 0, self._held, command)
+        self.state["held"] = held = np.where(sent, command, held)
+        return np.where(self["threshold_m"] > 0, held, command)

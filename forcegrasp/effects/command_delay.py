@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from forcegrasp.effects.base import DelayLine, Effect, Parameter
+from forcegrasp.effects.base import Effect, Parameter, State, delay_line, delayed
 
 
 class CommandDelay(Effect):
@@ -20,11 +20,9 @@ class CommandDelay(Effect):
     parameters = (Parameter("delay_s", "time until a command acts", "s", 0.0, 0.4, 0.06, trials=(0.015, 0.05, 0.12)),)
     order = 1  # after a dead band, which is the driver's
 
-    def start(self) -> None:
-        self._line = DelayLine(len(self.values), self.motors, self.longest("delay_s") / self.dt)
-
-    def reset(self, which: np.ndarray) -> None:
-        self._line.reset(which, self["delay_s"][which, 0] / self.dt)
+    def init(self, which: np.ndarray) -> State:
+        steps = self["delay_s"][which, 0] / self.dt
+        return delay_line(self.position[which], steps, self.longest("delay_s") / self.dt)
 
     def command(self, command: np.ndarray, fresh: np.ndarray) -> np.ndarray:
-        return self._line(command, past=self.position)
+        return delayed(self.state, command)

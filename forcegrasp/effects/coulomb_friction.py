@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from forcegrasp.effects.base import Effect, Parameter
+from forcegrasp.effects.base import Contribution, Effect, Parameter
 
 
 class CoulombFriction(Effect):
@@ -19,5 +19,5 @@ class CoulombFriction(Effect):
         Parameter("force_n", "friction F_c", "N", 0.0, 0.5, 0.03, trials=(0.005, 0.02, 0.06), follows="effort"),
     )
 
-    def act(self) -> None:
-        self.plant.friction[self.rows] += self["force_n"]
+    def act(self) -> Contribution:
+        return Contribution(friction=self["force_n"])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from forcegrasp.effects.base import Effect, Parameter, first_order_weight
+from forcegrasp.effects.base import Contribution, Effect, Parameter, State, first_order_weight
 
 #: Time in which the spring settles, s: far below what 25 Hz can see, far above a physics step.
 SETTLING_S = 0.008
@@ -34,13 +34,11 @@ class FingerCompliance(Effect):
     )
     order = 1
 
-    def start(self) -> None:
-        self._deflection = np.zeros((len(self.values), 2))
+    def init(self, which: np.ndarray) -> State:
+        return {"deflection": np.zeros((len(which), 2))}
 
-    def reset(self, which: np.ndarray) -> None:
-        self._deflection[which] = 0
-
-    def act(self) -> None:
-        gap = self["compliance_m_n"] * self.pad_force - self._deflection
-        self._deflection = self._deflection + first_order_weight(self.dt, SETTLING_S) * gap
-        self.plant.pad_shift_m[self.rows] += self._deflection
+    def act(self) -> Contribution:
+        before = self.state["deflection"]
+        gap = self["compliance_m_n"] * self.pad_force - before
+        self.state["deflection"] = deflection = before + first_order_weight(self.dt, SETTLING_S) * gap
+        return Contribution(pad_shift_m=deflection)

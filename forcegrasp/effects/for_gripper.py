@@ -55,11 +55,6 @@ def effect_of(name: str, gripper: Gripper) -> type[Effect]:
     raise ConfigError(f"effect {name}: no such effect{closest(name, known)}")
 
 
-def for_gripper(effect: type[Effect], gripper: Gripper) -> type[Effect]:
-    """An effect's class as this gripper has it: its parameters' names, units and sizes, and how many there are."""
-    return _adapt(effect, _Traits.of(gripper))
-
-
 @functools.cache
 def _adapt(effect: type[Effect], traits: _Traits) -> type[Effect]:
     if traits == _Traits(2, 2, False, 1.0, 1.0, 1.0):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from forcegrasp.effects.base import DelayLine, Effect, Parameter
+from forcegrasp.effects.base import Effect, Parameter, State, delay_line, delayed
 
 
 class ForceDelay(Effect):
@@ -21,11 +21,9 @@ class ForceDelay(Effect):
     order = 4
     least_channels = 1
 
-    def start(self) -> None:
-        self._line = DelayLine(len(self.values), self.channels, self.longest("delay_s") / self.dt)
-
-    def reset(self, which: np.ndarray) -> None:
-        self._line.reset(which, self["delay_s"][which, 0] / self.dt)
+    def init(self, which: np.ndarray) -> State:
+        unknown = np.full((len(which), self.channels), np.nan)
+        return delay_line(unknown, self["delay_s"][which, 0] / self.dt, self.longest("delay_s") / self.dt)
 
     def read_force(self, force: np.ndarray) -> np.ndarray:
-        return self._line(force, new=self.new_reading[:, 0])
+        return delayed(self.state, force)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from forcegrasp.effects.base import Effect, Parameter
+from forcegrasp.effects.base import Effect, Parameter, State
 
 
 class ForceDrift(Effect):
@@ -29,12 +29,9 @@ class ForceDrift(Effect):
     def trials(cls) -> np.ndarray:
         return np.array([[0.02, 0.0], [0.0, 0.02]])
 
-    def start(self) -> None:
-        self._time = np.zeros((len(self.values), 1))
-
-    def reset(self, which: np.ndarray) -> None:
-        self._time[which] = -self.dt  # so that the first reading is at 0
+    def init(self, which: np.ndarray) -> State:
+        return {"time": np.full((len(which), 1), -self.dt)}  # so that the first reading is at 0
 
     def read_force(self, force: np.ndarray) -> np.ndarray:
-        self._time += self.dt * self.new_reading
-        return force + self.values * self._time
+        self.state["time"] += self.dt
+        return force + self.values * self.state["time"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from forcegrasp.effects.base import Effect, Parameter
+from forcegrasp.effects.base import Effect, Parameter, State
 
 
 class ForceHysteresis(Effect):
@@ -31,14 +31,12 @@ class ForceHysteresis(Effect):
     def trials(cls) -> np.ndarray:
         return np.array([[0.03, 0.0], [0.1, 0.0], [0.0, 0.1], [0.0, 0.3]])
 
-    def start(self) -> None:
-        self._play, self._read = np.zeros((2, len(self.values), self.channels))
-
-    def reset(self, which: np.ndarray) -> None:
-        self._play[which] = self._read[which] = 0
+    def init(self, which: np.ndarray) -> State:
+        play, read = np.zeros((2, len(which), self.channels))
+        return {"play": play, "read": read}
 
     def read_force(self, force: np.ndarray) -> np.ndarray:
-        half, share = self["width_n"] / 2, self["share"]
-        self._play = np.where(half == 0, force, np.clip(self._play, force - half, force + half))
-        self._read = np.maximum(self._play, np.minimum(self._read, (1 + share) * self._play))
-        return np.where(share == 0, self._play, self._read)
+        state, half, share = self.state, self["width_n"] / 2, self["share"]
+        state["play"] = play = np.where(half == 0, force, np.clip(state["play"], force - half, force + half))
+        state["read"] = read = np.maximum(play, np.minimum(state["read"], (1 + share) * play))
+        return np.where(share == 0, play, read)

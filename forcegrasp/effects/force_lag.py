@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from forcegrasp.effects.base import Effect, Parameter, first_order_weight
+from forcegrasp.effects.base import Effect, Parameter, State, first_order_weight
 
 
 class ForceLag(Effect):
@@ -21,14 +21,11 @@ class ForceLag(Effect):
     order = 3
     least_channels = 1
 
-    def start(self) -> None:
-        self._held = np.zeros((len(self.values), self.channels))
-
-    def reset(self, which: np.ndarray) -> None:
-        self._held[which] = np.nan
+    def init(self, which: np.ndarray) -> State:
+        return {"held": np.full((len(which), self.channels), np.nan)}  # the first force that comes
 
     def read_force(self, force: np.ndarray) -> np.ndarray:
-        held = np.where(np.isnan(self._held), force, self._held)
-        weight = first_order_weight(self.dt, self["time_constant_s"]) * self.new_reading
-        self._held = np.where(weight == 1, force, held + weight * (force - held))
-        return self._held
+        held = np.where(np.isnan(self.state["held"]), force, self.state["held"])
+        weight = first_order_weight(self.dt, self["time_constant_s"])
+        self.state["held"] = held = np.where(weight == 1, force, held + weight * (force - held))
+        return held

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from forcegrasp.effects.base import Effect, Parameter
+from forcegrasp.effects.base import Effect, Parameter, State
 
 
 class RateLimit(Effect):
@@ -33,15 +33,11 @@ class RateLimit(Effect):
     )
     order = 2
 
-    def start(self) -> None:
-        self._held = np.zeros((len(self.values), self.motors))
-
-    def reset(self, which: np.ndarray) -> None:
-        self._held[which] = np.nan
+    def init(self, which: np.ndarray) -> State:
+        return {"held": self.position[which]}
 
     def command(self, command: np.ndarray, fresh: np.ndarray) -> np.ndarray:
-        held = np.where(np.isnan(self._held), self.position, self._held)
-        step = self["rate_m_s"] * self.dt
+        held, step = self.state["held"], self["rate_m_s"] * self.dt
         limited = held + np.clip(command - held, -step, step)
-        self._held = np.where(np.isinf(step), command, limited)
-        return self._held
+        self.state["held"] = held = np.where(np.isinf(step), command, limited)
+        return held

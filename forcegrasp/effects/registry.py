@@ -3,64 +3,42 @@
 from __future__ import annotations
 
 import functools
+from importlib import import_module
 from importlib.metadata import entry_points
 
-from forcegrasp.effects.actuator_lag import ActuatorLag
-from forcegrasp.effects.adhesion import Adhesion
-from forcegrasp.effects.backlash import Backlash
 from forcegrasp.effects.base import STAGES, Effect
-from forcegrasp.effects.command_deadband import CommandDeadband
-from forcegrasp.effects.command_delay import CommandDelay
-from forcegrasp.effects.coulomb_friction import CoulombFriction
-from forcegrasp.effects.encoder_bias import EncoderBias
-from forcegrasp.effects.finger_compliance import FingerCompliance
-from forcegrasp.effects.force_bias import ForceBias
-from forcegrasp.effects.force_crosstalk import ForceCrosstalk
-from forcegrasp.effects.force_deadzone import ForceDeadzone
-from forcegrasp.effects.force_delay import ForceDelay
-from forcegrasp.effects.force_drift import ForceDrift
-from forcegrasp.effects.force_gain_asymmetry import ForceGainAsymmetry
-from forcegrasp.effects.force_hysteresis import ForceHysteresis
-from forcegrasp.effects.force_lag import ForceLag
-from forcegrasp.effects.force_limit import ForceLimit
-from forcegrasp.effects.force_saturation import ForceSaturation
 from forcegrasp.effects.none import NoEffect
-from forcegrasp.effects.object_friction import ObjectFriction
-from forcegrasp.effects.quantisation import Quantisation
-from forcegrasp.effects.rate_limit import RateLimit
-from forcegrasp.effects.stiction import Stiction
-from forcegrasp.effects.stiffening_contact import StiffeningContact
-from forcegrasp.effects.viscoelastic_contact import ViscoelasticContact
 from forcegrasp.errors import ConfigError, closest
 
 #: Other packages add effects under this entry point group: name = "module:Class".
 ENTRY_POINTS = "forcegrasp.effects"
 
-_SHIPPED: tuple[type[Effect], ...] = (
-    CommandDeadband,
-    CommandDelay,
-    RateLimit,
-    ActuatorLag,
-    CoulombFriction,
-    Stiction,
-    ForceLimit,
-    Backlash,
-    FingerCompliance,
-    StiffeningContact,
-    ViscoelasticContact,
-    Adhesion,
-    ObjectFriction,
-    ForceCrosstalk,
-    ForceHysteresis,
-    ForceGainAsymmetry,
-    ForceLag,
-    ForceDelay,
-    ForceDeadzone,
-    ForceDrift,
-    ForceBias,
-    ForceSaturation,
-    EncoderBias,
-    Quantisation,
+# Modules beside this one, each with a class of its name: coulomb_friction.py has CoulombFriction.
+_SHIPPED = (
+    "actuator_lag",
+    "adhesion",
+    "backlash",
+    "command_deadband",
+    "command_delay",
+    "coulomb_friction",
+    "encoder_bias",
+    "finger_compliance",
+    "force_bias",
+    "force_crosstalk",
+    "force_deadzone",
+    "force_delay",
+    "force_drift",
+    "force_gain_asymmetry",
+    "force_hysteresis",
+    "force_lag",
+    "force_limit",
+    "force_saturation",
+    "object_friction",
+    "quantisation",
+    "rate_limit",
+    "stiction",
+    "stiffening_contact",
+    "viscoelastic_contact",
 )
 
 
@@ -71,7 +49,7 @@ def catalogue() -> dict[str, type[Effect]]:
     Raises:
       ConfigError: if an effect of another package can't be used; names the package's entry point.
     """
-    found = {effect.name: effect for effect in _SHIPPED}
+    found = {name: _shipped(name) for name in _SHIPPED}
     for point in entry_points(group=ENTRY_POINTS):
         try:
             effect = point.load()
@@ -86,6 +64,10 @@ def catalogue() -> dict[str, type[Effect]]:
             )
         found[effect.name] = effect
     return dict(sorted(found.items(), key=lambda item: (STAGES.index(item[1].stage), item[1].order)))
+
+
+def _shipped(name: str) -> type[Effect]:
+    return getattr(import_module(f"forcegrasp.effects.{name}"), name.title().replace("_", ""))
 
 
 def get_effect(name: str) -> type[Effect]:

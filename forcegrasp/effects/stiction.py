@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from forcegrasp.effects.base import Effect, Parameter
+from forcegrasp.effects.base import Contribution, Effect, Parameter
 
 #: Velocity at which the finger no longer sticks, m/s (Stribeck velocity).
 STRIBECK_M_S = 0.002
@@ -28,7 +28,7 @@ class Stiction(Effect):
     )
     order = 1
 
-    def act(self) -> None:
+    def act(self) -> Contribution:
         share = self["kinetic_share"]
         stuck = np.exp(-((self.velocity / (STRIBECK_M_S * self.position_scale)) ** 2))
-        self.plant.friction[self.rows] += self["breakaway_n"] * (share + (1 - share) * stuck)
+        return Contribution(friction=self["breakaway_n"] * (share + (1 - share) * stuck))

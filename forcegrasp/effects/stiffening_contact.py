@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from forcegrasp.effects.base import Effect, Parameter
-from forcegrasp.effects.touch import Touch
+from forcegrasp.effects.base import Contribution, Effect, Parameter, State
+from forcegrasp.effects.touch import contact_push, depth_in_object, untouched
 from forcegrasp.physics.plant import Plant
 
 #: Depth at which the cubic spring's force is given, metres.
@@ -31,26 +31,20 @@ class StiffeningContact(Effect):
     def trials(cls) -> np.ndarray:
         return np.array([[0.5, 0.0], [2.0, 0.0], [5.0, 0.0], [0.0, 0.01], [0.0, 0.04], [0.0, 0.15]])
 
-    def start(self) -> None:
-        self._touch, self._push = Touch(len(self.values)), np.zeros((len(self.values), 2))
-        self._strongest = np.full((len(self.values), 2), np.inf)
-
-    def reset(self, which: np.ndarray) -> None:
-        self._touch.reset(which)
-        self._push[which] = 0.0
+    def init(self, which: np.ndarray) -> State:
+        # no motor can press harder; a long time step that overshoots must not be thrown back with more
+        strongest = self.plant.strongest_press(self.rows[which])
+        return {"surface": untouched(which), "push": np.zeros((len(which), 2)), "strongest": strongest}
 
     def change_model(self, plant: Plant, which: np.ndarray) -> None:
         solimp, rows = plant.field("geom_solimp"), self.rows[which]
         for geom in plant.object_geoms:
             solimp[rows, geom, 4] += self["extra_power"][which, 0]
-        # no motor can press harder; a long time step that overshoots must not be thrown back with more
-        self._strongest[which] = plant.strongest_press(rows)
 
-    def act(self) -> None:
-        depth = np.maximum(self._touch.depth(self.plant, self.rows, self.pad_force), 0.0)
-        self._push = np.minimum(self["cubic_n"] * (depth / DEPTH_M) ** 3, self._strongest)
-        self.plant.finger_push_n[self.rows] += self._push  # towards opening, away from the object
-        self.plant.object_push_n[self.rows] += self._push[:, 0] - self._push[:, 1]
+    def act(self) -> Contribution:
+        depth = np.maximum(depth_in_object(self, self.pad_force), 0.0)
+        self.state["push"] = push = np.minimum(self["cubic_n"] * (depth / DEPTH_M) ** 3, self.state["strongest"])
+        return contact_push(push)
 
     def interaction(self, force: np.ndarray) -> np.ndarray:
-        return force + self._push
+        return force + self.state["push"]

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from forcegrasp.effects.base import Effect, Parameter, first_order_weight
-from forcegrasp.effects.touch import Touch
+from forcegrasp.effects.base import Contribution, Effect, Parameter, State, first_order_weight
+from forcegrasp.effects.touch import contact_push, depth_in_object, untouched
 
 
 class ViscoelasticContact(Effect):
@@ -36,19 +36,16 @@ class ViscoelasticContact(Effect):
     )
     order = 1
 
-    def start(self) -> None:
-        self._touch, self._relaxed, self._push = Touch(len(self.values)), *np.zeros((2, len(self.values), 2))
+    def init(self, which: np.ndarray) -> State:
+        relaxed, push = np.zeros((2, len(which), 2))
+        return {"surface": untouched(which), "relaxed": relaxed, "push": push}
 
-    def reset(self, which: np.ndarray) -> None:
-        self._touch.reset(which)
-        self._relaxed[which] = self._push[which] = 0.0
-
-    def act(self) -> None:
-        depth = np.maximum(self._touch.depth(self.plant, self.rows, self.pad_force), 0.0)
-        self._relaxed = self._relaxed + first_order_weight(self.dt, self["time_constant_s"]) * (depth - self._relaxed)
-        self._push = self["stiffness_n_m"] * np.maximum(depth - self._relaxed, 0.0)
-        self.plant.finger_push_n[self.rows] += self._push  # towards opening, away from the object
-        self.plant.object_push_n[self.rows] += self._push[:, 0] - self._push[:, 1]
+    def act(self) -> Contribution:
+        depth, before = np.maximum(depth_in_object(self, self.pad_force), 0.0), self.state["relaxed"]
+        relaxed = before + first_order_weight(self.dt, self["time_constant_s"]) * (depth - before)
+        push = self["stiffness_n_m"] * np.maximum(depth - relaxed, 0.0)
+        self.state.update(relaxed=relaxed, push=push)
+        return contact_push(push)
 
     def interaction(self, force: np.ndarray) -> np.ndarray:
-        return force + self._push
+        return force + self.state["push"]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import mujoco
@@ -12,20 +11,20 @@ import numpy as np
 from mujoco.batch import Batch
 
 from forcegrasp.physics import guard
+from forcegrasp.physics.attached_effects import AttachedEffects
 from forcegrasp.physics.fast import SPHERE
-from forcegrasp.physics.gripper import SIDES, Gripper, effort_sensor, own_sensor
-from forcegrasp.physics.gripper_parts import BaseParameter, Finger
+from forcegrasp.physics.gripper import Gripper
+from forcegrasp.physics.gripper_parts import BaseParameter
 from forcegrasp.physics.inertia import inertia_of_radius
-from forcegrasp.physics.opening import command_law
 from forcegrasp.physics.protocols import PlantEffect
-from forcegrasp.physics.sensors import ReadingEffects
+from forcegrasp.physics.scene_layout import SceneLayout
 
 # Constraint that holds a finger against dry friction: as stiff as the step allows, lest it creeps under load.
 _STIFF_SOLREF = (0.004, 1.0)
 _STIFF_SOLIMP = (0.99, 0.9999, 0.001, 0.5, 2.0)
 
 
-class Plant:
+class Plant(SceneLayout):
     """Simulates ``n`` grasps, each with its own parameters and effects.
 
     Parameters are written into per-simulation model fields: nothing is recompiled. Results do not depend on the number
@@ -53,56 +52,27 @@ class Plant:
         other_collisions: bool = False,
     ) -> None:
         guard.silence_log()
-        self.gripper, self.n, self._tier = gripper, n, tier
-        self.model = model = gripper.compile(tier)
+        self.n, self._tier = n, tier
+        model = gripper.compile(tier)
         model.opt.timestep *= step_factor
         if other_collisions:
             model.opt.disableflags ^= mujoco.mjtDisableBit.mjDSBL_NATIVECCD
         self.dt = float(model.opt.timestep)  #: physics step, seconds
+        super().__init__(gripper, model)
         self._prepare(model)
         self.batch = batch = Batch(model, n, threads)
         self._qpos, self._ctrl, self._sensors = (batch.bind(name) for name in ("qpos", "ctrl", "sensordata"))
-        self.motors, self.channels = len(gripper.motors), len(gripper.forces)  #: how many there are
-        joints = [model.joint(motor.joint) for motor in gripper.motors]
-        #: degrees of freedom of the motors (left, right, or the one), and of the object along the grasp axis
-        self.motor_dofs = [joint.dofadr[0] for joint in joints]
-        object_joint = model.joint(gripper.object_joint)
-        is_free = object_joint.type[0] == mujoco.mjtJoint.mjJNT_FREE
-        self._object_qpos = object_joint.qposadr[0] + (gripper.axis if is_free else 0)
-        self._object_origin = model.qpos0[self._object_qpos]  # the middle of the grasp is where the scene puts it
-        self.object_dof = object_joint.dofadr[0] + (gripper.axis if is_free else 0)
-        #: degrees of freedom of everything but the object
-        self.gripper_dofs = [i for i in range(model.nv) if model.dof_jntid[i] != object_joint.id]
-        self.actuators = [model.actuator(motor.actuator).id for motor in gripper.motors]
-        # where motors stand in the engine's arrays: slices, for they are read and written in every step
-        self._motor_q = _slice(*(joint.qposadr[0] for joint in joints))
-        self._motor_v, self._drives = _slice(*self.motor_dofs), _slice(*self.actuators)
         self._motor_velocity = batch.bind("qvel")[:, self._motor_v]
-        self._object_body = model.geom(gripper.object_geom).bodyid[0]
-        #: geoms of the object
-        self.object_geoms = np.flatnonzero(model.geom_bodyid == self._object_body)
-        self._pads = [_Pads.find(model, finger.body) for finger in gripper.fingers]
-        self._signs = np.array([motor.sign for motor in gripper.motors])
-        self._origins = np.array([motor.closed for motor in gripper.motors])
-        self._command_scale, self._command_zero = command_law(gripper.motors, model)
-        #: Which motor moves each side, and how far its pads go per unit of it; 0 for a side that stands still.
-        self._mover = np.array([max(finger.motor, 0) for finger in gripper.fingers])
-        self.travel = np.where([f.motor >= 0 for f in gripper.fingers], gripper.opening.travel, 0.0)
-        self._readings = [_reading(model, *pair) for pair in zip(SIDES, gripper.fingers, strict=True)]
-        self._efforts = self._effort_readings(model)
-        self._felt = [i for i, finger in enumerate(gripper.fingers) if finger.force_sensor]
         self._fields: dict[str, np.ndarray] = {}
         self._base: dict[str, np.ndarray] = {}
         self._friction_active: np.ndarray | None = None  # which motors' friction was stiffened, ``(n, motors)``
-        self._effects: list[PlantEffect] = []
-        self._hooked: dict[str, list[PlantEffect]] = {}
-        self._reading_effects = ReadingEffects([])
+        self.effects = AttachedEffects(())
         self.force_scale = np.ones(n)  #: f_α, factor from the force sensors to the reading, ``(n,)``
-        #: What effects add to in each step: friction of the motors ``(n, motors)``, displacement of the pads towards
-        #: opening (metres) and forces on them (newtons, positive opens), ``(n, 2)``, and forces on the object ``(n,)``.
+        #: What effects contribute to a step, all together: see :class:`~forcegrasp.physics.protocols.Contribution`.
         self.friction = np.zeros((n, self.motors))
         self.pad_shift_m, self.finger_push_n = np.zeros((2, n, 2))
         self.object_push_n = np.zeros(n)
+        self._contributed = (self.friction, self.pad_shift_m, self.finger_push_n, self.object_push_n)
         self.position = np.zeros((n, self.motors))  #: of the motors (left, right, or the one), m or rad; 0 is closed
         #: Sum of each finger's contact forces at the last physics step, before f_α, newtons, ``(n, 2)``.
         self.pad_force = np.zeros((n, 2))
@@ -114,18 +84,6 @@ class Plant:
         self.measured_position = np.zeros((n, self.motors))  #: what the encoders say, m or rad
         #: What the encoders said when a real gripper was recorded, m or rad, ``(n, motors)``; None if only simulated.
         self.recorded_position: np.ndarray | None = None
-
-    def _effort_readings(self, model: mujoco.MjModel) -> tuple[list[int], np.ndarray]:
-        """Where the motors' efforts are read, and the fingertip newtons of each, pressing positive, per unit of it."""
-        if self.gripper.force != "motor":
-            return [], np.empty(0)
-        addresses = [model.sensor(effort_sensor(motor)).adr[0] for motor in self.gripper.motors]
-        factors = np.empty(self.motors)
-        for index, motor in enumerate(self.gripper.motors):
-            drive = model.actuator(motor.actuator)
-            length_per_position = self._command_scale[index] * drive.gainprm[0] / -drive.biasprm[1]
-            factors[index] = -length_per_position / self.travel[self._moved_by(index)].sum()
-        return addresses, factors
 
     def _prepare(self, model: mujoco.MjModel) -> None:
         """Undoes the compiler's shortcuts past fields that effects change; what is simulated stays the same."""
@@ -164,10 +122,6 @@ class Plant:
         """How far each side's pads stand from where they are when closed, metres, ``(n, 2)``; 0 if they never move."""
         return self.to_sides(self.position)
 
-    def to_sides(self, of_motors: np.ndarray) -> np.ndarray:
-        """Displacements of motors ``(..., motors)`` as displacements of the pads they move, metres, ``(..., 2)``."""
-        return of_motors if self.gripper.is_direct else of_motors[..., self._mover] * self.travel
-
     @property
     def object_position(self) -> np.ndarray:
         """Object position along the grasp axis from where the scene puts it, metres, ``(n,)``."""
@@ -187,9 +141,6 @@ class Plant:
             return gain * self.gripper.stroke
         reach = [self.travel[self._moved_by(motor)].sum() for motor in range(self.motors)]
         return (gain * self.gripper.stroke / reach)[:, self._mover]
-
-    def _moved_by(self, motor: int) -> np.ndarray:
-        return (self._mover == motor) & (self.travel != 0)
 
     # --- parameters ----------------------------------------------------------------------------------------------
 
@@ -245,10 +196,8 @@ class Plant:
 
     def attach(self, effects: Sequence[tuple[PlantEffect, np.ndarray]]) -> None:
         """Puts effects into the plant, each on its own rows, in the order of their stages; replaces earlier ones."""
-        self._effects = [effect.attach(self, rows) for effect, rows in sorted(effects, key=lambda pair: pair[0].rank)]
-        hooks = ("change_model", "command", "act", "interaction")
-        self._hooked = {hook: [e for e in self._effects if hook in e.hooks()] for hook in hooks}
-        self._reading_effects = ReadingEffects(self._effects)
+        ranked = sorted(effects, key=lambda pair: pair[0].rank)
+        self.effects = AttachedEffects([effect.attach(self, rows) for effect, rows in ranked])
 
     def reset(self, ids: np.ndarray, offset_m: np.ndarray, position: np.ndarray | None = None) -> None:
         """Starts grasps anew, after their parameters were written.
@@ -261,11 +210,7 @@ class Plant:
         for name, field in self._fields.items():  # whatever effects made of it
             field[ids] = self._base[name][ids]
         self._friction_active = None
-        for effect in self._effects:
-            which = np.flatnonzero(np.isin(effect.rows, ids))
-            effect.reset(which)
-            if "change_model" in effect.hooks():
-                effect.change_model(self, which)
+        self.effects.change_model(self, ids)
         self.batch.set_const(ids)
         for name, index, frame in self._pad_frames:  # set_const finds them anew
             self.batch.expand(name)[ids, index] = frame
@@ -275,11 +220,10 @@ class Plant:
             self._place(ids, position)
         self._qpos[ids, self._object_qpos] = self._object_origin + offset_m
         self.batch.forward(ids)
-        for effect in self._effects:  # all rows are read, but only these anew
-            effect.new_reading[:] = np.isin(effect.rows, ids)[:, None]
-        self._read()
-        for effect in self._effects:
-            effect.new_reading[:] = True
+        self.position = self._motors_of(self._qpos)
+        self.pad_shift_m[ids] = 0
+        self.effects.reset(ids)
+        self._read_anew(ids)
 
     def posed(self, position: np.ndarray, object_position: float) -> np.ndarray:
         """Generalised positions of the first row with its motors and its object somewhere else, ``(nq,)``."""
@@ -299,17 +243,6 @@ class Plant:
             self._qpos[ids, address] = np.interp(position[:, mover], law.position, law.qpos[:, address])
         self._qpos[ids, self._motor_q] = position * self._signs + self._origins
 
-    @functools.cached_property
-    def _dofs_of_right(self) -> set[int]:
-        """Degrees of freedom between the world and the right side's pads."""
-        found: set[int] = set()
-        body = int(self.model.body(self.gripper.fingers[1].body).id)
-        while body:
-            first = int(self.model.body_dofadr[body])
-            found |= set(range(first, first + int(self.model.body_dofnum[body]))) if first >= 0 else set()
-            body = int(self.model.body_parentid[body])
-        return found
-
     # --- time ----------------------------------------------------------------------------------------------------
 
     def advance(self, command: np.ndarray, steps: int = 1, fresh: np.ndarray | bool = True) -> None:
@@ -320,14 +253,14 @@ class Plant:
           steps: number of physics steps.
           fresh: whether the command is a new one, ``(n,)`` or for all.
         """
-        if not self._effects:
+        if not len(self.effects):
             self._send(command)
             self.batch.step(nstep=steps)
             self._read()
             return
         fresh = np.broadcast_to(fresh, (self.n,))
         for _ in range(steps):
-            self._send(self._through_command(command, fresh))
+            self._send(self.effects.command(command, fresh))
             self._apply_actions()
             self.batch.step(nstep=1)
             self._read()
@@ -360,59 +293,23 @@ class Plant:
     @property
     def acts_in_steps(self) -> bool:
         """Whether an effect acts in every step, and not only on the model when a grasp starts."""
-        return any(hook != "change_model" for effect in self._effects for hook in effect.hooks())
+        return self.effects.act_in_steps
 
     def warnings(self) -> np.ndarray:
         """MuJoCo's warning counters, ``(n, kinds)``; all 0 in a sound simulation."""
         return self.batch.warning[..., 1]
 
-    def _motors_of(self, qpos: np.ndarray) -> np.ndarray:
-        return (qpos[..., self._motor_q] - self._origins) * self._signs
-
-    def _channels_of(self, sensors: np.ndarray, force: np.ndarray, scale: np.ndarray) -> np.ndarray:
-        """What the force channels transduce, newtons, ``(..., channels)``: forces of fingers, or efforts of motors."""
-        addresses, factors = self._efforts
-        if addresses:
-            return sensors[..., addresses] * factors * scale
-        return force if len(self._felt) == 2 else force[..., self._felt]
-
-    def _pads_of(self, sensors: np.ndarray) -> np.ndarray:
-        # contiguous, lest the order of the sum depend on n
-        sums = [np.ascontiguousarray(sensors[..., part]).sum(axis=-1) for part in self._readings]
-        return np.stack(sums, axis=-1)
-
     def _send(self, command: np.ndarray) -> None:
         self._ctrl[:, self._drives] = command * self._command_scale + self._command_zero
 
-    def _through_command(self, command: np.ndarray, fresh: np.ndarray) -> np.ndarray:
-        effects = self._hooked["command"]
-        if not effects:
-            return command
-        command = np.array(command, float)
-        for effect in effects:
-            command[effect.rows] = effect.command(command[effect.rows], fresh[effect.rows])
-        return command
-
     def _apply_actions(self) -> None:
-        effects = self._hooked["act"]
-        if not effects:
+        if not self.effects.contribute(self._contributed):
             return
-        for total in (self.friction, self.pad_shift_m, self.finger_push_n, self.object_push_n):
-            total[:] = 0
-        for effect in effects:
-            effect.act()
         self._write_friction()
         self._write_pad_shift()
         push = self.batch.bind("qfrc_applied")
         push[:, self._motor_v] = self._to_motors(self.finger_push_n) * self._signs
         push[:, self.object_dof] = self.object_push_n
-
-    def _to_motors(self, push_n: np.ndarray) -> np.ndarray:
-        """Forces on the pads as what they do to the motors that move them, N or N·m, ``(n, motors)``."""
-        if self.gripper.is_direct:
-            return push_n
-        work = push_n * self.travel
-        return np.stack([work[:, self._moved_by(motor)].sum(axis=1) for motor in range(self.motors)], axis=1)
 
     def _write_friction(self) -> None:
         if not self.friction.any() and "dof_frictionloss" not in self._fields:
@@ -448,50 +345,22 @@ class Plant:
         turned = self.batch.bind("xmat")[:, self._pads[side].body].reshape(-1, 3, 3)
         return turned[:, self.gripper.axis] * (-1.0, 1.0)[side]  # the world's axis, seen from the body
 
+    def _read_anew(self, ids: np.ndarray) -> None:
+        """Reads rows that were reset; of the others, readings and the memory of their effects stay as they are."""
+        others = np.delete(np.arange(self.n), ids)
+        readings = self.measured_position[others], self.measured_force[others]
+        with self.effects.kept(others):
+            self._read()
+        self.measured_position[others], self.measured_force[others] = readings
+
     def _read(self) -> None:
         self.position, self.pad_force = self._motors_of(self._qpos), self._pads_of(self._sensors)
-        force = self.pad_force.copy()
-        for effect in self._hooked.get("interaction", ()):
-            force[effect.rows] = effect.interaction(force[effect.rows])
         scale = self.force_scale[:, None]
-        self.force = force * scale
+        self.force = self.effects.interaction(self.pad_force) * scale
         self.transduced_force = self._channels_of(self._sensors, self.force, scale)
         self.measured_force = self.transduced_force.copy()
         self.measured_position = self.position.copy()
-        self._reading_effects.apply(self.measured_position, self.measured_force)
-
-
-@dataclass(frozen=True)
-class _Pads:
-    """What moves with a side's pads, in the frame of their body."""
-
-    body: int
-    moved: dict[str, np.ndarray]  #: field of positions → indices
-
-    @classmethod
-    def find(cls, model: mujoco.MjModel, name: str) -> _Pads:
-        body = int(model.body(name).id)
-        moved = {
-            "geom_pos": np.flatnonzero(model.geom_bodyid == body),
-            "site_pos": np.flatnonzero(model.site_bodyid == body),
-            "body_pos": np.flatnonzero(model.body_parentid == body),
-        }
-        return cls(body, moved)
-
-
-def _reading(model: mujoco.MjModel, side: str, finger: Finger) -> slice:
-    """Where the numbers stand whose sum is a side's force; of sensors that were added, the normal forces alone."""
-    sensor = model.sensor(finger.force_sensor or own_sensor(side))
-    return slice(sensor.adr[0], sensor.adr[0] + sensor.dim[0], 1 if finger.force_sensor else 3)
-
-
-def _slice(one: int, other: int | None = None) -> slice:
-    """The slice that holds these indices, in this order."""
-    if other is None:
-        return slice(int(one), int(one) + 1)
-    step = int(other - one)
-    end = int(other) + (1 if step > 0 else -1)
-    return slice(int(one), None if end < 0 else end, step)
+        self.effects.readings.apply(self.measured_position, self.measured_force)
 
 
 def write_base(plant: Plant, ids: np.ndarray, values: Mapping[str, np.ndarray]) -> np.ndarray:

@@ -2,9 +2,21 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar, NamedTuple, Protocol
 
 import numpy as np
+
+#: Memory of an effect by name, each array with a row for each of the effect's rows.
+State = dict[str, np.ndarray]
+
+
+class Contribution(NamedTuple):
+    """What an effect adds to one physics step, on its rows; None adds nothing."""
+
+    friction: np.ndarray | None = None  #: dry friction of the motors, N or N·m, ``(rows, motors)``
+    pad_shift_m: np.ndarray | None = None  #: displacement of the pads towards opening, ``(rows, 2)``
+    finger_push_n: np.ndarray | None = None  #: force on the pads, positive opens, ``(rows, 2)``
+    object_push_n: np.ndarray | None = None  #: force on the object along the grasp axis, ``(rows,)``
 
 
 class PlantEffect(Protocol):
@@ -12,8 +24,9 @@ class PlantEffect(Protocol):
 
     after_noise: ClassVar[bool]
     rows: np.ndarray
-    new_reading: np.ndarray
 
+    @property
+    def state(self) -> State: ...
     @property
     def rank(self) -> tuple[int, int]: ...
     @classmethod
@@ -24,7 +37,7 @@ class PlantEffect(Protocol):
     def reset(self, which: np.ndarray) -> None: ...
     def change_model(self, plant: Any, which: np.ndarray) -> None: ...
     def command(self, command: np.ndarray, fresh: np.ndarray) -> np.ndarray: ...
-    def act(self) -> None: ...
+    def act(self) -> Contribution: ...
     def interaction(self, force: np.ndarray) -> np.ndarray: ...
     def read_force(self, force: np.ndarray) -> np.ndarray: ...
     def read_position(self, position: np.ndarray) -> np.ndarray: ...

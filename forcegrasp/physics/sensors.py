@@ -1,4 +1,8 @@
-"""The sensor chain, in the one order in which everything is read: transduction, effects, noise, rounding."""
+"""The sensor chain, in the one order in which everything is read: transduction, effects, noise, rounding.
+
+Names along it, of forces as of positions: ``force`` is true, ``transduced_force`` goes into the reading,
+``measured_force`` has been through effects, ``sensed_force`` through noise and rounding, too.
+"""
 
 from __future__ import annotations
 

@@ -96,7 +96,7 @@ def play(plant: Plant, commands: np.ndarray = RICH) -> Trace:
 def read(plant: Plant) -> tuple[np.ndarray, np.ndarray]:
     """Positions and forces as sensors without noise give them: what the plant measures, then rounded."""
     position, force = plant.measured_position.copy(), plant.measured_force.copy()
-    for effect in plant._effects:
+    for effect in plant.effects:
         if is_rounding(type(effect)):
             position[effect.rows] = effect.read_position(position[effect.rows])
             force[effect.rows] = effect.read_force(force[effect.rows])

@@ -198,9 +198,8 @@ def test_metadata(effect):
 def test_parameters(effect, variant, parameter):
     p = parameter
     assert p.unit
-    assert p.name.endswith(
-        {"1": "", "m/N": "_m_n", "N/m": "_n_m", "N/s": "_n_s", "m/s": "_m_s"}.get(p.unit, f"_{p.unit.lower()}")
-    )
+    ending = p.unit.lower().replace("1/", "per/").replace("/", "_")
+    assert p.unit == "1" or p.name.endswith(f"_{ending}"), f"a name ends with its unit: …_{ending}"
     assert p.low < p.typical < p.high
     assert all(p.low <= size <= p.high for size in p.trials)
     assert np.isinf(p.null) or p.low <= p.null <= p.high

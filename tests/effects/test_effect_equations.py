@@ -162,9 +162,9 @@ def test_coulomb_friction_holds_up_to_its_size():
 def test_stiction_follows_the_stribeck_curve():
     effect = make("stiction", 0.05, 0.4)
     for speed in (0.0, 0.001, 0.002, -0.002, 0.01, 1.0):
-        stub = SimpleNamespace(velocity=np.full((1, 2), speed), friction=np.full((1, 2), 0.01))
-        effect.attach(stub, np.array([0])).act()
-        assert stub.friction - 0.01 == pytest.approx(0.02 + 0.03 * np.exp(-((speed / 0.002) ** 2)), abs=1e-12)
+        stub = SimpleNamespace(velocity=np.full((1, 2), speed))
+        friction = effect.attach(stub, np.array([0])).act().friction
+        assert friction == pytest.approx(0.02 + 0.03 * np.exp(-((speed / 0.002) ** 2)), abs=1e-12)
 
 
 def test_stiction_sticks_then_jumps():
@@ -255,7 +255,7 @@ def test_finger_compliance_deflects_in_proportion_to_force(compliance):
 
 
 class Pads:
-    """Stands for a plant with both pads at given places along the grasp axis, and collects what effects push."""
+    """Stands for a plant with both pads at given places along the grasp axis, and motors of any strength."""
 
     pad_shift_m = np.zeros((1, 2))
 
@@ -263,7 +263,9 @@ class Pads:
         pads = np.array([-1, 1]) * distance + centre  # the left one stands on the negative side
         self.pad_position, self.object_position = (pads * [-1, 1])[None], np.array([centre])
         self.pad_force = np.broadcast_to(np.asarray(force, float), (1, 2))
-        self.finger_push_n, self.object_push_n = np.zeros((1, 2)), np.zeros(1)
+
+    def strongest_press(self, rows: np.ndarray) -> np.ndarray:
+        return np.full((len(rows), 2), np.inf)
 
 
 def press(effect: Effect, distance: np.ndarray, force: np.ndarray, centre: np.ndarray | float = 0.0) -> np.ndarray:
@@ -278,11 +280,11 @@ def press(effect: Effect, distance: np.ndarray, force: np.ndarray, centre: np.nd
     added, everywhere = [], np.broadcast_to(centre, len(distance))
     for row, pushed, middle in zip(distance, force, everywhere, strict=True):
         plant = Pads(row, pushed, middle)
-        effect.attach(plant, np.array([0])).act()
+        push = effect.attach(plant, np.array([0])).act()
         added.append(effect.interaction(plant.pad_force)[0] - plant.pad_force[0])
-        assert plant.finger_push_n[0] == pytest.approx(added[-1], abs=1e-12)  # what presses opens the fingers
-        along_axis = plant.finger_push_n[0] * [-1, 1]  # opening moves the left finger to the negative side
-        assert plant.object_push_n[0] == pytest.approx(-along_axis.sum(), abs=1e-12)  # to every push its opposite
+        assert push.finger_push_n[0] == pytest.approx(added[-1], abs=1e-12)  # what presses opens the fingers
+        along_axis = push.finger_push_n[0] * [-1, 1]  # opening moves the left finger to the negative side
+        assert push.object_push_n[0] == pytest.approx(-along_axis.sum(), abs=1e-12)  # to every push its opposite
     return np.array(added)
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from forcegrasp.effects.base import Effect
+from forcegrasp.effects import Contribution, Effect
 from forcegrasp.physics.gripper_file import load_gripper
 from forcegrasp.physics.plant import Plant
 
@@ -20,9 +20,8 @@ class Push(Effect):
     name, stage, parameters = "push", "contact", ()
     newtons = (0.0, 0.0, 0.0)
 
-    def act(self) -> None:
-        self.plant.finger_push_n[self.rows] += self.newtons[:2]
-        self.plant.object_push_n[self.rows] += self.newtons[2]
+    def act(self) -> Contribution:
+        return Contribution(finger_push_n=np.array(self.newtons[:2]), object_push_n=np.array(self.newtons[2]))
 
 
 def _moved(gripper: str, newtons: tuple[float, float, float], seconds: float) -> tuple[np.ndarray, float]:
@@ -58,8 +57,8 @@ class ShiftOfTheRightPad(Effect):
 
     name, stage, parameters = "shift", "transmission", ()
 
-    def act(self) -> None:
-        self.plant.pad_shift_m[self.rows] += (0.0, 0.002)
+    def act(self) -> Contribution:
+        return Contribution(pad_shift_m=np.array([0.0, 0.002]))
 
 
 @pytest.mark.parametrize("gripper", ["tiago", SECOND], ids=["tiago", "second"])
@@ -73,3 +72,5 @@ def test_each_pad_has_a_shift_of_its_own(gripper):
     np.testing.assert_allclose(moved, np.where(right, 0.002, 0.0), atol=1e-12)
     assert left.any()
     assert right.any()
+    plant.reset(np.arange(1), np.zeros(1))
+    assert not plant.pad_shift_m.any()  # until the next step

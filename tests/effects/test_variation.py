@@ -41,7 +41,7 @@ def attached(model: Model, n: int) -> tuple[ModelVariation, Plant]:
 
 def values_of(plant: Plant) -> np.ndarray:
     """Parameters of all effects in a plant, ``(n, parameters)``."""
-    return np.concatenate([effect.values for effect in plant._effects], axis=1)
+    return np.concatenate([effect.values for effect in plant.effects], axis=1)
 
 
 def grasps(n: int) -> GraspParameters:
@@ -183,7 +183,7 @@ def test_delays_that_are_drawn_anew_act():
     """The line is long enough for the longest, and each row starts to move after its own delay."""
     rows = 6
     simulator = simulate(rows, model_of(NOMINAL, ("command_delay", {"delay_s": Fitted(0.0, 0.0, 0.2, "s")})))
-    (effect,) = simulator.plant._effects
+    (effect,) = simulator.plant.effects
     for seed in range(3):
         simulator.reset(grasps(rows), rng=np.random.default_rng(seed))
         moved = np.full(rows, np.nan)

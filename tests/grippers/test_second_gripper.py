@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from forcegrasp.effects.base import Effect
+from forcegrasp.effects.base import Contribution, Effect
 from forcegrasp.effects.registry import catalogue
 from forcegrasp.physics.gripper_file import load_gripper
 from forcegrasp.physics.plant import Plant, write_base
@@ -126,8 +126,8 @@ class Shift(Effect):
     name, stage, parameters = "shift", "transmission", ()
     shift_m = 0.0
 
-    def act(self) -> None:
-        self.plant.pad_shift_m[self.rows] += self.shift_m
+    def act(self) -> Contribution:
+        return Contribution(pad_shift_m=np.array(self.shift_m))
 
 
 def _touch_at(gripper, shift_m: float, radius: float) -> np.ndarray:

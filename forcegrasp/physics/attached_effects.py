@@ -1,0 +1,94 @@
+"""Effects in a plant: each on its own rows, where it acts, in the order of their stages."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Generator, Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from forcegrasp.physics.protocols import PlantEffect
+from forcegrasp.physics.sensors import ReadingEffects
+
+
+class AttachedEffects:
+    """Effects that are attached to one plant of ``n`` rows.
+
+    Args:
+      effects: in the order in which they act.
+    """
+
+    def __init__(self, effects: Sequence[PlantEffect]) -> None:
+        self._effects = tuple(effects)
+        self._command, self._act, self._interaction = (
+            [effect for effect in effects if hook in effect.hooks()] for hook in ("command", "act", "interaction")
+        )
+        self.readings = ReadingEffects(effects)
+        #: Whether any acts in every step, and not only on the model when a grasp starts.
+        self.act_in_steps = any(effect.hooks() - {"change_model"} for effect in effects)
+
+    def __len__(self) -> int:
+        return len(self._effects)
+
+    def __iter__(self) -> Iterator[PlantEffect]:
+        return iter(self._effects)
+
+    def change_model(self, plant: Any, ids: np.ndarray) -> None:
+        """Lets them change the model in these rows of the plant."""
+        for effect, which in self._rows_of(ids):
+            effect.change_model(plant, which)
+
+    def reset(self, ids: np.ndarray) -> None:
+        """Gives them the memory of a new grasp in these rows of the plant, where it stands at its start."""
+        for effect, which in self._rows_of(ids):
+            effect.reset(which)
+
+    @contextlib.contextmanager
+    def kept(self, ids: np.ndarray) -> Generator[None]:
+        """Keeps their memory in these rows of the plant, whatever is read meanwhile."""
+        before = [
+            (effect, which, {name: values[which] for name, values in effect.state.items()})
+            for effect, which in self._rows_of(ids)
+        ]
+        yield
+        for effect, which, memory in before:
+            for name, values in memory.items():
+                effect.state[name][which] = values
+
+    def command(self, command: np.ndarray, fresh: np.ndarray) -> np.ndarray:
+        """Commanded positions ``(n, motors)`` on their way to the motors; which are new ones: ``fresh`` ``(n,)``."""
+        if not self._command:
+            return command
+        command = np.array(command, float)
+        for effect in self._command:
+            command[effect.rows] = effect.command(command[effect.rows], fresh[effect.rows])
+        return command
+
+    def contribute(self, totals: Sequence[np.ndarray]) -> bool:
+        """Sums up what they contribute to a step; returns whether any may.
+
+        Args:
+          totals: set to the sums, of all rows, in the order of :class:`~forcegrasp.physics.protocols.Contribution`.
+            An effect finds those of the ones before it.
+        """
+        if not self._act:
+            return False
+        for total in totals:
+            total[:] = 0
+        for effect in self._act:
+            for total, added in zip(totals, effect.act(), strict=True):
+                if added is not None:
+                    total[effect.rows] += added
+        return True
+
+    def interaction(self, force: np.ndarray) -> np.ndarray:
+        """True forces between pads and object, newtons, ``(n, 2)``, from those of the contacts."""
+        force = force.copy()
+        for effect in self._interaction:
+            force[effect.rows] = effect.interaction(force[effect.rows])
+        return force
+
+    def _rows_of(self, ids: np.ndarray) -> list[tuple[PlantEffect, np.ndarray]]:
+        """Each effect with those of its own rows that are among these of the plant."""
+        return [(effect, np.flatnonzero(np.isin(effect.rows, ids))) for effect in self._effects]

@@ -1,0 +1,138 @@
+"""Where motors, pads, forces and the object stand in the arrays of a gripper's compiled scene."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from forcegrasp.physics.gripper import SIDES, Gripper, effort_sensor, own_sensor
+from forcegrasp.physics.gripper_parts import Finger
+from forcegrasp.physics.opening import command_law
+
+
+class SceneLayout:
+    """A gripper's places in its scene, and what arrays of the engine mean for its motors, sides and force channels.
+
+    Args:
+      gripper: whose scene it is.
+      model: the scene, compiled.
+    """
+
+    def __init__(self, gripper: Gripper, model: mujoco.MjModel) -> None:
+        self.gripper, self.model = gripper, model
+        self.motors, self.channels = len(gripper.motors), len(gripper.forces)  #: how many there are
+        joints = [model.joint(motor.joint) for motor in gripper.motors]
+        #: degrees of freedom of the motors (left, right, or the one), and of the object along the grasp axis
+        self.motor_dofs = [joint.dofadr[0] for joint in joints]
+        object_joint = model.joint(gripper.object_joint)
+        is_free = object_joint.type[0] == mujoco.mjtJoint.mjJNT_FREE
+        self._object_qpos = object_joint.qposadr[0] + (gripper.axis if is_free else 0)
+        self._object_origin = model.qpos0[self._object_qpos]  # the middle of the grasp is where the scene puts it
+        self.object_dof = object_joint.dofadr[0] + (gripper.axis if is_free else 0)
+        #: degrees of freedom of everything but the object
+        self.gripper_dofs = [i for i in range(model.nv) if model.dof_jntid[i] != object_joint.id]
+        self.actuators = [model.actuator(motor.actuator).id for motor in gripper.motors]
+        # where motors stand in the engine's arrays: slices, for they are read and written in every step
+        self._motor_q = _slice(*(joint.qposadr[0] for joint in joints))
+        self._motor_v, self._drives = _slice(*self.motor_dofs), _slice(*self.actuators)
+        self._object_body = model.geom(gripper.object_geom).bodyid[0]
+        #: geoms of the object
+        self.object_geoms = np.flatnonzero(model.geom_bodyid == self._object_body)
+        self._pads = [_Pads.find(model, finger.body) for finger in gripper.fingers]
+        self._signs = np.array([motor.sign for motor in gripper.motors])
+        self._origins = np.array([motor.closed for motor in gripper.motors])
+        self._command_scale, self._command_zero = command_law(gripper.motors, model)
+        #: Which motor moves each side, and how far its pads go per unit of it; 0 for a side that stands still.
+        self._mover = np.array([max(finger.motor, 0) for finger in gripper.fingers])
+        self.travel = np.where([f.motor >= 0 for f in gripper.fingers], gripper.opening.travel, 0.0)
+        self._readings = [_reading(model, *pair) for pair in zip(SIDES, gripper.fingers, strict=True)]
+        self._efforts = self._effort_readings(model)
+        self._felt = [i for i, finger in enumerate(gripper.fingers) if finger.force_sensor]
+
+    def _effort_readings(self, model: mujoco.MjModel) -> tuple[list[int], np.ndarray]:
+        """Where the motors' efforts are read, and the fingertip newtons of each, pressing positive, per unit of it."""
+        if self.gripper.force != "motor":
+            return [], np.empty(0)
+        addresses = [model.sensor(effort_sensor(motor)).adr[0] for motor in self.gripper.motors]
+        factors = np.empty(self.motors)
+        for index, motor in enumerate(self.gripper.motors):
+            drive = model.actuator(motor.actuator)
+            length_per_position = self._command_scale[index] * drive.gainprm[0] / -drive.biasprm[1]
+            factors[index] = -length_per_position / self.travel[self._moved_by(index)].sum()
+        return addresses, factors
+
+    def _moved_by(self, motor: int) -> np.ndarray:
+        return (self._mover == motor) & (self.travel != 0)
+
+    def to_sides(self, of_motors: np.ndarray) -> np.ndarray:
+        """Displacements of motors ``(..., motors)`` as displacements of the pads they move, metres, ``(..., 2)``."""
+        return of_motors if self.gripper.is_direct else of_motors[..., self._mover] * self.travel
+
+    def _to_motors(self, push_n: np.ndarray) -> np.ndarray:
+        """Forces on the pads as what they do to the motors that move them, N or N·m, ``(n, motors)``."""
+        if self.gripper.is_direct:
+            return push_n
+        work = push_n * self.travel
+        return np.stack([work[:, self._moved_by(motor)].sum(axis=1) for motor in range(self.motors)], axis=1)
+
+    @functools.cached_property
+    def _dofs_of_right(self) -> set[int]:
+        """Degrees of freedom between the world and the right side's pads."""
+        found: set[int] = set()
+        body = int(self.model.body(self.gripper.fingers[1].body).id)
+        while body:
+            first = int(self.model.body_dofadr[body])
+            found |= set(range(first, first + int(self.model.body_dofnum[body]))) if first >= 0 else set()
+            body = int(self.model.body_parentid[body])
+        return found
+
+    def _motors_of(self, qpos: np.ndarray) -> np.ndarray:
+        return (qpos[..., self._motor_q] - self._origins) * self._signs
+
+    def _channels_of(self, sensors: np.ndarray, force: np.ndarray, scale: np.ndarray) -> np.ndarray:
+        """What the force channels transduce, newtons, ``(..., channels)``: forces of fingers, or efforts of motors."""
+        addresses, factors = self._efforts
+        if addresses:
+            return sensors[..., addresses] * factors * scale
+        return force if len(self._felt) == 2 else force[..., self._felt]
+
+    def _pads_of(self, sensors: np.ndarray) -> np.ndarray:
+        # contiguous, lest the order of the sum depend on n
+        sums = [np.ascontiguousarray(sensors[..., part]).sum(axis=-1) for part in self._readings]
+        return np.stack(sums, axis=-1)
+
+
+@dataclass(frozen=True)
+class _Pads:
+    """What moves with a side's pads, in the frame of their body."""
+
+    body: int
+    moved: dict[str, np.ndarray]  #: field of positions → indices
+
+    @classmethod
+    def find(cls, model: mujoco.MjModel, name: str) -> _Pads:
+        body = int(model.body(name).id)
+        moved = {
+            "geom_pos": np.flatnonzero(model.geom_bodyid == body),
+            "site_pos": np.flatnonzero(model.site_bodyid == body),
+            "body_pos": np.flatnonzero(model.body_parentid == body),
+        }
+        return cls(body, moved)
+
+
+def _reading(model: mujoco.MjModel, side: str, finger: Finger) -> slice:
+    """Where the numbers stand whose sum is a side's force; of sensors that were added, the normal forces alone."""
+    sensor = model.sensor(finger.force_sensor or own_sensor(side))
+    return slice(sensor.adr[0], sensor.adr[0] + sensor.dim[0], 1 if finger.force_sensor else 3)
+
+
+def _slice(one: int, other: int | None = None) -> slice:
+    """The slice that holds these indices, in this order."""
+    if other is None:
+        return slice(int(one), int(one) + 1)
+    step = int(other - one)
+    end = int(other) + (1 if step > 0 else -1)
+    return slice(int(one), None if end < 0 else end, step)
