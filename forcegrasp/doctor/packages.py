@@ -42,6 +42,7 @@ MODULES = (
     "omegaconf",
     "yaml",
     "polars",
+    "pydantic",
     "safetensors.torch",
     "matplotlib.figure",
     "PIL.Image",

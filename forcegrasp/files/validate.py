@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any, TypeVar, get_args
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, ValidationError
@@ -13,7 +13,7 @@ from pydantic_core import ErrorDetails, PydanticCustomError
 from forcegrasp.errors import ConfigError, ForcegraspError, closest
 
 # So many problems of a file are told at once; longest key and value in a message.
-_MOST, _LONGEST_KEY, _LONGEST_VALUE = 3, 80, 40
+_MOST, _LONGEST_KEY, _LONGEST_VALUE = 5, 80, 40
 _NUMBER, _TEXT = "must be a number", "must be text"
 _EXPONENT = re.compile(r"[-+.\d]+[eE][-+]?\d+")
 _PROBLEMS = {
@@ -47,7 +47,7 @@ def validate(
       error: what to raise.
 
     Raises:
-      ForcegraspError: says what is wrong with up to three keys, unknown ones first.
+      ForcegraspError: says what is wrong with up to five keys, unknown ones first.
     """
     try:
         return kind.model_validate(_with_text_keys(raw))
@@ -79,6 +79,17 @@ def text(longest: int, lines: bool = False) -> AfterValidator:
             raise wrong("must be text and not empty")
         if not (value.replace("\n", "") if lines else value).isprintable():
             raise wrong(f"{_cut(repr(value), _LONGEST_VALUE)} holds characters that can't be printed; remove them")
+        return value
+
+    return AfterValidator(check)
+
+
+def must(holds: Callable[[Any], bool], problem: str) -> AfterValidator:
+    """Makes a validator of what must hold; braces in ``problem`` are the value."""
+
+    def check(value: Any) -> Any:
+        if not holds(value):
+            raise wrong(problem.format(value))
         return value
 
     return AfterValidator(check)

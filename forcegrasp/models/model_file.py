@@ -12,14 +12,14 @@ from typing import Annotated, Any, TypeVar
 import mujoco
 import numpy as np
 import yaml
-from pydantic import AfterValidator, ConfigDict, Field, model_validator
+from pydantic import ConfigDict, Field, model_validator
 
 from forcegrasp.effects import Effect
 from forcegrasp.effects.base import Parameter
 from forcegrasp.effects.for_gripper import effect_of
 from forcegrasp.errors import ConfigError, closest
 from forcegrasp.files import plain_yaml
-from forcegrasp.files.validate import Record, refusal, validate, wrong
+from forcegrasp.files.validate import Record, must, refusal, validate, wrong
 from forcegrasp.files.whole_file import write_whole
 from forcegrasp.physics.gripper import Gripper
 from forcegrasp.physics.gripper_file import load_gripper
@@ -150,20 +150,12 @@ def read_model(path: str | Path) -> Model:
     )
 
 
-def _number(value: float) -> float:
-    if math.isnan(value):
-        raise wrong("must be a number, not nan")
-    return value
-
-
-def _noise(value: float) -> float:
-    if not 0 < value < math.inf:
-        raise wrong("must be positive; leave noise out if it is not known")
-    return value
-
-
-_Number = Annotated[float, Field(allow_inf_nan=True), AfterValidator(_number)]
-_Noise = Annotated[float, Field(allow_inf_nan=True), AfterValidator(_noise)]
+_Number = Annotated[float, Field(allow_inf_nan=True), must(lambda v: not math.isnan(v), "must be a number, not nan")]
+_Noise = Annotated[
+    float,
+    Field(allow_inf_nan=True),
+    must(lambda std: 0 < std < math.inf, "must be positive; leave noise out if it is not known"),
+]
 
 
 class _Interval(Record):
@@ -191,7 +183,7 @@ class _Effect(Record):
     """Every other key is one of its parameters."""
 
     model_config = ConfigDict(extra="allow")
-    __pydantic_extra__: dict[str, _Interval]
+    __pydantic_extra__: dict[str, _Interval]  # pyright: ignore[reportIncompatibleVariableOverride]
     variant: str = ""
 
 
@@ -203,13 +195,13 @@ class _ReadingNoise(Record):
 class _File(Record):
     format: str
     gripper: str = Field(description="name, or the path of its description", examples=["./my_gripper.yaml"])
-    mujoco: Any = Field(None, description="version; for the reader")
-    data: dict[str, str] | None = Field(None, description="measurement set and fingerprint")
+    mujoco: Any = Field(default=None, description="version; for the reader")
+    data: dict[str, str] | None = Field(default=None, description="measurement set and fingerprint")
     base: dict[str, _Interval] = Field(description="base parameters of the gripper as a whole")
-    objects: dict[str, dict[str, _Interval]] | None = Field(None, description="object: its base parameters")
-    grasps: dict[str, dict[str, _Interval]] | None = Field(None, description="grasp: its base parameters")
-    effects: dict[str, _Effect] | None = Field(None, description="effect: its parameters")
-    noise: _ReadingNoise | None = Field(None, description="standard deviations of the readings")
+    objects: dict[str, dict[str, _Interval]] | None = Field(default=None, description="object: its base parameters")
+    grasps: dict[str, dict[str, _Interval]] | None = Field(default=None, description="grasp: its base parameters")
+    effects: dict[str, _Effect] | None = Field(default=None, description="effect: its parameters")
+    noise: _ReadingNoise | None = Field(default=None, description="standard deviations of the readings")
     warnings: list[str] | None = None
 
 

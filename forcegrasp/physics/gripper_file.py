@@ -1,5 +1,7 @@
 """Reads the description of a gripper, as YAML; what it does not say follows from the scene."""
 
+# pyright: standard
+
 from __future__ import annotations
 
 import dataclasses
@@ -66,16 +68,18 @@ def _load(path: Path) -> Gripper:
     except (OSError, plain_yaml.PlainYamlError) as error:
         why = getattr(error, "strerror", None) or str(error)
         raise refusal(path, "", f"could not read the gripper description: {why}") from error
-    if isinstance(raw, dict) and raw.get("format") not in (FORMAT, FIRST_FORMAT):
-        problem = f"must be {FORMAT}; {FIRST_FORMAT} is read, too" if "format" in raw else f"missing; must be {FORMAT}"
-        raise refusal(path, "format", problem)
-    if isinstance(raw, dict) and raw["format"] == FIRST_FORMAT:
+    written = raw.get("format", "missing") if isinstance(raw, dict) else FORMAT
+    if written not in (FORMAT, FIRST_FORMAT):
+        also = "missing; " if written == "missing" else ""
+        raise refusal(path, "format", f"{also}must be {FORMAT}; {FIRST_FORMAT} is read, too")
+    if written == FIRST_FORMAT:
         description, names = validate(FirstDescription, raw, path).as_second(), _FIRST_NAMES
     else:
         description, names = validate(Description, raw, path), _NAMES
     gripper = _in_scene(_gripper(path, description))
     check_gripper(gripper, names)
-    return dataclasses.replace(gripper, training=training_of_scene(gripper, description.training_keys))
+    given = description.training.model_dump(exclude_none=True, exclude_unset=True) if description.training else {}
+    return dataclasses.replace(gripper, training=training_of_scene(gripper, given))
 
 
 #: What messages call the parts of a description.

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import re
-from dataclasses import fields
-from typing import Annotated, Any, Literal
+from collections.abc import Sequence
+from typing import Annotated, Literal
 
-from pydantic import AfterValidator, Field, PlainValidator, PositiveFloat, create_model, model_validator
+from pydantic import AfterValidator, Field, PlainValidator, PositiveFloat, model_validator
 
 from forcegrasp.errors import closest
-from forcegrasp.files.validate import Record, counted, text, wrong
+from forcegrasp.files.validate import Record, counted, must, text, wrong
 from forcegrasp.physics.gripper import SIDES, SPECIAL
-from forcegrasp.physics.gripper_parts import FieldWrite, Training
+from forcegrasp.physics.gripper_parts import FieldWrite
 
 FORMAT, FIRST_FORMAT = "forcegrasp-gripper/2", "forcegrasp-gripper/1"
 _WRITE = re.compile(r"(-?)((?:actuator|dof|geom)_\w+)(?: (\d+))?")
@@ -25,16 +25,11 @@ def _field_write(written: object) -> FieldWrite:
     return FieldWrite(field, None if column is None else int(column), -1.0 if sign else 1.0)
 
 
-def _ordered(ends: tuple[float, float]) -> tuple[float, float]:
-    if ends[0] > ends[1]:
-        raise wrong("must be [low, high] with low ≤ high")
-    return ends
-
-
 Name = Annotated[str, text(200)]
 Pair = Annotated[tuple[float, float], counted(2, 2, "two numbers in brackets")]
-Range = Annotated[Pair, AfterValidator(_ordered)]
-Names = Annotated[tuple[Name, Name], counted(2, 2, "two names, [left, right]")]
+Range = Annotated[Pair, must(lambda ends: ends[0] <= ends[1], "must be [low, high] with low ≤ high")]
+_TWO = "two names, [left, right]"
+Names = Annotated[tuple[Name, Name], counted(2, 2, _TWO), must(lambda names: names[0] != names[1], f"must be {_TWO}")]
 
 
 class _Stroke(Record):
@@ -58,9 +53,9 @@ class MotorEntry(_Stroke):
 class FingerEntry(Record):
     """One side of the grasp."""
 
-    joint: Name | None = Field(None, description="the joint that moves the side")
-    body: Name | None = Field(None, description="the body of its pads, where no joint or several move it")
-    force_sensor: Name | None = Field(None, description="its sensor")
+    joint: Name | None = Field(default=None, description="the joint that moves the side")
+    body: Name | None = Field(default=None, description="the body of its pads, where no joint or several move it")
+    force_sensor: Name | None = Field(default=None, description="its sensor")
 
     @model_validator(mode="after")
     def _moved_or_not(self) -> FingerEntry:
@@ -105,26 +100,35 @@ class ParameterEntry(Record):
 
 
 class ControlEntry(Record):
-    period_s: PositiveFloat = Field(0.04, description="time between two commands, s")
-    max_step: PositiveFloat | None = Field(None, description="largest command step, m or rad")
+    period_s: PositiveFloat = Field(default=0.04, description="time between two commands, s")
+    max_step: PositiveFloat | None = Field(default=None, description="largest command step, m or rad")
 
 
 class ScaleEntry(Record):
     """Factors of the sizes at which effects are looked for."""
 
-    position: PositiveFloat | None = Field(None, description="of positions")
-    force: PositiveFloat = Field(1.0, description="of forces")
+    position: PositiveFloat | None = Field(default=None, description="of positions")
+    force: PositiveFloat = Field(default=1.0, description="of forces")
 
 
-#: What a training draws; what is left out follows from the scene.
-_TRAINING_TYPES = {
-    "tuple[float, float]": Range,
-    "dict[str, tuple[float, float]]": dict[str, Pair],
-    "str": Name,
-    "float": float,
-}
-_TRAINING_KEYS: dict[str, Any] = {f.name: (_TRAINING_TYPES[str(f.type)] | None, None) for f in fields(Training)}
-TrainingEntry = create_model("TrainingEntry", __base__=Record, **_TRAINING_KEYS)
+class TrainingEntry(Record):
+    """What a training draws; what is left out follows from the scene."""
+
+    radius_m: Range | None = Field(default=None, description="radii of objects")
+    start_radius_m: Range | None = Field(default=None, description="the same at the start of the curriculum")
+    offset_m: Range | None = Field(default=None, description="where objects stand along the axis")
+    start_offset_m: Range | None = Field(default=None, description="the same at the start of the curriculum")
+    deformation_m: float | None = Field(default=None, description="largest deformation, both sides together")
+    goal_force_min_n: float | None = Field(default=None, description="smallest goal force")
+    max_force_n: float | None = Field(default=None, description="force of a finger at the largest command step")
+    softness: dict[str, Pair] = Field(default={}, description="parameter: [hard, soft], its values at κ = 0 and 1")
+    servo_gain: Name | None = Field(default=None, description="base parameter that is drawn with every grasp")
+    servo_gain_range: Range | None = Field(default=None, description="its range")
+    position_std: float | None = Field(default=None, description="noise of the encoders, m or rad")
+    force_std_n: float | None = Field(default=None, description="noise of the forces")
+    contact_threshold_n: float | None = Field(default=None, description="force above which a finger touches")
+    assumed_stiffness: float | None = Field(default=None, description="k of the hand-written controller, N/m or N/rad")
+    closing_step: float | None = Field(default=None, description="its command step while it closes, m or rad")
 
 
 def _complete(parameters: dict[str, ParameterEntry]) -> dict[str, ParameterEntry]:
@@ -145,7 +149,7 @@ class _Description(Record):
     format: str = Field(description=f"{FORMAT}; {FIRST_FORMAT} is read, too")
     name: Name = Field(description="for titles and messages, and so that models and policies know theirs")
     model: Name = Field(description="the MJCF, beside the description")
-    fast: Literal["none", "sphere"] = Field("none", description="what pads touch in the fast tier")
+    fast: Literal["none", "sphere"] = Field(default="none", description="what pads touch in the fast tier")
     object: ObjectEntry
     parameters: Annotated[dict[str, ParameterEntry], AfterValidator(_complete)] = Field(
         description="the base model: what a comparison may fit before it looks for missing effects"
@@ -155,28 +159,23 @@ class _Description(Record):
 class Description(_Description):
     """A gripper of one or two motors."""
 
-    motors: Annotated[tuple[MotorEntry, ...], counted(1, 2, "a list of one motor, or of two (left, right)")] = Field(
+    motors: Annotated[Sequence[MotorEntry], counted(1, 2, "a list of one motor, or of two (left, right)")] = Field(
         description="one motor, or two: left, right",
         examples=["[{joint: j, actuator: a, closed: 0, open: 0.04}]"],
     )
     fingers: FingersEntry
-    force: Literal["sensors", "motor", "none"] | None = Field(None, description="where forces are read")
+    force: Literal["sensors", "motor", "none"] | None = Field(default=None, description="where forces are read")
     control: ControlEntry | None = None
     scale: ScaleEntry | None = None
-    training: TrainingEntry | None = Field(None, description="what a training draws; the rest follows from the scene")
-
-    @property
-    def training_keys(self) -> dict[str, Any]:
-        """What the file says of training."""
-        return self.training.model_dump(exclude_none=True) if self.training else {}
+    training: TrainingEntry | None = None
 
     @model_validator(mode="after")
     def _fits_together(self) -> Description:
-        names, training = self.parameters, self.training_keys
-        gain = {training["servo_gain"]} if "servo_gain" in training else set()
-        for key, drawn in (("softness", set(training.get("softness", {}))), ("servo_gain", gain)):
-            for name in sorted(drawn - set(names)):
-                raise wrong(f"no parameter {name!r}{closest(name, names)}", "training", key)
+        known, training = self.parameters, self.training or TrainingEntry()
+        for key, names in (("softness", [*training.softness]), ("servo_gain", [training.servo_gain])):
+            for name in names:
+                if name and name not in known:
+                    raise wrong(f"no parameter {name!r}{closest(name, known)}", "training", key)
         has_sensor = bool(self.fingers.left.force_sensor or self.fingers.right.force_sensor)
         if self.force and (self.force == "sensors") != has_sensor:
             raise wrong(f"{self.force}: `sensors` needs a finger with a force_sensor, the others need none", "force")
@@ -187,14 +186,6 @@ class _FirstFingers(_Stroke):
     joints: Names
     actuators: Names
     force_sensors: Names
-
-    @model_validator(mode="after")
-    def _must_be_two(self) -> _FirstFingers:
-        for key in ("joints", "actuators", "force_sensors"):
-            left, right = getattr(self, key)
-            if left == right:
-                raise wrong("must be two names, [left, right]", key)
-        return self
 
 
 class FirstDescription(_Description):

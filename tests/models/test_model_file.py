@@ -203,7 +203,7 @@ BROKEN = {
     "effect's interval out of bounds around null": (
         GAP, "gap_m: {value: 0.0, low: -.inf, high: .inf}", ["effects.backlash.gap_m: must lie in"],
     ),
-    "effect's parameter NaN": ("right_n: -0.02", "right_n: .nan", ["effects.force_bias.right_n.value: must be a number"]),
+    "effect's parameter NaN": ("right_n: -0.02", "right_n: .nan", ["force_bias.right_n.value: must be a number"]),
     "effect's unit": ("high: 0.0005, unit: m", "high: 0.0005, unit: mm", ["effects.backlash.gap_m.unit: must be m"]),
     "data is a list": ("data: {set: mine, fingerprint: 0abc}", "data: [1]", ["data: must be a mapping"]),
     "data holds more than text": ("fingerprint: 0abc", "fingerprint: [1]", ["data.fingerprint: must be text"]),
