@@ -43,6 +43,7 @@ MODULES = (
     "yaml",
     "polars",
     "pydantic",
+    "pydantic_core",
     "safetensors.torch",
     "matplotlib.figure",
     "PIL.Image",

@@ -57,7 +57,8 @@ def load(path: str | Path) -> Loaded[MeasurementSet] | Loaded[FinalForceTable]:
     gripper = load_gripper(measured.gripper, measured.path)
     if isinstance(measured, FinalForceTable):
         return Loaded(measured, gripper, check_table(measured, gripper.stroke))
-    odd = check_set(measured, gripper.stroke, half_opening_m=float(gripper.opening.opening_m[-1]) / 2)
+    half_opening_m = float(gripper.opening.opening_m[-1]) / 2
+    odd = check_set(measured, gripper.stroke, half_opening_m=half_opening_m, pads_at=gripper.pads_at)
     return Loaded(measured, gripper, odd + check_given_noise(measured, gripper.unit))
 
 

@@ -148,11 +148,12 @@ def _complete(parameters: dict[str, ParameterEntry]) -> dict[str, ParameterEntry
 class _Description(Record):
     format: str = Field(description=f"{FORMAT}; {FIRST_FORMAT} is read, too")
     name: Name = Field(description="for titles and messages, and so that models and policies know theirs")
-    model: Name = Field(description="the MJCF, beside the description")
+    model: Name = Field(description="the MJCF, beside the description", examples=["my_gripper.xml"])
     fast: Literal["none", "sphere"] = Field(default="none", description="what pads touch in the fast tier")
-    object: ObjectEntry
+    object: ObjectEntry = Field(examples=["{joint: object, geom: object, axis: x}"])
     parameters: Annotated[dict[str, ParameterEntry], AfterValidator(_complete)] = Field(
-        description="the base model: what a comparison may fit before it looks for missing effects"
+        description="the base model: what a comparison may fit before it looks for missing effects",
+        examples=["{radius_m: {nominal: 0.02, low: 0.01, high: 0.04, unit: m, scope: object, writes: []}, …}"],
     )
 
 
@@ -163,7 +164,7 @@ class Description(_Description):
         description="one motor, or two: left, right",
         examples=["[{joint: j, actuator: a, closed: 0, open: 0.04}]"],
     )
-    fingers: FingersEntry
+    fingers: FingersEntry = Field(examples=["{left: {joint: finger_l}, right: {joint: finger_r}}"])
     force: Literal["sensors", "motor", "none"] | None = Field(default=None, description="where forces are read")
     control: ControlEntry | None = None
     scale: ScaleEntry | None = None
@@ -176,6 +177,11 @@ class Description(_Description):
             for name in names:
                 if name and name not in known:
                     raise wrong(f"no parameter {name!r}{closest(name, known)}", "training", key)
+        if (training.servo_gain is None) != (training.servo_gain_range is None):
+            absent = "servo_gain" if training.servo_gain is None else "servo_gain_range"
+            raise wrong(
+                "missing; a training draws the gain of `servo_gain` from `servo_gain_range`", "training", absent
+            )
         has_sensor = bool(self.fingers.left.force_sensor or self.fingers.right.force_sensor)
         if self.force and (self.force == "sensors") != has_sensor:
             raise wrong(f"{self.force}: `sensors` needs a finger with a force_sensor, the others need none", "force")
