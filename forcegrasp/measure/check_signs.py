@@ -1,4 +1,4 @@
-"""Which way is closing, which sign presses, which finger is which? Refuses only where no effect could be the reason."""
+"""Checks the closing direction, the sign of forces, and left against right. Refuses only what no effect explains."""
 
 from __future__ import annotations
 

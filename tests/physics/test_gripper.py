@@ -274,6 +274,53 @@ def test_broken_value_is_one_line_with_file_and_key(tmp_path, key, value, expect
     assert expected in _refusal(_copy(tmp_path, description))
 
 
+#: The same for the shipped descriptions of the second format.
+BROKEN_SECOND = [
+    ("motors", ..., "motors: missing, such as `[{joint: j, actuator: a, closed: 0, open: 0.04}]`"),
+    ("motors", {}, "motors: must be a list of one motor, or of two (left, right)"),
+    ("motors.0.open", "wide", "motors[0].open: must be a number, not wide"),
+    ("motors.0.joints", "a", "motors[0].joints: unknown; did you mean joint"),
+    ("fingers.left.body", "pad", "fingers.left: needs the joint that moves it, or the body of its pads"),
+    ("force", "effort", "force: must be sensors, motor or none, not effort"),
+    ("force", "motor", "force: motor: `sensors` needs a finger with a force_sensor, the others need none"),
+    ("control.period_s", 0, "control.period_s: must be positive"),
+    ("scale.force", True, "scale.force: must be a number, not True"),
+    ("training.radius_m", [0.03, 0.02], "training.radius_m: must be [low, high] with low ≤ high"),
+    ("training.radius_m", 0.03, "training.radius_m: must be two numbers in brackets"),
+    ("training.radius", [0.02, 0.03], "training.radius: unknown; did you mean radius_m"),
+    ("training.softness.width", [1, 2], "training.softness: no parameter 'width'"),
+    ("training.servo_gain", "gain", "training.servo_gain: no parameter 'gain'"),
+    ("training.servo_gain", ..., "training.servo_gain: missing; a training draws the gain of `servo_gain` from"),
+    ("training.servo_gain_range", ..., "training.servo_gain_range: missing"),
+]
+
+
+@pytest.mark.parametrize(("key", "value", "expected"), BROKEN_SECOND)
+def test_broken_value_of_the_second_format(tmp_path, key, value, expected):
+    shipped = load_gripper("tiago").path
+    description = yaml.safe_load(shipped.read_text())
+    *parents, last = key.split(".")
+    place = description
+    for parent in parents:
+        place = place[int(parent)] if isinstance(place, list) else place[parent]
+    if value is ...:
+        del place[last]
+    else:
+        place[last] = value
+    (tmp_path / "tiago.xml").write_text(shipped.with_suffix(".xml").read_text())
+    path = tmp_path / "mine.yaml"
+    path.write_text(yaml.safe_dump(description))
+    assert expected in _refusal(path)
+
+
+def test_several_wrong_keys_are_told_at_once(tmp_path):
+    (tmp_path / "second.yaml").write_text("format: forcegrasp-gripper/2\nname: 7\nmodle: a.xml\n")
+    message = _refusal(tmp_path / "second.yaml")
+    assert "second.yaml: modle: unknown; did you mean model?; also name: must be text, not 7" in message
+    assert "also model: missing" in message
+    assert message.endswith("more")
+
+
 @pytest.mark.parametrize(
     ("content", "expected"),
     [
