@@ -42,6 +42,8 @@ MODULES = (
     "omegaconf",
     "yaml",
     "polars",
+    "pydantic",
+    "pydantic_core",
     "safetensors.torch",
     "matplotlib.figure",
     "PIL.Image",

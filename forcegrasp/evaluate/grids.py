@@ -6,12 +6,15 @@ import dataclasses
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
+from pydantic import Field
 
 from forcegrasp.config import GraspConfig
 from forcegrasp.errors import ConfigError
-from forcegrasp.measure.yaml_file import Reader, load_yaml
+from forcegrasp.files.validate import counted, must, refusal, validate
+from forcegrasp.measure.yaml_file import Number, TextRecord, load_yaml
 from forcegrasp.physics import GraspParameters, GraspSampler, Gripper, default_gripper
 from forcegrasp.physics.completion import complete
 from forcegrasp.physics.sampling import offset_limits_m
@@ -85,33 +88,33 @@ def read_objects(name: str, grasp: GraspConfig, gripper: Gripper | None = None) 
     gripper = gripper or default_gripper()
     grasp = complete(grasp, gripper)
     path = Path(str(files("forcegrasp.assets") / "paper_objects.yaml")) if name == PAPER_OBJECTS else Path(name)
-    top = Reader(load_yaml(path), str(path), ("format", "objects"))
-    if top.text("format", 80) != FORMAT:
+    said = validate(_File, load_yaml(path), path)
+    if said.format != FORMAT:
         raise ConfigError(f"{path}: format: must be {FORMAT}")
-    listed = top.get("objects")
-    if not isinstance(listed, dict) or not listed:
-        raise ConfigError(f"{path}: objects: must hold an object a line, each `name: {{diameter_m: ...}}`")
     widest = float(gripper.opening.opening_m[-1])
-    return [_read_object(path, key, entry, grasp, widest) for key, entry in listed.items()]
+    for name, item in said.objects.items():
+        low, high = item.goal_force_n
+        for key, value, least, most in (
+            ("diameter_m", item.diameter_m, 2 * grasp.deformation_m, widest),
+            ("kappa", item.kappa, -1e-12, 1 + 1e-12),
+            ("goal_force_n", low, 0, 50),
+            ("goal_force_n", high, 0, 50),
+        ):
+            if not least < value < most:
+                raise refusal(path, f"objects.{name}.{key}", f"must lie between {least:.3g} and {most:.3g}")
+    return [GraspedObject(name, i.diameter_m, i.kappa, i.goal_force_n) for name, i in said.objects.items()]
 
 
-def _read_object(path: Path, name: str, entry: object, grasp: GraspConfig, widest_m: float) -> GraspedObject:
-    place = f"{path}: objects.{name}"
-    reader = Reader(entry, place, ("diameter_m", "kappa", "goal_force_n"))
-    diameter = _between(reader, "diameter_m", 2 * grasp.deformation_m, widest_m)
-    kappa = _between(reader, "kappa", -1e-12, 1 + 1e-12)
-    goals = reader.get("goal_force_n")
-    if not isinstance(goals, list) or len(goals) != 2:
-        raise reader.refuse("goal_force_n", "must be [low, high]")
-    bounds = Reader(dict(zip(("low", "high"), goals, strict=True)), f"{place}: goal_force_n", ("low", "high"))
-    low, high = (_between(bounds, key, 0, 50) for key in ("low", "high"))
-    if low > high:
-        raise reader.refuse("goal_force_n", f"{low:g} > {high:g}; must be [low, high]")
-    return GraspedObject(name, diameter, kappa, (low, high))
+_ORDERED = must(lambda ends: ends[0] <= ends[1], "{0[0]:g} > {0[1]:g}; must be [low, high]")
+_EXAMPLE = "cup: {diameter_m: 0.06, kappa: 0.3, goal_force_n: [0.2, 0.9]}"
 
 
-def _between(reader: Reader, key: str, low: float, high: float) -> float:
-    value = reader.number(key)
-    if value is None or not low < value < high:
-        raise reader.refuse(key, f"must lie between {low:.3g} and {high:.3g}")
-    return value
+class _Object(TextRecord):
+    diameter_m: Number
+    kappa: Number
+    goal_force_n: Annotated[tuple[Number, Number], counted(2, 2, "[low, high]"), _ORDERED]
+
+
+class _File(TextRecord):
+    format: str
+    objects: dict[str, _Object] = Field(min_length=1, examples=[_EXAMPLE])

@@ -40,7 +40,8 @@ def load(path: str | Path) -> Loaded[MeasurementSet] | Loaded[FinalForceTable]:
     gripper = load_gripper(measured.gripper, measured.path)
     if isinstance(measured, FinalForceTable):
         return Loaded(measured, gripper, check_table(measured, gripper.stroke))
-    warnings = check_set(measured, gripper.stroke, half_opening_m=float(gripper.opening.opening_m[-1]) / 2)
+    half_opening_m = float(gripper.opening.opening_m[-1]) / 2
+    warnings = check_set(measured, gripper.stroke, half_opening_m=half_opening_m, pads_at=gripper.pads_at)
     return Loaded(measured, gripper, warnings + check_given_noise(measured, gripper.unit))
 
 

@@ -1,4 +1,4 @@
-"""Did anything happen? Commands that change, positions that follow, forces that feel an object."""
+"""Checks that commands change, positions follow, and forces show contact with an object."""
 
 from __future__ import annotations
 

@@ -1,8 +1,9 @@
-"""Which way is closing, which sign presses, which finger is which? Refuses only where no effect could be the reason."""
+"""Checks the closing direction, the sign of forces, and left against right. Refuses only what no effect explains."""
 
 from __future__ import annotations
 
 from collections import defaultdict
+from collections.abc import Callable
 
 import numpy as np
 
@@ -11,12 +12,22 @@ from forcegrasp.measure.check_liveness import feels, force_noise, without_trend
 from forcegrasp.measure.samples import place
 from forcegrasp.measure.schema import MeasuredGrasp, MeasurementSet, side_of
 
+PadsAt = Callable[[np.ndarray], np.ndarray | None]
 #: Positions may lag behind commands by any of these, in seconds.
 _LAGS = (0.0, 0.05, 0.1, 0.2, 0.4, 0.8)
 
 
-def check_signs(measured: MeasurementSet, open_m: float, closed_m: float) -> None:
-    """Raises MeasurementError if a closing direction, the sign of a force, or the fingers are the wrong way round."""
+def check_signs(
+    measured: MeasurementSet, open_m: float, closed_m: float, pads_at: PadsAt | None, half_opening_m: float
+) -> None:
+    """Raises MeasurementError if a closing direction, the sign of a force, or the fingers are the wrong way round.
+
+    Args:
+      measured: the set.
+      open_m, closed_m: positions of a motor, m or rad.
+      pads_at: from positions of the motors to where the pads stand; None if that is not known.
+      half_opening_m: how far a pad stands from the middle of the open gripper.
+    """
     reach = open_m - closed_m
     for motor in range(len(measured.columns.position)):
         _check_follows(measured, motor, abs(reach))
@@ -24,10 +35,16 @@ def check_signs(measured: MeasurementSet, open_m: float, closed_m: float) -> Non
         _check_effort(measured)
     for channel in range(0 if measured.columns.read_effort else len(measured.columns.force)):
         _check_presses(measured, channel, closed_m, reach)
-    if measured.columns.are_pads:  # else positions do not tell where each pad is
-        _check_fingers(measured, abs(reach))
-        for grasp in measured.grasps:
-            _check_free_air(measured, grasp, abs(reach))
+    if pads_at is None or measured.columns.read_effort:  # which is of no finger, and felt in free air
+        return
+    placed = [pads_at(grasp.position_m) for grasp in measured.grasps]
+    pads = [places for places in placed if places is not None]
+    if len(pads) < len(placed):
+        return
+    if len(measured.columns.force) == 2:
+        _check_fingers(measured, pads, half_opening_m)
+    for grasp, places in zip(measured.grasps, pads, strict=True):
+        _check_free_air(measured, grasp, places, half_opening_m)
 
 
 def _check_follows(measured: MeasurementSet, motor: int, reach: float) -> None:
@@ -116,11 +133,11 @@ def _wrong_way(answers: list[np.ndarray]) -> bool:
     return bool(as_read.max() > max(0.2, -2 * as_read.min()) and without_drift.max() > max(0.0, -without_drift.min()))
 
 
-def _check_fingers(measured: MeasurementSet, reach: float) -> None:
+def _check_fingers(measured: MeasurementSet, pads: list[np.ndarray], reach: float) -> None:
     """An object off to the right is touched by the right finger first, if both close alike."""
     right, wrong = [], []
     alive = np.any([feels(grasp.force_n) for grasp in measured.grasps], axis=0).all()
-    for grasp in measured.grasps:
+    for grasp, places in zip(measured.grasps, pads, strict=True):
         offset = grasp.offset_m
         if offset is None or abs(offset) < 0.05 * reach:
             continue
@@ -130,14 +147,16 @@ def _check_fingers(measured: MeasurementSet, reach: float) -> None:
             continue
         first = min(touched)
         left_at, right_at = (np.inf if onset is None else grasp.time_s[onset] for onset in onsets)
-        unlike = np.abs(np.diff(grasp.command_m[: first + 1], axis=1)).max() > 0.02 * reach
-        unlike |= np.abs(np.diff(grasp.position_m[first])).max() > 0.05 * reach
+        unlike = np.ptp(grasp.command_m[: first + 1], axis=1).max() > 0.02 * reach
+        unlike |= np.ptp(places[first]) > 0.05 * reach
         lead = 0.1 + 2 * float(np.median(np.diff(grasp.time_s)))
         if unlike or abs(left_at - right_at) < lead:
             continue
         if (left_at < right_at) == (offset < 0):
             right.append(grasp)
-        elif _too_open_for_both(grasp, first, reach) or (grasp.radius_m is None and abs(left_at - right_at) > 3 * lead):
+        elif _too_open_for_both(grasp, places[first], reach) or (
+            grasp.radius_m is None and abs(left_at - right_at) > 3 * lead
+        ):
             wrong.append(grasp)
     if len(wrong) > 1 and len(wrong) >= 0.8 * len(wrong + right):
         raise MeasurementError(
@@ -147,12 +166,12 @@ def _check_fingers(measured: MeasurementSet, reach: float) -> None:
         )
 
 
-def _check_free_air(measured: MeasurementSet, grasp: MeasuredGrasp, reach: float) -> None:
+def _check_free_air(measured: MeasurementSet, grasp: MeasuredGrasp, pads: np.ndarray, reach: float) -> None:
     """Before a finger can touch, forces may be biased and drift, but not fluctuate as if grasping."""
     if grasp.radius_m is None or grasp.offset_m is None:
         return
     surface = grasp.radius_m + np.array([-1.0, 1.0]) * grasp.offset_m
-    near = np.any(grasp.position_m - surface < 0.15 * reach, axis=1)
+    near = np.any(pads - surface < 0.15 * reach, axis=1)
     free = int(near.argmax()) if near.any() else len(near)
     if free < 10 or len(near) - free < 10:
         return
@@ -195,9 +214,9 @@ def _onset(time: np.ndarray, force: np.ndarray, std: float | None) -> int | None
     return int(run.argmax()) if run.any() else None
 
 
-def _too_open_for_both(grasp: MeasuredGrasp, index: int, reach: float) -> bool:
+def _too_open_for_both(grasp: MeasuredGrasp, places: np.ndarray, reach: float) -> bool:
     """Whether the fingers are too far apart for the object to be between both: just one of them can touch it."""
     if grasp.radius_m is None or grasp.offset_m is None:
         return False
     spare = 0.03 * reach + 0.5 * abs(grasp.offset_m)
-    return bool(grasp.position_m[index].sum() > 2 * grasp.radius_m + spare)
+    return bool(places.sum() > 2 * grasp.radius_m + spare)

@@ -9,7 +9,7 @@ import numpy as np
 from forcegrasp.errors import MeasurementError
 from forcegrasp.measure.check_copies import check_copies
 from forcegrasp.measure.check_liveness import check_liveness
-from forcegrasp.measure.check_signs import check_signs
+from forcegrasp.measure.check_signs import PadsAt, check_signs
 from forcegrasp.measure.check_units import check_force_noise, check_forces, check_units
 from forcegrasp.measure.folder import show
 from forcegrasp.measure.samples import MIN_SAMPLES, check_samples, place
@@ -20,7 +20,11 @@ _GAP = 5
 
 
 def check_set(
-    measured: MeasurementSet, open_m: float, closed_m: float = 0.0, half_opening_m: float | None = None
+    measured: MeasurementSet,
+    open_m: float,
+    closed_m: float = 0.0,
+    half_opening_m: float | None = None,
+    pads_at: PadsAt | None = None,
 ) -> list[str]:
     """Checks a set against the gripper it is said to come from.
 
@@ -32,6 +36,8 @@ def check_set(
       open_m: position of a motor that is fully open, m or rad.
       closed_m: position of a motor that is fully closed.
       half_opening_m: half of what fits between the pads; left out, a sliding motor's reach; of one that turns, any.
+      pads_at: from positions of the motors to where the pads stand, see :meth:`Gripper.pads_at`; left out, positions of
+        two sliding motors are those of the pads, and of others what depends on it is not checked.
 
     Returns:
       Warnings, one line each.
@@ -52,7 +58,9 @@ def check_set(
         half_opening_m = abs(open_m - closed_m) if measured.columns.unit == "m" else math.inf
     warnings = check_units(measured, open_m, closed_m, half_opening_m)
     warnings += check_liveness(measured, abs(open_m - closed_m))
-    check_signs(measured, open_m, closed_m)
+    if pads_at is None and measured.columns.are_pads:
+        pads_at = np.asarray
+    check_signs(measured, open_m, closed_m, pads_at, half_opening_m)
     if len(measured.grasps) == 1:
         warnings.append(f"{show(measured.path)}: one grasp only; nothing can be held out to test a finding on")
     return [*measured.notes, *warnings, *_gaps(measured), *check_copies(measured)]

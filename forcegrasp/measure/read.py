@@ -9,10 +9,12 @@ from typing import Any
 
 import numpy as np
 import polars as pl
+from pydantic import Field
 
 from forcegrasp.errors import ConfigError, MeasurementError, closest
+from forcegrasp.files.validate import refusal, validate
 from forcegrasp.measure.csv_file import read_csv
-from forcegrasp.measure.folder import MAX_NAME, find_file, open_folder, show
+from forcegrasp.measure.folder import find_file, open_folder, show
 from forcegrasp.measure.parquet_file import read_parquet
 from forcegrasp.measure.samples import check_samples
 from forcegrasp.measure.schema import (
@@ -28,12 +30,20 @@ from forcegrasp.measure.schema import (
     fingerprint_of_table,
 )
 from forcegrasp.measure.table import FileColumns, Table
-from forcegrasp.measure.yaml_file import Reader, load_yaml
+from forcegrasp.measure.yaml_file import Name, Positive, Text, TextRecord, load_yaml
 
-META = ("format", "kind", "gripper")
-ABOUT = ("source", "license")
-NOISE = ("position_std_m", "force_std_n")
-MAX_TEXT = 10_000
+
+class Meta(TextRecord):
+    """What meta.yaml says of a set; no result depends on source and license."""
+
+    format: str = Field(description=FORMAT)
+    kind: Name = Field(description="grasps or final_force")
+    gripper: Name = Field(description="name of one that is shipped, or path of a description")
+    source: Text = Field(default="", description="where the data come from")
+    license: Text = Field(default="", description="on what terms they may be used")
+    position_std_m: Positive | None = Field(default=None, description="noise of the positions, m or rad")
+    force_std_n: Positive | None = Field(default=None, description="noise of the forces, N")
+
 
 _GRASPS = FileColumns(
     text=("grasp", "object", "session", "split"),
@@ -55,36 +65,34 @@ def read_set(path: str | Path) -> MeasurementSet | FinalForceTable:
     content = load_yaml(file)
     if content.get("format") != FORMAT:  # first, lest the keys of another format are called unknown
         raise MeasurementError(f"{show(file)}: format: must be {FORMAT}, not {show(content.get('format', ''))}")
-    meta = Reader(content, show(file), META, (*ABOUT, *NOISE))
-    kind = meta.text("kind", MAX_NAME)
+    meta = validate(Meta, content, show(file), MeasurementError)
     readers = {"grasps": _read_grasps, "final_force": _read_table}
-    if kind not in readers:
-        raise meta.refuse("kind", f"{show(kind)} is unknown{closest(kind, readers)}")
-    facts = {
-        "path": folder,
-        "name": folder.resolve().name,
-        "gripper": meta.text("gripper", MAX_NAME),
-        **{key: meta.text(key, MAX_TEXT, lines=True, blank=True) for key in ABOUT},  # no result depends on them
-        "force_std_n": meta.positive("force_std_n"),
-    }
-    return readers[kind](folder, meta, facts)
+    if meta.kind not in readers:
+        raise refusal(
+            show(file), "kind", f"{show(meta.kind)} is unknown{closest(meta.kind, readers)}", MeasurementError
+        )
+    facts = {"path": folder, "name": folder.resolve().name}
+    return readers[meta.kind](
+        folder, meta, facts | meta.model_dump(include={"gripper", "source", "license", "force_std_n"})
+    )
 
 
-def _read_table(folder: Path, meta: Reader, facts: dict[str, Any]) -> FinalForceTable:
-    if meta.get("position_std_m") is not None:
-        raise meta.refuse("position_std_m", "a table of final forces has no positions; remove it")
+def _read_table(folder: Path, meta: Meta, facts: dict[str, Any]) -> FinalForceTable:
+    if meta.position_std_m is not None:
+        problem = "a table of final forces has no positions; remove it"
+        raise refusal(show(folder / "meta.yaml"), "position_std_m", problem, MeasurementError)
     _refuse_files(folder, "final_force", ("grasps.csv", "samples.csv", "samples.parquet"))
     rows = read_csv(find_file(folder, "table.csv"), _FINAL)
     objects = tuple(rows.frame["object"].to_list())
     delta, force = (np.array(rows.frame[name].to_numpy()) for name in _FINAL.numbers)
-    fingerprint = fingerprint_of_table(facts["gripper"], facts["force_std_n"], objects, delta, force)
+    fingerprint = fingerprint_of_table(meta.gripper, meta.force_std_n, objects, delta, force)
     readings = {"objects": objects, "delta_q_m": delta, "final_force_n": force}
     return FinalForceTable(**facts, **readings, fingerprint=fingerprint, notes=rows.notes())
 
 
-def _read_grasps(folder: Path, meta: Reader, facts: dict[str, Any]) -> MeasurementSet:
+def _read_grasps(folder: Path, meta: Meta, facts: dict[str, Any]) -> MeasurementSet:
     _refuse_files(folder, "grasps", ("table.csv",))
-    columns = gripper_columns(meta, folder)
+    columns = gripper_columns(meta.gripper, folder, show(folder / "meta.yaml"))
     in_samples = FileColumns(("grasp",), (*columns.signals, OBJECT), optional=(OBJECT,), blank=(OBJECT,))
     table = read_csv(find_file(folder, "grasps.csv"), _GRASPS)
     _check_grasps(table)
@@ -96,28 +104,27 @@ def _read_grasps(folder: Path, meta: Reader, facts: dict[str, Any]) -> Measureme
     else:
         samples = read_csv(find_file(folder, "samples.csv"), in_samples)
     grasps = _grasps(folder, table, samples, columns)
-    position_std = meta.positive("position_std_m")
     return MeasurementSet(
         **facts,
-        position_std_m=position_std,
+        position_std_m=meta.position_std_m,
         grasps=grasps,
-        fingerprint=fingerprint_of_set(facts["gripper"], position_std, facts["force_std_n"], grasps),
+        fingerprint=fingerprint_of_set(meta.gripper, meta.position_std_m, meta.force_std_n, grasps),
         notes=table.notes() + samples.notes(),
     )
 
 
-def gripper_columns(meta: Reader, folder: Path) -> Columns:
-    """What samples of the gripper hold that a file names; ``folder`` is where the path of its description starts.
+def gripper_columns(gripper: str, folder: Path, place: str) -> Columns:
+    """What samples of a gripper hold; ``folder`` is where the path of its description starts.
 
     Raises:
-      MeasurementError: if there is no such gripper, or its description can't be right.
+      MeasurementError: if there is no such gripper, or its description can't be right; names the file that says it.
     """
     from forcegrasp.physics.gripper_file import load_gripper  # brings MuJoCo, which nothing else here needs
 
     try:
-        return columns_of(load_gripper(meta.text("gripper", MAX_NAME), folder))
+        return columns_of(load_gripper(gripper, folder))
     except ConfigError as error:
-        raise meta.refuse("gripper", str(error).removeprefix("gripper=")) from error
+        raise refusal(place, "gripper", str(error).removeprefix("gripper="), MeasurementError) from error
 
 
 def side_by_side(samples: Mapping[str, np.ndarray] | pl.DataFrame, names: Sequence[str]) -> np.ndarray:

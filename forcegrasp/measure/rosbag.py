@@ -20,39 +20,55 @@ Every other signal gives its newest reading at or before that time. Nothing is i
 
 from __future__ import annotations
 
+import functools
 import re
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
+from pydantic import AfterValidator, model_validator
 
 from forcegrasp.errors import MeasurementError, closest
-from forcegrasp.measure.folder import MAX_NAME, MAX_ROWS, show
-from forcegrasp.measure.read import MAX_TEXT, NOISE, gripper_columns, side_by_side
+from forcegrasp.files.validate import counted, must, refusal, text, validate, wrong
+from forcegrasp.measure.folder import MAX_ROWS, show
+from forcegrasp.measure.names import misfits
+from forcegrasp.measure.read import gripper_columns, side_by_side
 from forcegrasp.measure.samples import check_samples
 from forcegrasp.measure.schema import (
     OBJECT,
-    SPLITS,
     Columns,
     MeasuredGrasp,
     MeasurementSet,
     fingerprint_of_set,
 )
-from forcegrasp.measure.yaml_file import Reader, load_yaml
+from forcegrasp.measure.yaml_file import Name, Number, Positive, Text, TextRecord, load_yaml
 
 _STEP = re.compile(r"(\w+)(?:\[(?:(\d+)|(\w+)=([^\]]+))\])?", re.ASCII)
 
 
-@dataclass(frozen=True)
-class _Signal:
-    """Where a signal comes from. Steps are (field, index, field to look the index up in, what to look up)."""
+_LongText = Annotated[str, text(1000)]
 
-    topic: str
-    field: str
-    steps: tuple[tuple[str, int | None, str, str], ...]
-    scale: float
-    offset: float
+
+def _steps(field: str) -> list[tuple[Any, ...]]:
+    """Steps to a number in a message: (field, index, field to look the index up in, what to look up)."""
+    parts = re.split(r"\.(?![^\[]*\])", field)  # dots, but not those in [name=a.b]
+    found = [_STEP.fullmatch(part) for part in parts]
+    if not all(found):
+        raise wrong(f"{show(field)} must look like a.b, a[0].b or position[name=joint]")
+    return [match.groups() for match in found if match]
+
+
+class _Signal(TextRecord):
+    """Where a signal comes from."""
+
+    topic: _LongText
+    field: Annotated[_LongText, AfterValidator(lambda field: _steps(field) and field)]
+    scale: Annotated[Number, must(bool, "must not be 0")] = 1.0
+    offset: Number = 0.0
+
+    @functools.cached_property
+    def steps(self) -> list[tuple[Any, ...]]:
+        return _steps(self.field)
 
     def value(self, message: Any) -> float | None:
         """The value in a message; None if a name that is looked up is not in it. Raises if the field is wrong."""
@@ -64,8 +80,39 @@ class _Signal:
                     return None
                 index = listed.index(wanted)
             if index is not None:
-                message = message[index]
+                message = message[int(index)]
         return self.scale * float(message) + self.offset
+
+
+class _Cut(TextRecord):
+    """One grasp in a bag. Times are in seconds since the bag's first message."""
+
+    grasp: Name
+    object: Name
+    session: Name
+    start_s: Number
+    end_s: Number
+    object_radius_m: Positive | None = None
+    object_offset_m: Number | None = None
+    split: Literal["fit", "check"] | None = None
+
+    @model_validator(mode="after")
+    def _lasts(self) -> _Cut:
+        if self.start_s >= self.end_s:
+            raise wrong("must be a time after start_s, in seconds since the bag's first message", "end_s")
+        return self
+
+
+class _Mapping(TextRecord):
+    bag: Text
+    gripper: Name
+    source: Text
+    license: Text
+    position_std_m: Positive | None = None
+    force_std_n: Positive | None = None
+    clock: Name
+    signals: dict[str, _Signal]
+    grasps: Annotated[tuple[_Cut, ...], counted(1, MAX_ROWS, "a list with one entry per grasp")]
 
 
 def convert_bag(mapping_file: str | Path) -> MeasurementSet:
@@ -79,55 +126,27 @@ def convert_bag(mapping_file: str | Path) -> MeasurementSet:
     """
     path = Path(mapping_file)
     place = show(path)
-    required = ("bag", "gripper", "source", "license", "clock", "signals", "grasps")
-    top = Reader(load_yaml(path), place, required, NOISE)
-    columns, known = gripper_columns(top, path.parent), top.get("signals")
-    mapping = Reader(known, f"{place}: signals", columns.signals[1:], (OBJECT,))
-    signals = {name: _signal(mapping.get(name), f"{place}: signals: {name}") for name in known}
-    clock = top.text("clock", MAX_NAME)
-    if clock not in signals:
-        raise top.refuse("clock", f"{show(clock)} is no signal{closest(clock, signals)}")
-    if not isinstance(top.get("grasps"), list) or not top.get("grasps"):
-        raise top.refuse("grasps", "must be a list with one entry per grasp")
-    readings = _read_bag(path.parent / top.text("bag", MAX_TEXT), signals)
+    mapping = validate(_Mapping, load_yaml(path), place, MeasurementError)
+    columns, signals = gripper_columns(mapping.gripper, path.parent, place), mapping.signals
+    problem = misfits("key", list(signals), columns.signals[1:], (OBJECT,))
+    if problem:
+        raise refusal(place, "signals", problem, MeasurementError)
+    if mapping.clock not in signals:
+        hint = closest(mapping.clock, signals)
+        raise refusal(place, "clock", f"{show(mapping.clock)} is no signal{hint}", MeasurementError)
+    readings = _read_bag(path.parent / mapping.bag, signals)
     grasps = tuple(
-        _cut(entry, f"{place}: grasps, entry {number}", clock, readings, columns)
-        for number, entry in enumerate(top.get("grasps"), 1)
+        _cut(entry, f"{place}: grasps[{index}]", mapping.clock, readings, columns)
+        for index, entry in enumerate(mapping.grasps)
     )
-    for number, grasp in enumerate(grasps, 1):
-        if grasp.name in [other.name for other in grasps[: number - 1]]:
-            raise MeasurementError(f"{place}: grasps, entry {number}: {show(grasp.name)} is there twice; rename it")
+    for index, grasp in enumerate(grasps):
+        if grasp.name in [other.name for other in grasps[:index]]:
+            raise MeasurementError(f"{place}: grasps[{index}]: {show(grasp.name)} is there twice; rename it")
         check_samples(path, grasp)
-    facts = {
-        "gripper": top.text("gripper", MAX_NAME),
-        "position_std_m": top.positive("position_std_m"),
-        "force_std_n": top.positive("force_std_n"),
-        "grasps": grasps,
-    }
-    return MeasurementSet(
-        path=path,
-        name=path.stem,
-        source=top.text("source", MAX_TEXT, lines=True),
-        license=top.text("license", MAX_TEXT, lines=True),
-        fingerprint=fingerprint_of_set(**facts),
-        **facts,
-    )
-
-
-def _signal(entry: Any, place: str) -> _Signal:
-    reader = Reader(entry, place, ("topic", "field"), ("scale", "offset"))
-    field = reader.text("field", 1000)
-    steps = []
-    for part in re.split(r"\.(?![^\[]*\])", field):  # dots, but not those in [name=a.b]
-        match = _STEP.fullmatch(part)
-        if not match:
-            raise reader.refuse("field", f"{show(field)} must look like a.b, a[0].b or position[name=joint]")
-        name, index, names, wanted = match.groups()
-        steps.append((name, int(index) if index else None, names or "", wanted or ""))
-    scale = reader.number("scale", 1.0)
-    if not scale:
-        raise reader.refuse("scale", "must not be 0")
-    return _Signal(reader.text("topic", 1000), field, tuple(steps), scale, reader.number("offset", 0.0) or 0.0)
+    noise = (mapping.position_std_m, mapping.force_std_n)
+    fingerprint = fingerprint_of_set(mapping.gripper, *noise, grasps)
+    about = (mapping.gripper, mapping.source, mapping.license)
+    return MeasurementSet(path, path.stem, *about, *noise, grasps, fingerprint)
 
 
 def _read_bag(path: Path, signals: dict[str, _Signal]) -> dict[str, np.ndarray]:
@@ -179,34 +198,28 @@ def _value(path: Path, name: str, signal: _Signal, message: Any, kind: str) -> f
         ) from error
 
 
-def _cut(entry: Any, place: str, clock: str, readings: dict[str, np.ndarray], columns: Columns) -> MeasuredGrasp:
+def _cut(entry: _Cut, place: str, clock: str, readings: dict[str, np.ndarray], columns: Columns) -> MeasuredGrasp:
     """One grasp: a sample at each message of the clock, with the newest reading of all other signals."""
-    required = ("grasp", "object", "session", "start_s", "end_s")
-    reader = Reader(entry, place, required, ("object_radius_m", "object_offset_m", "split"))
-    split = reader.text("split", MAX_NAME) if reader.get("split") else None
-    if split not in (None, *SPLITS):
-        raise reader.refuse("split", f"{show(split)} is unknown{closest(split or '', SPLITS)}")
-    start, end = reader.number("start_s"), reader.number("end_s")
-    if start is None or end is None or start >= end:
-        raise reader.refuse("end_s", "must be a time after start_s, in seconds since the bag's first message")
     time = readings[clock][:, 0]
-    time = time[(time >= start) & (time <= end)]
+    time = time[(time >= entry.start_s) & (time <= entry.end_s)]
     if not len(time):
         ends = readings[clock][[0, -1], 0]
-        raise reader.refuse("start_s", f"no message of {clock} until end_s; the bag has some from {ends[0]:g} s")
+        raise MeasurementError(
+            f"{place}.start_s: no message of {clock} until end_s; the bag has some from {ends[0]:g} s"
+        )
     cut = {"t_s": time}
     for name, values in readings.items():
         newest = np.searchsorted(values[:, 0], time, side="right") - 1
         if newest[0] < 0:
-            raise reader.refuse("start_s", f"{name} has no reading before {values[0, 0]:g} s; start later")
+            raise MeasurementError(f"{place}.start_s: {name} has no reading before {values[0, 0]:g} s; start later")
         cut[name] = values[newest, 1]
     return MeasuredGrasp(
-        name=reader.text("grasp", MAX_NAME),
-        object=reader.text("object", MAX_NAME),
-        session=reader.text("session", MAX_NAME),
-        radius_m=reader.positive("object_radius_m"),
-        offset_m=reader.number("object_offset_m"),
-        split=split,
+        name=entry.grasp,
+        object=entry.object,
+        session=entry.session,
+        radius_m=entry.object_radius_m,
+        offset_m=entry.object_offset_m,
+        split=entry.split,
         time_s=time,
         command_m=side_by_side(cut, columns.command),
         position_m=side_by_side(cut, columns.position),

@@ -1,7 +1,5 @@
 """A fitted model as a text file that a person can read and edit."""
 
-# pyright: standard
-
 from __future__ import annotations
 
 import math
@@ -9,20 +7,24 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, TypeVar
 
 import mujoco
 import numpy as np
 import yaml
+from pydantic import ConfigDict, Field, model_validator
 
 from forcegrasp.effects import Effect
+from forcegrasp.effects.base import Parameter
 from forcegrasp.effects.for_gripper import effect_of
 from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.errors import ConfigError, closest
 from forcegrasp.files import plain_yaml
+from forcegrasp.files.validate import Record, must, refusal, validate, wrong
 from forcegrasp.files.whole_file import write_whole
 from forcegrasp.physics.gripper import Gripper
 from forcegrasp.physics.gripper_file import load_gripper
+from forcegrasp.physics.gripper_parts import SCOPES, BaseParameter
 from forcegrasp.short_repr import ShortRepr, counted, cut, some
 
 FORMAT = "forcegrasp-model/1"
@@ -30,8 +32,7 @@ FORMAT = "forcegrasp-model/1"
 SHIPPED = "virtual_robot"
 #: Entries of its noise.
 NOISE = ("position_std", "force_std_n")
-# Of a key in a message.
-_LONGEST_KEY = 80
+AnyResult = TypeVar("AnyResult")
 
 
 @dataclass(frozen=True)
@@ -137,140 +138,122 @@ def read_model(path: str | Path) -> Model:
         raw = plain_yaml.load(path)
     except (OSError, plain_yaml.PlainYamlError) as error:
         why = getattr(error, "strerror", None) or str(error)
-        raise _refuse(path, "", f"could not read the model: {why}") from error
-    keys = ("format", "gripper", "mujoco", "data", "base", "objects", "grasps", "effects", "warnings", "noise")
+        raise refusal(path, "", f"could not read the model: {why}") from error
     if not isinstance(raw, dict) or raw.get("format") != FORMAT:
-        raise _refuse(path, "format", f"must be {FORMAT}; write a model with `forcegrasp fit`")
-    for key in raw:
-        if key not in keys:
-            raise _refuse(path, str(key), f"unknown{closest(str(key), keys)}")
-    if not isinstance(raw.get("gripper"), str):
-        raise _refuse(path, "gripper", "must be a gripper's name, or the path of its description")
-    gripper = _renamed(path, "gripper", lambda: load_gripper(raw["gripper"], path.parent))
-    base = _read_all(path, "base", raw.get("base"), gripper, "gripper")
-    missing = {n for n, p in gripper.parameters.items() if p.scope == "gripper"} - set(base)
-    if missing:
-        raise _refuse(path, f"base.{min(missing)}", "missing")
-    objects = {
-        str(o): _read_all(path, f"objects.{o}", v, gripper, "object") for o, v in _map(path, "objects", raw).items()
-    }
-    grasps = {str(g): _read_all(path, f"grasps.{g}", v, gripper, "grasp") for g, v in _map(path, "grasps", raw).items()}
-    effects = tuple(_read_effect(path, name, entry, gripper) for name, entry in _map(path, "effects", raw).items())
-    data = {str(key): _text(path, f"data.{key}", value) for key, value in _map(path, "data", raw).items()}
-    lines = [] if raw.get("warnings") is None else raw["warnings"]
-    if not isinstance(lines, list):
-        raise _refuse(path, "warnings", "must be a list")
-    warnings = tuple(_text(path, f"warnings.{index}", line) for index, line in enumerate(lines))
-    return Model(gripper, base, objects, grasps, effects, data, warnings, _read_noise(path, raw))
+        raise refusal(path, "format", f"must be {FORMAT}; write a model with `forcegrasp fit`")
+    said = validate(_File, raw, path)
+    gripper = _renamed(path, "gripper", lambda: load_gripper(said.gripper, path.parent))
+    scopes = {scope: {n: p for n, p in gripper.parameters.items() if p.scope == scope} for scope in SCOPES}
+    return Model(
+        gripper,
+        base=_fitted(path, "base", said.base, scopes["gripper"], required=True),
+        objects={o: _fitted(path, f"objects.{o}", v, scopes["object"]) for o, v in (said.objects or {}).items()},
+        grasps={g: _fitted(path, f"grasps.{g}", v, scopes["grasp"]) for g, v in (said.grasps or {}).items()},
+        effects=tuple(_found(path, name, entry, gripper) for name, entry in (said.effects or {}).items()),
+        data=said.data or {},
+        warnings=tuple(said.warnings or ()),
+        noise=(said.noise.position_std, said.noise.force_std_n) if said.noise else None,
+    )
 
 
-def _read_noise(path: Path, raw: Mapping[str, Any]) -> tuple[float, float] | None:
-    entries = _map(path, "noise", raw)
-    for key in entries:
-        if key not in NOISE:
-            raise _refuse(path, f"noise.{key}", f"unknown{closest(str(key), NOISE)}")
-    if not entries:
-        return None
-    for key in NOISE:
-        if key not in entries:
-            raise _refuse(path, f"noise.{key}", "missing")
-        if not 0 < _number(path, f"noise.{key}", entries[key]) < math.inf:
-            raise _refuse(path, f"noise.{key}", "must be positive; leave noise out if it is not known")
-    return float(entries["position_std"]), float(entries["force_std_n"])
+_Number = Annotated[float, Field(allow_inf_nan=True), must(lambda v: not math.isnan(v), "must be a number, not nan")]
+_Noise = Annotated[
+    float,
+    Field(allow_inf_nan=True),
+    must(lambda std: 0 < std < math.inf, "must be positive; leave noise out if it is not known"),
+]
 
 
-def _read_effect(path: Path, name: Any, entry: Any, gripper: Gripper) -> FoundEffect:
+class _Interval(Record):
+    """A number and its 95 % interval, or a number alone, which is certain."""
+
+    value: _Number
+    low: _Number = -math.inf
+    high: _Number = math.inf
+    unit: str = ""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _alone(cls, entry: object) -> object:
+        return entry if isinstance(entry, dict) else {"value": entry}
+
+    @model_validator(mode="after")
+    def _in_order(self) -> _Interval:
+        if not self.low <= self.value <= self.high:
+            numbers = f"{self.low:g}, {self.value:g}, {self.high:g}"
+            raise wrong(f"low ≤ value ≤ high must hold, and does not with {numbers}")
+        return self
+
+
+class _Effect(Record):
+    """Every other key is one of its parameters."""
+
+    model_config = ConfigDict(extra="allow")
+    __pydantic_extra__: dict[str, _Interval]  # pyright: ignore[reportIncompatibleVariableOverride]
+    variant: str = ""
+
+
+class _ReadingNoise(Record):
+    position_std: _Noise = Field(description="m or rad")
+    force_std_n: _Noise = Field(description="N")
+
+
+class _File(Record):
+    format: str
+    gripper: str = Field(description="name, or the path of its description", examples=["./my_gripper.yaml"])
+    mujoco: Any = Field(default=None, description="version; for the reader")
+    data: dict[str, str] | None = Field(default=None, description="measurement set and fingerprint")
+    base: dict[str, _Interval] = Field(description="base parameters of the gripper as a whole")
+    objects: dict[str, dict[str, _Interval]] | None = Field(default=None, description="object: its base parameters")
+    grasps: dict[str, dict[str, _Interval]] | None = Field(default=None, description="grasp: its base parameters")
+    effects: dict[str, _Effect] | None = Field(default=None, description="effect: its parameters")
+    noise: _ReadingNoise | None = Field(default=None, description="standard deviations of the readings")
+    warnings: list[str] | None = None
+
+
+def _found(path: Path, name: str, entry: _Effect, gripper: Gripper) -> FoundEffect:
     where = f"effects.{name}"
-    effect = _renamed(path, "effects", lambda: effect_of(str(name), gripper))
-    if not isinstance(entry, dict):
-        raise _refuse(path, where, "must be a mapping of its parameters")
-    known = {p.name: p for p in effect.parameters}
-    variant = entry.get("variant", effect.variants[0])
+    effect = _renamed(path, "effects", lambda: effect_of(name, gripper))
+    variant = entry.variant if "variant" in entry.model_fields_set else effect.variants[0]
     if variant not in effect.variants:
-        raise _refuse(path, f"{where}.variant", f"must be {' or '.join(filter(None, effect.variants)) or 'left out'}")
-    for key in entry:
-        if key != "variant" and key not in known:
-            raise _refuse(path, f"{where}.{key}", f"unknown{closest(str(key), known)}")
-    parameters = {}
-    for p in effect.parameters:
-        if p.name not in entry:
-            raise _refuse(path, f"{where}.{p.name}", "missing")
-        fitted = _read_number(path, f"{where}.{p.name}", entry[p.name], p.unit)
-        absent = fitted.low == fitted.value == fitted.high == p.null  # which may be infinite
-        if not (absent or (p.low <= fitted.low and fitted.high <= p.high)):
-            raise _refuse(path, f"{where}.{p.name}", f"must lie in [{p.low:g}, {p.high:g}] {p.unit}")
-        parameters[p.name] = fitted
-    return FoundEffect(effect, variant, parameters)
+        known = " or ".join(filter(None, effect.variants)) or "left out"
+        raise refusal(path, f"{where}.variant", f"must be {known}")
+    known = {p.name: p for p in effect.parameters}
+    return FoundEffect(effect, variant, _fitted(path, where, entry.__pydantic_extra__, known, required=True))
 
 
-def _read_all(path: Path, where: str, raw: Any, gripper: Gripper, scope: str) -> dict[str, Fitted]:
-    if not isinstance(raw, dict):
-        raise _refuse(path, where, "must be a mapping of parameters")
-    known = {name: p for name, p in gripper.parameters.items() if p.scope == scope}
-    for name in raw:
+def _fitted(
+    path: Path,
+    where: str,
+    entries: Mapping[str, _Interval],
+    known: Mapping[str, BaseParameter] | Mapping[str, Parameter],
+    required: bool = False,
+) -> dict[str, Fitted]:
+    """Entries as numbers of these parameters, in the order of the file; all of them must be there if ``required``."""
+    for name in entries:
         if name not in known:
-            raise _refuse(path, f"{where}.{name}", f"unknown{closest(str(name), known)}")
+            raise refusal(path, f"{where}.{name}", f"unknown{closest(name, known)}")
+    for name in known:
+        if required and name not in entries:
+            raise refusal(path, f"{where}.{name}", "missing")
     found = {}
-    for name, entry in raw.items():
-        p, fitted = known[name], _read_number(path, f"{where}.{name}", entry, known[name].unit)
-        if not (p.low <= fitted.low and fitted.high <= p.high):
-            raise _refuse(path, f"{where}.{name}", f"must lie in [{p.low:g}, {p.high:g}] {p.unit}")
-        found[name] = fitted
+    for name, entry in entries.items():
+        p, place = known[name], f"{where}.{name}"
+        if "unit" in entry.model_fields_set and entry.unit != p.unit:
+            raise refusal(path, f"{place}.unit", f"must be {p.unit}")
+        ends = {"low": entry.value, "high": entry.value} | entry.model_dump(exclude_unset=True, exclude={"unit"})
+        found[name] = fitted = Fitted(**ends, unit=p.unit)
+        absent = isinstance(p, Parameter) and fitted.low == fitted.value == fitted.high == p.null  # may be infinite
+        if not (absent or (p.low <= fitted.low and fitted.high <= p.high)):
+            raise refusal(path, place, f"must lie in [{p.low:g}, {p.high:g}] {p.unit}")
     return found
 
 
-def _read_number(path: Path, where: str, entry: Any, unit: str) -> Fitted:
-    parts = entry if isinstance(entry, dict) else {"value": entry}
-    keys = ("value", "low", "high", "unit")
-    for key in parts:
-        if key not in keys:
-            raise _refuse(path, f"{where}.{key}", f"unknown{closest(str(key), keys)}")
-    value, low, high = (
-        _number(path, f"{where}.{key}" if isinstance(entry, dict) else where, parts.get(key, parts.get("value")))
-        for key in ("value", "low", "high")
-    )
-    if not low <= value <= high:
-        raise _refuse(path, where, f"low ≤ value ≤ high must hold, and does not with {low:g}, {value:g}, {high:g}")
-    if parts.get("unit", unit) != unit:
-        raise _refuse(path, f"{where}.unit", f"must be {unit}")
-    return Fitted(value, low, high, unit)
-
-
-def _number(path: Path, where: str, value: Any) -> float:
-    try:
-        if isinstance(value, (int, float)) and not isinstance(value, bool) and not math.isnan(value):
-            return float(value)
-    except OverflowError:
-        pass
-    hint = "; YAML wants 1.0e-3 for 1e-3" if isinstance(value, str) and "e" in value.lower() else ""
-    raise _refuse(path, where, f"must be a number{hint}")
-
-
-def _text(path: Path, where: str, value: Any) -> str:
-    if isinstance(value, str):
-        return value
-    raise _refuse(path, where, "must be text; put it in quotes")
-
-
-def _map(path: Path, key: str, raw: Mapping[str, Any]) -> dict:
-    value = {} if raw.get(key) is None else raw[key]
-    if not isinstance(value, dict):
-        raise _refuse(path, key, "must be a mapping")
-    return value
-
-
-def _renamed(path: Path, where: str, call: Callable[[], Any]) -> Any:
+def _renamed(path: Path, where: str, call: Callable[[], AnyResult]) -> AnyResult:
     try:
         return call()
     except ConfigError as error:
-        raise _refuse(path, where, str(error)) from error
-
-
-def _refuse(path: Path, where: str, problem: str) -> ConfigError:
-    """The error to raise about a key, in one line whatever the file says."""
-    key = where if len(where) <= _LONGEST_KEY else f"{where[:_LONGEST_KEY]}…"
-    text = ": ".join(filter(None, (str(path), key, problem)))
-    return ConfigError(" ".join("".join(c if c.isprintable() else " " for c in text).split()))
+        raise refusal(path, where, str(error)) from error
 
 
 class _Numbers(dict):

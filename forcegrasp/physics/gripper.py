@@ -126,6 +126,22 @@ class Gripper(ShortRepr):
             return straight_law(self.stroke)
         return measure_opening(self.spec(), self.motors, self.fingers, self.object_geom, self.axis)
 
+    def pads_at(self, position: np.ndarray) -> np.ndarray | None:
+        """How far each side's pads stand from the middle between them, metres; None if they don't move alike.
+
+        Args:
+          position: of the motors, ``(n, motors)``.
+
+        Returns:
+          ``(n, 2)``, left and right.
+        """
+        if self.is_direct and len(self.motors) == 2:
+            return position
+        left, right = self.opening.travel
+        if len(self.motors) == 2 or not math.isclose(left, right, rel_tol=0.01):
+            return None
+        return np.repeat(self.opening.opening_at(position) / 2, 2, axis=1)
+
     @property
     def stall(self) -> float:
         """Movement in a control step above which a motor's effort says nothing of contact, m or rad.

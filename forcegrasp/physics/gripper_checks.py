@@ -1,4 +1,4 @@
-"""Finds what a scene does not have, or has the wrong way round, while the description can still be blamed for it."""
+"""Checks a description against its scene: names, directions, ranges, and the fields that parameters write."""
 
 from __future__ import annotations
 

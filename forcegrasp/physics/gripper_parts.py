@@ -9,6 +9,8 @@ import numpy as np
 
 from forcegrasp.short_repr import ShortRepr
 
+#: Of what a base parameter has one value each.
+SCOPES = ("gripper", "object", "grasp")
 Softness = TypeVar("Softness", float, np.ndarray)
 
 

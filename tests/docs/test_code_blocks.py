@@ -208,6 +208,8 @@ SWAPPED = "left: {joint: right, force_sensor: left}\n  right: {joint: left, forc
         ("yaml", "[geom_solimp 2]", "[geom_solimp]"),
         ("yaml", "low: 5, high: 100", "low: 30, high: 100"),
         ("xml", "</mujoco>", ""),
+        ("yaml", "model: my", "modle: my"),
+        ("yaml", "closed: 0.0, open: 0.04", "closed: 0.0, open: 4e-2"),
     ],
 )
 def test_messages_are_as_quoted(page, file, old, new):

@@ -45,17 +45,20 @@ def test_own_objects(tmp_path):
 
 BROKEN = {
     "other format": (GOOD.replace("objects/1", "objects/9"), "format: must be forcegrasp-objects/1"),
-    "no objects": ("format: forcegrasp-objects/1\nobjects:\n", "must hold an object a line"),
-    "no diameter": (GOOD.replace("diameter_m: 0.06, ", ""), "missing keys: diameter_m"),
-    "unknown key": (GOOD.replace("kappa", "kapa"), "unknown keys: .kapa. .did you mean kappa"),
+    "no objects": ("format: forcegrasp-objects/1\nobjects:\n", "objects: missing, such as `cup: {diameter_m: 0.06"),
+    "no diameter": (GOOD.replace("diameter_m: 0.06, ", ""), "objects.cup.diameter_m: missing"),
+    "unknown key": (GOOD.replace("kappa", "kapa"), "objects.cup.kapa: unknown; did you mean kappa"),
     "millimetres": (GOOD.replace("0.06", "60"), "diameter_m: must lie between 0.024 and 0.09"),
     "squeezed flat": (GOOD.replace("0.06", "0.02"), "diameter_m: must lie between"),
     "kappa": (GOOD.replace("0.3", "1.3"), "kappa: must lie between"),
     "text": (GOOD.replace("0.3", "soft"), "is not a number"),
     "one goal": (GOOD.replace("[0.2, 0.9]", "0.9"), "must be \\[low, high\\]"),
     "goals swapped": (GOOD.replace("[0.2, 0.9]", "[0.9, 0.2]"), "0.9 > 0.2"),
-    "negative goal": (GOOD.replace("[0.2, 0.9]", "[-0.2, 0.9]"), "low: must lie between 0 and 50"),
-    "not a mapping": (GOOD.replace("{diameter_m: 0.06, kappa: 0.3, goal_force_n: [0.2, 0.9]}", "7"), "must hold"),
+    "negative goal": (GOOD.replace("[0.2, 0.9]", "[-0.2, 0.9]"), "goal_force_n: must lie between 0 and 50"),
+    "not a mapping": (
+        GOOD.replace("{diameter_m: 0.06, kappa: 0.3, goal_force_n: [0.2, 0.9]}", "7"),
+        "cup: must map",
+    ),
     "not YAML": ("format: [", "not YAML"),
 }
 

@@ -7,6 +7,7 @@ import math
 
 import numpy as np
 import pytest
+from measured_rig import make_set
 
 from forcegrasp.errors import MeasurementError
 from forcegrasp.measure import MeasuredGrasp, MeasurementSet, check_set, read_set, write_set
@@ -42,7 +43,7 @@ def changed(measured: MeasurementSet, **signals) -> MeasurementSet:
 
 def refuse(measured: MeasurementSet, gripper: Gripper, *parts: str) -> None:
     with pytest.raises(MeasurementError) as caught:
-        check_set(measured, gripper.stroke, half_opening_m=half_opening(gripper))
+        check_set(measured, gripper.stroke, half_opening_m=half_opening(gripper), pads_at=gripper.pads_at)
     for part in parts:
         assert part in str(caught.value)
 
@@ -59,7 +60,7 @@ def test_what_was_recorded_is_read(name, samples, tmp_path):
         assert one.force_n.shape == (len(one.time_s), len(gripper.forces))
         for array in ("time_s", "command_m", "position_m", "force_n"):
             assert getattr(one, array).tobytes() == np.ascontiguousarray(getattr(other, array)).tobytes()
-    assert check_set(read, gripper.stroke, half_opening_m=half_opening(gripper)) == []
+    assert check_set(read, gripper.stroke, half_opening_m=half_opening(gripper), pads_at=gripper.pads_at) == []
 
 
 def test_columns_of_two_fingers_are_the_default():
@@ -114,6 +115,53 @@ def test_what_one_motor_shows_wrong_is_refused(name):
     refuse(changed(measured, force_n=np.negative), gripper, measured.columns.force[0], "by -1")
     refuse(changed(measured, force_n=np.zeros_like), gripper, ", ".join(measured.columns.force), "all forces are zero")
     refuse(changed(measured, force_n=np.ones_like), gripper, f"column {measured.columns.force[0]}", "sensor stuck?")
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_pads_stand_where_the_opening_says(name):
+    gripper = load_gripper(name)
+    positions = np.linspace(0.2, 1.0, 5)[:, None] * gripper.stroke * np.ones(len(gripper.motors))
+    pads = gripper.pads_at(positions)
+    if name == "so101_gripper":  # one jaw stands still
+        assert pads is None
+        return
+    assert pads is not None
+    np.testing.assert_allclose(pads.sum(axis=1), gripper.opening.opening_at(positions[:, 0]))
+    assert pads[-1] == pytest.approx([half_opening(gripper)] * 2)
+
+
+def with_one_motor(grasps: list[MeasuredGrasp], gripper: Gripper, channels: int = 2) -> MeasurementSet:
+    """What a rig of two fingers that close alike would have read with one motor, and some of its force sensors."""
+    columns = columns_of(gripper)
+    columns = dataclasses.replace(columns, force=columns.force[:channels])
+    made = [
+        dataclasses.replace(
+            g,
+            columns=columns,
+            command_m=gripper.opening.position_at(g.command_m.sum(axis=1))[:, None],
+            position_m=gripper.opening.position_at(g.position_m.sum(axis=1))[:, None],
+            force_n=g.force_n[:, :channels],
+        )
+        for g in grasps
+    ]
+    return make_set(made, gripper=gripper.name, position_std_m=None)
+
+
+@pytest.mark.parametrize("name", ["franka_hand", "robotiq_2f85"])
+@pytest.mark.parametrize("channels", [1, 2])
+def test_forces_in_free_air_and_swapped_fingers_of_one_motor_are_refused(name, channels, grasps):
+    gripper = load_gripper(name)
+    right = with_one_motor(grasps, gripper, channels)
+    check_set(right, gripper.stroke, half_opening_m=half_opening(gripper), pads_at=gripper.pads_at)
+    if channels == 2:
+        swapped = changed(right, force_n=lambda force: force[:, ::-1])
+        refuse(swapped, gripper, "the wrong finger touches first in 4 of 4")
+    rng = np.random.default_rng(5)
+    touched = [
+        dataclasses.replace(g, force_n=g.force_n + (g.time_s < 0.8)[:, None] * rng.normal(0, 1, g.force_n.shape))
+        for g in right.grasps
+    ]
+    refuse(dataclasses.replace(right, grasps=tuple(touched)), gripper, "N in free air", "object_radius_m")
 
 
 def test_objects_stay_in_metres():

@@ -5,9 +5,8 @@ from __future__ import annotations
 import pytest
 from measured_rig import refuse
 
-from forcegrasp.errors import MeasurementError
 from forcegrasp.measure import read_set
-from forcegrasp.measure.yaml_file import Reader
+from forcegrasp.measure.read import Meta
 
 VALID = {
     "format": "forcegrasp-measurements/1",
@@ -59,9 +58,9 @@ TEXTS = {
     "kind misspelt": (_text(kind="grasp"), ["did you mean grasps"]),
     "kind of two": (_text(kind="grasps final_force"), ["kind"]),
     "kind in capitals": (_text(kind="GRASPS"), ["kind"]),
-    "key misspelt": (_text(licence="CC0", license=None), ["'licence'", "did you mean license"]),
-    "unknown key": (_text(robot="tiago"), ["'robot'"]),
-    "key with unit": (_text(force_std_mn="13"), ["'force_std_mn'", "force_std_n"]),
+    "key misspelt": (_text(licence="CC0", license=None), ["licence: unknown", "did you mean license"]),
+    "unknown key": (_text(robot="tiago"), ["robot: unknown"]),
+    "key with unit": (_text(force_std_mn="13"), ["force_std_mn: unknown", "force_std_n"]),
     "key twice": (_text() + "kind: final_force\n", ["row 6", "'kind'", "twice"]),
     "empty": ("", []),
     "a comment": ("# nothing\n", []),
@@ -129,8 +128,10 @@ def test_positions_in_a_table_of_forces(folder):
     refuse(folder, "position_std_m")
 
 
-@pytest.mark.parametrize("key", ["first", "second", "third"])
-def test_every_key_that_must_be_there_is_asked_for(key):
-    content = {name: "1" for name in ("first", "second", "third") if name != key}
-    with pytest.raises(MeasurementError, match=f"^here: missing keys: {key}; add them$"):
-        Reader(content, "here", ("first", "second", "third"))
+def test_all_wrong_keys_are_told_at_once(folder):
+    (folder / "meta.yaml").write_text("format: forcegrasp-measurements/1\nkid: grasps\nforce_std_n: much\na: 1\nb: 2\n")
+    refuse(folder, "kid: unknown; did you mean kind", "kind: missing", "gripper: missing", "1 more")
+
+
+def test_keys_that_must_be_there():
+    assert [key for key, field in Meta.model_fields.items() if field.is_required()] == list(NEEDED)

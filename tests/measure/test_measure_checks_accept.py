@@ -283,9 +283,9 @@ def test_free_air_of_an_object_on_the_right_ends_early_for_the_right_finger():
     chatters = (right < 0.03) & (right > 0.018)  # it touches at 30 mm
     force[:, 1] = np.where(chatters, np.sin(np.arange(len(right))), right < 0.018)
     grasp = change(grasp, position_m=np.stack([np.full_like(right, OPEN_M), right], axis=1), force_n=force)
-    _check_free_air(make_set([grasp]), grasp, OPEN_M)
+    _check_free_air(make_set([grasp]), grasp, grasp.position_m, OPEN_M)
     with pytest.raises(MeasurementError, match="in free air"):
-        _check_free_air(make_set([grasp]), change(grasp, offset_m=-0.01), OPEN_M)
+        _check_free_air(make_set([grasp]), change(grasp, offset_m=-0.01), grasp.position_m, OPEN_M)
 
 
 def test_checking_changes_nothing(measured):

@@ -192,9 +192,9 @@ BROKEN_VALUES = [
     ("object.shape", "box", "object.shape: unknown"),
     (f"{_DAMPING}.min", 1, f"{_DAMPING}.min: unknown"),
     ("format", "forcegrasp-gripper/9", "format: must be forcegrasp-gripper/2; forcegrasp-gripper/1 is read, too"),
-    ("name", 7, "name=7: must be text"),
-    ("name", ["a"], "name=['a']: must be text"),
-    ("model", None, "model=None: must be text"),
+    ("name", 7, "name: must be text, not 7; put it in quotes"),
+    ("name", ["a"], "name: must be text, not ['a']"),
+    ("model", None, "model: must be text, not None"),
     ("model", "nowhere.xml", "nowhere.xml: could not read the scene"),
     ("model", "second.yaml", "not XML"),
     ("fast", "cube", "fast: must be none or sphere"),
@@ -204,19 +204,19 @@ BROKEN_VALUES = [
     ("fingers.joints", "west", "fingers.joints: must be two names"),
     ("fingers.joints", ["west", "east", "north"], "fingers.joints: must be two names"),
     ("fingers.joints", ["west", "west"], "fingers.joints: must be two names"),
-    ("fingers.joints", ["west", 3], "fingers.joints=3: must be text"),
+    ("fingers.joints", ["west", 3], "fingers.joints[1]: must be text, not 3"),
     ("fingers.joints", ["west", "easst"], "fingers.joints: second.xml has no 'easst'; did you mean east"),
     ("fingers.joints", ["west", "rail"], "fingers.joints: 'rail' must open towards +x, as the right finger"),
     ("fingers.joints", ["east", "west"], "fingers.joints: 'east' must open towards -x, as the left finger"),
     ("fingers.actuators", ["drive_west", "drive_est"], "fingers.actuators: second.xml has no 'drive_est'"),
     ("fingers.actuators", ["drive_east", "drive_west"], "fingers.actuators: 'drive_east' must drive the left finger"),
     ("fingers.force_sensors", ["touch_west", "touch"], "fingers.force_sensors: second.xml has no 'touch'"),
-    ("fingers.closed", "0.05 m", "fingers.closed=0.05 m: must be a number"),
-    ("fingers.closed", "5e-2", "fingers.closed=5e-2: must be a number; YAML wants 1.0e-3 for 1e-3"),
-    ("fingers.closed", True, "fingers.closed=True: must be a number"),
-    ("fingers.closed", float("nan"), "fingers.closed=nan: must be a number"),
+    ("fingers.closed", "0.05 m", "fingers.closed: must be a number, not 0.05 m"),
+    ("fingers.closed", "5e-2", "fingers.closed: must be a number, not 5e-2; YAML wants 1.0e-3 for 1e-3"),
+    ("fingers.closed", True, "fingers.closed: must be a number, not True"),
+    ("fingers.closed", float("nan"), "fingers.closed: must be a number, not nan"),
     ("fingers.closed", 10**400, "must be a number"),
-    ("fingers.closed", 0.0, "fingers.open: must differ from fingers.closed"),
+    ("fingers.closed", 0.0, "fingers.open: must differ from closed"),
     ("fingers.closed", 50, "fingers.closed=50: the left joint goes from 0 to 0.05 m"),
     ("fingers.closed", -0.05, "fingers.joints: 'west' must open towards -x"),
     ("object.axis", "w", "object.axis: must be x, y or z"),
@@ -228,16 +228,16 @@ BROKEN_VALUES = [
     ("object.geom", "things", "object.geom: second.xml has no 'things'; did you mean thing"),
     ("object.geom", "west", "object.geom: 'west' must be on the body that 'rail' moves"),
     (_DAMPING, 40, f"{_DAMPING}: must map"),
-    (f"{_DAMPING}.nominal", 500, f"{_DAMPING}.nominal=500: must lie between low=10 and high=120"),
-    (f"{_DAMPING}.low", "ten", f"{_DAMPING}.low=ten: must be a number"),
-    (f"{_DAMPING}.high", None, f"{_DAMPING}.high=None: must be a number"),
-    (f"{_DAMPING}.unit", 3, f"{_DAMPING}.unit=3: must be text"),
-    (f"{_DAMPING}.scope", "finger", f"{_DAMPING}.scope=finger: must be one of gripper, object, grasp"),
+    (f"{_DAMPING}.nominal", 500, f"{_DAMPING}.nominal: 500 must lie between low=10 and high=120"),
+    (f"{_DAMPING}.low", "ten", f"{_DAMPING}.low: must be a number, not ten"),
+    (f"{_DAMPING}.high", None, f"{_DAMPING}.high: must be a number, not None"),
+    (f"{_DAMPING}.unit", 3, f"{_DAMPING}.unit: must be text, not 3"),
+    (f"{_DAMPING}.scope", "finger", f"{_DAMPING}.scope: must be gripper, object or grasp, not finger"),
     (f"{_DAMPING}.writes", [], f"{_DAMPING}.writes: must name a field"),
-    (f"{_DAMPING}.writes", "dof_damping", f"{_DAMPING}.writes: must be a list"),
+    (f"{_DAMPING}.writes", "dof_damping", f"{_DAMPING}.writes: must be a list, such as `[dof_damping]`"),
     (f"{_DAMPING}.writes", 3, f"{_DAMPING}.writes: must be a list"),
-    (f"{_DAMPING}.writes", ["damping"], f"{_DAMPING}.writes: 'damping' must look like"),
-    (f"{_DAMPING}.writes", ["dof_damping x"], f"{_DAMPING}.writes: 'dof_damping x' must look like"),
+    (f"{_DAMPING}.writes", ["damping"], f"{_DAMPING}.writes[0]: 'damping' must look like"),
+    (f"{_DAMPING}.writes", ["dof_damping x"], f"{_DAMPING}.writes[0]: 'dof_damping x' must look like"),
     (f"{_DAMPING}.writes", [{"dof_damping": 0}], "must look like"),
     (f"{_DAMPING}.writes", ["body_mass"], "'body_mass' must look like"),
     (f"{_DAMPING}.writes", ["dof_dampin"], "in MuJoCo's model; did you mean dof_damping"),
@@ -272,6 +272,53 @@ def test_broken_value_is_one_line_with_file_and_key(tmp_path, key, value, expect
     else:
         place[last] = value
     assert expected in _refusal(_copy(tmp_path, description))
+
+
+#: The same for the shipped descriptions of the second format.
+BROKEN_SECOND = [
+    ("motors", ..., "motors: missing, such as `[{joint: j, actuator: a, closed: 0, open: 0.04}]`"),
+    ("motors", {}, "motors: must be a list of one motor, or of two (left, right)"),
+    ("motors.0.open", "wide", "motors[0].open: must be a number, not wide"),
+    ("motors.0.joints", "a", "motors[0].joints: unknown; did you mean joint"),
+    ("fingers.left.body", "pad", "fingers.left: needs the joint that moves it, or the body of its pads"),
+    ("force", "effort", "force: must be sensors, motor or none, not effort"),
+    ("force", "motor", "force: motor: `sensors` needs a finger with a force_sensor, the others need none"),
+    ("control.period_s", 0, "control.period_s: must be positive"),
+    ("scale.force", True, "scale.force: must be a number, not True"),
+    ("training.radius_m", [0.03, 0.02], "training.radius_m: must be [low, high] with low ≤ high"),
+    ("training.radius_m", 0.03, "training.radius_m: must be two numbers in brackets"),
+    ("training.radius", [0.02, 0.03], "training.radius: unknown; did you mean radius_m"),
+    ("training.softness.width", [1, 2], "training.softness: no parameter 'width'"),
+    ("training.servo_gain", "gain", "training.servo_gain: no parameter 'gain'"),
+    ("training.servo_gain", ..., "training.servo_gain: missing; a training draws the gain of `servo_gain` from"),
+    ("training.servo_gain_range", ..., "training.servo_gain_range: missing"),
+]
+
+
+@pytest.mark.parametrize(("key", "value", "expected"), BROKEN_SECOND)
+def test_broken_value_of_the_second_format(tmp_path, key, value, expected):
+    shipped = load_gripper("tiago").path
+    description = yaml.safe_load(shipped.read_text())
+    *parents, last = key.split(".")
+    place = description
+    for parent in parents:
+        place = place[int(parent)] if isinstance(place, list) else place[parent]
+    if value is ...:
+        del place[last]
+    else:
+        place[last] = value
+    (tmp_path / "tiago.xml").write_text(shipped.with_suffix(".xml").read_text())
+    path = tmp_path / "mine.yaml"
+    path.write_text(yaml.safe_dump(description))
+    assert expected in _refusal(path)
+
+
+def test_several_wrong_keys_are_told_at_once(tmp_path):
+    (tmp_path / "second.yaml").write_text("format: forcegrasp-gripper/2\nname: 7\nmodle: a.xml\n")
+    message = _refusal(tmp_path / "second.yaml")
+    assert "second.yaml: modle: unknown; did you mean model?; also name: must be text, not 7" in message
+    assert "also model: missing" in message
+    assert message.endswith("more")
 
 
 @pytest.mark.parametrize(
