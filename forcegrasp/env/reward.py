@@ -7,11 +7,11 @@ from jaxtyping import Float
 from torch import Tensor
 
 
-def force_reward(force_error: Float[Tensor, "*B 2"]) -> Float[Tensor, "*B 1"]:
+def force_reward(force_error: Float[Tensor, "*B channels"]) -> Float[Tensor, "*B 1"]:
     """r_force = 1 − tanh(Σ_i |Δf_i|) (paper, eq. 8).
 
     Args:
-      force_error: Δf = f_goal − f of both fingers, newtons, ``(*B, 2)``.
+      force_error: Δf = f_goal − f of each force, newtons, ``(*B, channels)``.
 
     Returns:
       ``(*B, 1)``, in [0, 1], 1 where both forces equal the goal.
@@ -20,12 +20,12 @@ def force_reward(force_error: Float[Tensor, "*B 2"]) -> Float[Tensor, "*B 1"]:
 
 
 def normalised_force_reward(
-    force_error: Float[Tensor, "*B 2"], goal_force: Float[Tensor, "*B 1"]
+    force_error: Float[Tensor, "*B channels"], goal_force: Float[Tensor, "*B 1"]
 ) -> Float[Tensor, "*B 1"]:
     """r_force = 1 − tanh(Σ_i |Δf_i| / f_goal), the form that trained the published policies (authors' code).
 
     Args:
-      force_error: newtons, ``(*B, 2)``.
+      force_error: newtons, ``(*B, channels)``.
       goal_force: newtons, ``(*B, 1)``.
 
     Returns:

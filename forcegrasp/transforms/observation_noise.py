@@ -32,7 +32,7 @@ class ObservationNoise(Transform):
         self,
         in_keys: Sequence[NestedKey],
         out_keys: Sequence[NestedKey],
-        std: Sequence[float],
+        std: Sequence[float | int],
         seed: int = 0,
         device: torch.device | str = "cpu",
         step: Sequence[float] | None = None,

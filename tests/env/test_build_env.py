@@ -261,6 +261,7 @@ OTHER = {
     "grasp": {
         "kappa": [0.0, 0.5],
         "b2": [-9.0, -9.0],
+        "servo_gain": "nominal",
         "radius_m": [0.025, 0.035],
         "offset_m": [0.0, 0.0],
         "deformation_m": 0.025,
