@@ -74,7 +74,7 @@ def validate(config: Any, path: str = "") -> None:
         if listed and not value and entry.default_factory is not dataclasses.MISSING and entry.default_factory():
             raise ConfigError(f"{name}=[]: must not be empty ({meta['doc']})")
         for item in value if listed else [value]:
-            if meta["choices"] and item not in meta["choices"]:
+            if meta["choices"] and item not in list(meta["choices"]):
                 raise ConfigError(f"{name}={item}: must be one of {', '.join(meta['choices'])}")
             number = isinstance(item, (int, float)) and not isinstance(item, bool)
             if number and not meta["low"] <= item <= meta["high"]:  # also refuses NaN

@@ -115,7 +115,7 @@ class ObservationConfig:
         list(DEFAULT_PARTS),
         "parts of o(t): a number per motor or per force reading each",
         source="paper, Sec. 4",
-        choices=tuple(PARTS),
+        choices=PARTS,
     )
     frames: int = option(3, "observations stacked, k", source="paper, Sec. 4", low=1, high=50)
 

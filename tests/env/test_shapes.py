@@ -21,7 +21,7 @@ def simulator() -> GraspSimulator:
 
 
 WRONG = {
-    "force of one finger": lambda simulator: force_reward(ONE),
+    "a force that is a number": lambda simulator: force_reward(torch.tensor(1.0)),
     "a goal per finger": lambda simulator: normalised_force_reward(PAIR, PAIR),
     "a goal for fewer grasps": lambda simulator: normalised_force_reward(PAIR, ONE[:3]),
     "a speed per finger": lambda simulator: object_penalty(PAIR, 0.1),
