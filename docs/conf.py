@@ -18,7 +18,7 @@ author = "the forcegrasp authors"
 version = release = __version__
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
 autodoc_member_order = "bysource"
-autodoc_inherit_docstrings = False  # torchrl's methods are told by torchrl
+autodoc_inherit_docstrings = False  # torchrl documents its own methods
 autodoc_typehints = "none"  # the docstrings say what is taken
 add_module_names = False
 html_theme = "furo"

@@ -3,7 +3,7 @@
 python tools/bench_gpu.py [--device cuda] [--grasps 1024 4096 16384] [--steps 150] [--tier fast] [--repeats 3]
 
 Every level simulates whole episodes of grasps that close at full speed; training also updates the networks. The best of
-the repeats counts. What is compiled and recorded at the start is told apart.
+the repeats counts. What is compiled and recorded at the start is reported separately.
 """
 
 from __future__ import annotations

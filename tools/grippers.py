@@ -152,7 +152,7 @@ def diagnose(grippers: list[str], sets: int, plain: int, grasps: int, folder: Pa
 
 
 def diagnose_one(gripper: str, hidden: str, seed: int, grasps: int) -> dict[str, Any]:
-    """Records one set, with an effect of typical size, and diagnoses it; the diagnosis is told nothing."""
+    """Records one set, with an effect of typical size, and diagnoses it; the diagnosis is not given it."""
     from forcegrasp.config import RecordConfig
     from forcegrasp.diagnosis.diagnose_set import diagnose_set
     from forcegrasp.identify.loading import Loaded

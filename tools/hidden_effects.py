@@ -52,7 +52,7 @@ class Job:
 
 
 def jobs() -> list[Job]:
-    """The whole campaign, most telling sets first."""
+    """The whole campaign, most informative sets first."""
     from tests.independent.rig import CATALOGUE, OUTSIDE, VARIANTS
 
     found = [Job("none", (), "", seed) for seed in range(1, 13)]

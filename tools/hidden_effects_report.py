@@ -89,7 +89,7 @@ def _page(rows: list[dict], planned: int) -> str:
         "Measurement sets were recorded by an independent simulator (`tests/independent`: its own scene, 0.5 ms",
         "steps, the newer collision code, its own implementation of every effect), with off-nominal base parameters,",
         "sensor noise of 27 µm and 13 mN, and 24 grasps of a rich plan, 150 samples each. `forcegrasp diagnose` was",
-        "told nothing.",
+        "given no hints.",
         "",
         "    python tools/hidden_effects.py run      # the campaign, about a minute a set",
         "    python tools/hidden_effects.py report   # this page",

@@ -6,44 +6,50 @@ import argparse
 import sys
 import time
 from collections import defaultdict
+from collections.abc import Callable
 from pathlib import Path
+from types import FrameType
 
 from mujoco.batch import Batch
 
 from forcegrasp.cli.measuring import refuse_table
+from forcegrasp.diagnosis import search, signatures
 from forcegrasp.diagnosis.diagnose_set import diagnose_set
+from forcegrasp.diagnosis.refine import refine
+from forcegrasp.identify.base_fit import fit_base
 from forcegrasp.identify.loading import load
+from forcegrasp.identify.noise_floor import numerical_error
 from forcegrasp.replay import replay
 from forcegrasp.replay.replay import Replay
 
-#: Function that simulates → what it does it for; the innermost one that is running counts.
+#: Code of functions that simulate → what they do it for; the innermost one that is running counts.
 PARTS = {
-    "fit_base": "base model, from several starts",
-    "numerical_error": "numerical floor",
-    "simulate": "signatures of all effects",
-    "best_sizes": "sizes around the best signatures",
-    "refine": "rough fits with one more effect",
-    "settle": "fits of the best ones to the end",
+    fit_base.__code__: "base model, from several starts",
+    numerical_error.__code__: "numerical floor",
+    signatures.Signatures.simulate.__code__: "signatures of all effects",
+    signatures.best_sizes.__code__: "sizes around the best signatures",
+    refine.__code__: "rough fits with one more effect",
+    search._Start.refine_on_reference_tier.__code__: "fits of the best ones to the end",
 }
 
 
-def part_of(frame) -> str:
+def part_of(frame: FrameType | None) -> str:
     """Which part of a diagnosis is running, from the call stack below the simulator."""
     while frame is not None:
-        if "compare" in frame.f_code.co_filename and frame.f_code.co_name in PARTS:
-            return PARTS[frame.f_code.co_name]
+        if frame.f_code in PARTS:
+            return PARTS[frame.f_code]
         frame = frame.f_back
     return "other"
 
 
-def watch(cls: type, name: str, told) -> None:
-    """Tells the processor seconds of each call of a method, with the object and its first argument."""
+def watch(cls: type, name: str, report: Callable[..., None]) -> None:
+    """Reports the processor seconds of each call of a method, with the object and its first argument."""
     method = getattr(cls, name)
 
     def timed(self, *args, **options):
         started = time.process_time()
         result = method(self, *args, **options)
-        told(time.process_time() - started, self, *args[:1])
+        report(time.process_time() - started, self, *args[:1])
         return result
 
     setattr(cls, name, timed)

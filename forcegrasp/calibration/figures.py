@@ -13,7 +13,7 @@ from forcegrasp.calibration.rig import Closing
 from forcegrasp.calibration.staircase import Staircase
 
 mpl.use("Agg")
-#: From low to high values: colours of Okabe and Ito, told apart by the colour-blind.
+#: From low to high values: colours of Okabe and Ito, distinct to the colour-blind.
 COLOURS = ("#0072b2", "#56b4e9", "#009e73", "#e69f00", "#d55e00", "#cc79a7")
 # A touch, for the figures: less than any sensor shows.
 _TOUCH_N = 1e-3

@@ -1,4 +1,4 @@
-"""The one thing that every calibration does: close with a constant delta, and write down positions and forces."""
+"""What every calibration does: close with a constant delta, and record positions and forces."""
 
 from __future__ import annotations
 

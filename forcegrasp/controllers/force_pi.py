@@ -44,7 +44,7 @@ class ForcePI(TensorDictModuleBase):
         super().__init__()
         gripper = gripper or default_gripper()
         self.in_keys = ["had_contact", "force_error", "force_integral"]
-        # tensordict's own annotation knows no nested keys
+        # tensordict's own annotation lacks nested keys
         self.out_keys = ["action", ("next", "force_integral")]  # pyright: ignore[reportAttributeAccessIssue]
         self.motors, self.period_s = len(gripper.motors), gripper.period_s
         self.max_delta = gripper.max_step if max_delta is None else max_delta

@@ -7,7 +7,7 @@ from zlib import crc32
 
 from matplotlib.colors import to_hex, to_rgb
 
-#: Controllers, and policies that come with the package (Okabe and Ito's colours, told apart by the colour-blind).
+#: Controllers, and policies that come with the package (Okabe and Ito's colours, distinct to the colour-blind).
 KNOWN = {
     "ib": "#0072b2",
     "no_ib": "#d55e00",

@@ -80,7 +80,7 @@ def group_runs(runs: list[History]) -> tuple[list[Group], list[str]]:
 
 
 def _labels(members: list[list[History]]) -> list[str]:
-    """The experiment's name, and what tells groups of one experiment apart: options off their defaults."""
+    """The experiment's name, and the options off their defaults in which its groups differ."""
     defaults = flat(dataclasses.asdict(TrainConfig()))
     labels = []
     for runs in members:

@@ -28,7 +28,7 @@ PAPER_OBJECTS = "paper"
 class Grid:
     """Grasps in cells of equal size."""
 
-    what: str  #: what tells the cells apart
+    what: str  #: what the cells differ in
     cells: list[str]
     grasps: GraspParameters  #: those of one cell next to each other
 

@@ -1,4 +1,4 @@
-"""One grasp as it was asked for: what is not given is drawn, so that the whole can be grasped."""
+"""One grasp as requested: what is not given is drawn such that the object can be grasped."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from forcegrasp.physics.sampling import offset_limits_m
 
 
 def draw_one_grasp(config: RenderConfig, gripper: Gripper | None = None) -> GraspParameters:
-    """Draws what ``config`` leaves open from the default ranges, narrowed to what goes with that which is given.
+    """Draws what ``config`` leaves open from the default ranges, narrowed to what fits the given values.
 
     Raises:
       ConfigError: if what is given can't be grasped (paper, eqs. 1 and 2), or its goal can't be reached.

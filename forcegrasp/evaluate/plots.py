@@ -70,7 +70,7 @@ def cell_boxes(results: dict[str, np.ndarray], cells: list[str], xlabel: str, yl
     Args:
       results: policy → values, ``(cells, trials)``.
       cells: their names.
-      xlabel: what tells the cells apart.
+      xlabel: what the cells differ in.
       ylabel: what the values are.
       log: whether the values span orders of magnitude.
     """

@@ -71,7 +71,7 @@ def load_policies(names: list[str], gripper: Gripper | None = None) -> list[Eval
 
 
 def gripper_of(names: list[str], asked: str) -> Gripper:
-    """The gripper that was asked for; else the one that the first trained policy knows; else the paper's.
+    """The requested gripper; else the one that the first trained policy was trained on; else the paper's.
 
     Raises:
       ConfigError, CheckpointError: if it can't be read.

@@ -26,7 +26,7 @@ def roll_out(
     Args:
       policy: reads and writes tensordicts; a policy with a state brings its ``make_tensordict_primer()``.
       grasps: what to grasp.
-      grasp: tells the length of an episode.
+      grasp: has the length of an episode.
       seed: seed of the sensor noise.
       **parts: the rest of the environment's configuration, see :func:`~forcegrasp.env.build_env`.
 

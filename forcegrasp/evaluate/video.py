@@ -39,7 +39,7 @@ def grasp_video(
 
     Args:
       episodes: title → one episode ``(T,)`` of an env's rollout; all of the same length.
-      sensors: σ_f of the band around the goal, and f_θ that tells when a finger touched.
+      sensors: σ_f of the band around the goal, and f_θ, above which a finger touches.
       every: control steps per picture.
       colours: title → colour; the titles are names of policies, and have theirs, if not given.
       gripper: that is seen; the paper's by default.

@@ -107,7 +107,7 @@ class Benchmark:
 
     @contextmanager
     def _progress(self) -> Iterator[Callable[[str], None]]:
-        """A function that tells what is going on: in a line that changes, or line by line where that can't be."""
+        """A function that reports progress: in a line that changes, or line by line where that can't be."""
         if self.console.is_terminal:
             with self.console.status("") as status:
                 yield status.update

@@ -1,4 +1,4 @@
-"""Trainings on the recommended experiment, each telling how its training episodes went, batch by batch.
+"""Trainings on the recommended experiment, each reporting how its training episodes went, batch by batch.
 
 Both have the same problem, curriculum and number of frames to anneal it over; the reward is the normalised form,
 mean of the episodes of a batch, actions explored.

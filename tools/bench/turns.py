@@ -44,7 +44,7 @@ class Worker:
         )
 
     def answer(self) -> dict[str, Any] | None:
-        """The next thing it tells; None if it has ended.
+        """Its next answer; None if it has ended.
 
         Raises:
           RuntimeError: if it failed, with the last it said.
@@ -69,7 +69,7 @@ class Worker:
         return answer["steps_per_second"]
 
     def memory_mb(self) -> float | None:
-        """Peak memory of the group, in MB, with what its processes share counted once; None where no /proc tells."""
+        """Peak memory of the group, in MB, with what its processes share counted once; None where there is no /proc."""
         try:
             parts = [_memory_kb(process) for process in self._members()]
         except (OSError, KeyError):

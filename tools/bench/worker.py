@@ -1,7 +1,7 @@
 """The process in which one case runs, so that its memory is its own: ``python -m tools.bench.worker CASE``.
 
 CASE is JSON: a level or peer is prepared and run once, then run again for each line of stdin for as many seconds as
-it says, and what came out is told as a line of JSON. A training tells each of its batches. Ends with its stdin.
+it says, and what came out is printed as a line of JSON. A training reports each of its batches. Ends with its stdin.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def measure(case: Case, tell) -> None:
 
 
 def learn(case: Case, tell) -> None:
-    """Trains, and tells of each batch: seconds since the start, frames, reward."""
+    """Trains, and reports each batch: seconds since the start, frames, reward."""
     from tools.bench.learning import TRAININGS
 
     started = 0.0

@@ -1,4 +1,4 @@
-"""Divergence that is put into the simulation: it is always told, and never reset in silence as MuJoCo does."""
+"""Divergence that is put into the simulation: it is always reported, and never reset in silence as MuJoCo does."""
 
 from __future__ import annotations
 
@@ -41,9 +41,9 @@ def trials(count: int, seed: int) -> Iterator[Trial]:
         expected = f"grasp {row} diverged at control step {simulator.steps[row]} "
         try:
             simulator.step(delta)
-            problem = "nothing was told"
+            problem = "nothing was reported"
         except PhysicsError as error:
-            problem = "" if expected in str(error) else f"told of another: {error}"
+            problem = "" if expected in str(error) else f"reported another: {error}"
         yield Trial(f"{number} {tier}: {field} = {value:.3g} in grasp {row}", problem, field)
 
 
@@ -52,4 +52,6 @@ def _value(rng: np.random.Generator) -> float:
     return float(rng.choice([np.nan, np.inf * sign, sign * 10 ** rng.uniform(15, 300)]))
 
 
-PROMISE = Promise("a simulation that diverges is told with the grasp, the step and the parameters", 1000, 40, trials)
+PROMISE = Promise(
+    "a simulation that diverges is reported with the grasp, the step and the parameters", 1000, 40, trials
+)

@@ -110,5 +110,5 @@ def _disk(folder: Path) -> Iterator[Callable[[int], None]]:
 
 
 PROMISE = Promise(
-    "a disk that fills up while training costs one checkpoint interval at most, and is told in one line", 100, 1, trials
+    "a disk that fills up while training costs one checkpoint interval at most, and one line says so", 100, 1, trials
 )

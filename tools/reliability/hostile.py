@@ -54,7 +54,7 @@ def _attempt(attack: Attack, root: Path) -> tuple[str, str]:
     except ForcegraspError as error:
         how, text = "refused", str(error)
         wrong = "" if text.splitlines() == [text] and len(text) < 1000 else f"not one short line: {text[:300]!r}"
-    except OSError as error:  # which the command line tells in one line, too
+    except OSError as error:  # which the command line reports in one line, too
         how, wrong = "refused", "" if error.strerror else f"not one line: {error}"
     grown = peak_memory_mb() - before
     new = [path for path in _tree(case) - laid if path.parts[0] != "out"]
