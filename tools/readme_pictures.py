@@ -97,8 +97,8 @@ def _draw(before: Comparison, after: Comparison, effect: str, share: float) -> F
     _draw_bars(figure.add_axes((0.775, 0.15, 0.21, 0.59)), before, after, share)
     errors = [f"error {rms(c.heldout, target):.1f} × sensor noise" for c in (before, after)]
     ends = {0.0: (f"Model without {effect}: {errors[0]}", WITHOUT), 1.0: (f"Model with {effect}: {errors[1]}", WITH)}
-    told, colour = ends.get(share, (f"Adding {effect} …", MEASURED))
-    figure.text(0.012, 0.97, told, fontsize=13, weight="bold", va="top", color=colour)
+    text, colour = ends.get(share, (f"Adding {effect} …", MEASURED))
+    figure.text(0.012, 0.97, text, fontsize=13, weight="bold", va="top", color=colour)
     key = "dots: measured · lines: predicted for grasps that were held out of the fit"
     figure.text(0.012, 0.89, key, fontsize=9, va="top", color=MEASURED)
     return figure

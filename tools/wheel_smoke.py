@@ -199,11 +199,11 @@ def run(step: Step, folder: Path, programs: Path) -> str:
         )
     except (OSError, RuntimeError, subprocess.TimeoutExpired) as error:
         return f"{type(error).__name__}: {error}"
-    told = done.stdout + done.stderr
-    if step.or_says and step.or_says in told:
+    printed = done.stdout + done.stderr
+    if step.or_says and step.or_says in printed:
         return ""
     if done.returncode:
-        return "\n".join([*told.splitlines()[-12:], f"exit status {done.returncode}"])
+        return "\n".join([*printed.splitlines()[-12:], f"exit status {done.returncode}"])
     missing = [name for name in step.leaves if not (work / name).exists()]
     return f"did not leave {', '.join(missing)}" if missing else ""
 

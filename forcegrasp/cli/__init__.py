@@ -1,1 +1,1 @@
-"""The command line: one file per verb, each with a ``main(arguments) -> exit status``."""
+"""The command line: one file per verb, each with its ``VERB``."""

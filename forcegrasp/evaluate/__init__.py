@@ -1,0 +1,1 @@
+"""Compares policies on the same grasps: rollouts, tables, learning curves, plots and video."""

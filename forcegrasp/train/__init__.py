@@ -1,0 +1,1 @@
+"""Trains policies: the loop, collectors, learning algorithms and logs."""
