@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+import signal
+from collections.abc import Callable, Iterator
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -47,3 +48,11 @@ def warp() -> None:
     start_warp()
     if not (kernels_are_cached() or os.environ.get("FORCEGRASP_WARP")):
         pytest.skip("Warp's kernels are not compiled here; set FORCEGRASP_WARP=1 to have it done")
+
+
+@pytest.fixture
+def hang_ups_arrive() -> Iterator[None]:
+    """As in a terminal, though the tests may have been started with nohup, which ignores hang-ups."""
+    before = signal.signal(signal.SIGHUP, signal.SIG_DFL)
+    yield
+    signal.signal(signal.SIGHUP, before)

@@ -98,6 +98,7 @@ def test_ctrl_c_ends_the_sweep_and_not_just_one_run(tiny, monkeypatch, capsys):
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGHUP, signal.SIGUSR1])
+@pytest.mark.usefixtures("hang_ups_arrive")
 def test_the_same_sweep_again_goes_on(tiny, tmp_path, monkeypatch, capsys, number):
     """As after a job that a scheduler ended and started anew: finished runs stay, the others end bit for bit alike."""
     log, interrupt = TrainingLog.batch, [False]

@@ -108,6 +108,7 @@ def equal(metrics) -> Callable[[RunDir, RunDir], bool]:
     ("number", "action"),
     [(1, ctrl_c), (2, ctrl_c), (4, ctrl_c), (1, terminate), (4, terminate), (1, hang_up), (3, preempt)],
 )
+@pytest.mark.usefixtures("hang_ups_arrive")
 def test_after_a_signal(whole, run, equal, number, action):
     signals = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGUSR1)
     handlers = [signal.getsignal(number) for number in signals]
@@ -377,6 +378,7 @@ def test_command_line_after_ctrl_c(tmp_path, metrics):
     assert metrics(run) == metrics(uninterrupted)
 
 
+@pytest.mark.usefixtures("hang_ups_arrive")
 def test_command_line_after_a_lost_terminal(tmp_path, metrics):
     """As when an ssh connection breaks: the terminal is gone, what is printed has no reader, and the run is saved."""
     options = ["ppo.total_frames=800000", "ppo.grasps=2", "grasp.steps=40", "physics.threads=1", "ppo.hidden=[8]"]
