@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -125,3 +126,10 @@ def made_up() -> SimpleNamespace:
         added=Added(target, base.fit, candidates[0].fit, before, 1.0, after_model),
         tried=[get_effect(n) for n in (*names, "backlash", "force_lag", "adhesion")],
     )
+
+
+def shortened(measured: MeasurementSet, samples: int) -> MeasurementSet:
+    """The first samples of each grasp: to simulate less takes less time."""
+    names = ("time_s", "command_m", "position_m", "force_n")
+    grasps = [dataclasses.replace(g, **{name: getattr(g, name)[:samples] for name in names}) for g in measured.grasps]
+    return dataclasses.replace(measured, grasps=tuple(grasps))

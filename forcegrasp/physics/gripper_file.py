@@ -47,11 +47,15 @@ def load_gripper(name: str | Path, folder: str | Path = "") -> Gripper:
         known = shipped_grippers()
         if name not in known:
             raise ConfigError(f"gripper={name}: no such gripper{closest(name, known)}; or give a description's path")
-        return _load(shipped_folder() / f"{name}.yaml")
+        return _shipped(name)
     return _load(Path(folder) / name)
 
 
-@functools.cache
+@functools.cache  # a training asks a dozen times, and the files of the package stay as they are
+def _shipped(name: str) -> Gripper:
+    return _load(shipped_folder() / f"{name}.yaml")
+
+
 def default_gripper() -> Gripper:
     """The gripper that is simulated where no other is named: the paper's."""
     return load_gripper(DEFAULT_GRIPPER)

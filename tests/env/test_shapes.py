@@ -41,6 +41,13 @@ def test_a_wrong_shape_is_caught(wrong, simulator):
         WRONG[wrong](simulator)
 
 
+def test_every_file_with_shapes_is_checked(root, pytestconfig):
+    """pyproject.toml names them one by one; one that was forgotten would be passed over in silence."""
+    files = [path for path in (root / "forcegrasp").rglob("*.py") if "from jaxtyping import" in path.read_text("utf-8")]
+    *checked, _ = pytestconfig.getoption("--jaxtyping-packages").split(",")
+    assert sorted(checked) == sorted(".".join(path.relative_to(root).with_suffix("").parts) for path in files)
+
+
 def test_what_a_simulator_returns_is_checked(monkeypatch, simulator):
     monkeypatch.setattr(simulator.plant, "measured_force", np.zeros((3, 3)))
     with pytest.raises(TypeCheckError, match="measured_force"):

@@ -152,6 +152,7 @@ def test_serial_trans_env_check(check_trans_in_workers: Callable) -> None:
     check_trans_in_workers(SerialEnv)
 
 
+@pytest.mark.parametrize("case", TOGETHER, indirect=True)  # all of them at once: to start processes takes long
 def test_parallel_trans_env_check(check_trans_in_workers: Callable) -> None:
     check_trans_in_workers(parallel_env)
 
@@ -174,6 +175,7 @@ def test_trans_serial_env_check(check_trans_around_workers: Callable) -> None:
     check_trans_around_workers(SerialEnv)
 
 
+@pytest.mark.parametrize("case", TOGETHER, indirect=True)
 def test_trans_parallel_env_check(check_trans_around_workers: Callable) -> None:
     check_trans_around_workers(parallel_env)
 
