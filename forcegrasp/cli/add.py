@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import shlex
+from pathlib import Path
+
+from forcegrasp.assets import DEFAULT_GRIPPER
 from forcegrasp.cli.results import default_out, need, print_table, progress_printer
 from forcegrasp.cli.verb import Verb
 from forcegrasp.config.verbs import AddConfig
@@ -52,7 +56,7 @@ def run(config: AddConfig) -> None:
     print_table(fit_report.printed_parameters(added.model))
     print("\n".join([lead, *(f"warning: {warning}" for warning in added.model.warnings)]))
     write_model(added.model, path)
-    print(f"wrote {path}. Train with it: forcegrasp train model={path}")
+    print(f"wrote {path}. Train with it: {train_command(path, added.model.gripper.name_or_path)}")
     write_results(
         folder,
         "add",
@@ -61,6 +65,13 @@ def run(config: AddConfig) -> None:
         lead,
         fit_report.add_sections(added, effect),
         loaded,
+    )
+
+
+def train_command(model: Path, gripper: str) -> str:
+    """What to type to train with a model of this gripper."""
+    return shlex.join(
+        ["forcegrasp", "train", f"model={model}", *([] if gripper == DEFAULT_GRIPPER else [f"gripper={gripper}"])]
     )
 
 

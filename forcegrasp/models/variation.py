@@ -23,7 +23,10 @@ def read_model_of(gripper: Gripper, source: Model | str | Path) -> Model:
     model = source if isinstance(source, Model) else read_model(Path(source))
     if model.gripper.name != gripper.name:
         name = "model" if isinstance(source, Model) else f"model={source}"
-        raise ConfigError(f"{name}: is of gripper {model.gripper.name}, and gripper={gripper.name} is asked for")
+        raise ConfigError(
+            f"{name}: is of gripper {model.gripper.name}, and gripper={gripper.name} is asked for;"
+            f" say gripper={model.gripper.name_or_path}, too"
+        )
     return model
 
 

@@ -18,6 +18,8 @@ from forcegrasp.reports.html import Picture, Section, Table, Text
 
 # Error ÷ floor up to which a model is as good as the data can tell.
 _AT_FLOOR = 1.03
+# Beyond it an error below the floor is excused by the simulation's numerical error, and not by noise.
+_MOST_NOISE = 1.2
 # Error ÷ noise beyond which a cell is marked.
 _MARKED = 2.0
 # What the residual is drawn against.
@@ -126,7 +128,13 @@ def answer(comparison: Comparison) -> str:
         where = "on held-out grasps"
     else:
         where = "on the grasps that it was fitted to (too few to hold any out)"
-    total = f"The model's error {where} is {value:.2f} × the sensor noise; up to {floor:.2f} is noise."
+    error = f"The model's error {where} is {value:.2f} × the sensor noise"
+    if at_floor(value, floor) and not at_floor(value, _MOST_NOISE):
+        return (
+            f"{error}, and up to {floor:.2f} × may be the simulation's own numerical error: this can't tell whether an"
+            " effect is missing. In the gripper's scene, try <flag multiccd='disable'/> or a smaller timestep."
+        )
+    total = f"{error}; up to {floor:.2f} is noise."
     if at_floor(value, floor):
         return f"{total} These measurements show no failure of the model."
     return (

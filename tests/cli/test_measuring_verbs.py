@@ -16,6 +16,7 @@ import yaml
 from rich import box
 from rich.table import Table
 
+from forcegrasp.cli.add import train_command
 from forcegrasp.cli.main import main
 from forcegrasp.cli.results import print_table
 
@@ -203,6 +204,12 @@ def test_a_table_of_final_forces(folder, capsys):
         assert (folder / verb / "report.html").is_file()
         assert json.loads((folder / verb / file).read_text())["floor_ratio"] > 0
         assert "dead zone" in capsys.readouterr().out
+
+
+def test_add_names_the_gripper_to_train_unless_it_is_the_default():
+    assert train_command(Path("better.yaml"), "tiago") == "forcegrasp train model=better.yaml"
+    other = "forcegrasp train model=better.yaml gripper=/lab/hand.yaml"
+    assert train_command(Path("better.yaml"), "/lab/hand.yaml") == other
 
 
 def test_an_effect_that_does_not_help_is_not_added(folder, capsys, monkeypatch):

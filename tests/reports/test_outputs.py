@@ -85,6 +85,14 @@ def test_compare_without_failure_says_so(made_up):
     assert not any("goes with" in line for line in comparison_report.details(comparison))
 
 
+def test_compare_can_not_tell_where_numerical_error_is_large(made_up):
+    one_and_a_half = 1.5 * np.random.default_rng(3).standard_normal(made_up.comparison.residual.shape)
+    comparison = dataclasses.replace(made_up.comparison, residual=one_and_a_half, heldout=one_and_a_half, floor=2.5)
+    answer = comparison_report.answer(comparison)
+    assert "can't tell" in answer
+    assert "no failure" not in answer
+
+
 def test_an_estimated_noise_is_called_a_lower_bound(made_up):
     assert "as given" in comparison_report.noise_sentence(made_up.target)
     estimated = dataclasses.replace(made_up.target, sigma_known=False)
