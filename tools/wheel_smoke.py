@@ -84,6 +84,7 @@ STEPS = [
     Step("export force_pi", ["forcegrasp", "export", "force_pi", "gripper=franka_hand", "out=hand"], ("hand",)),
     Step("deploy", ["python", "-c", DEPLOY]),
     Step("record", ["forcegrasp", "record", "out=set", "grasps=6", "objects=1", "effects=[force_bias]"], ("set",)),
+    Step("import", ["forcegrasp", "import", "example=true", "out=servo"], ("servo/meta.yaml",)),
     Step("fit", ["forcegrasp", "fit", "data=set", "out=model.yaml"], ("model.yaml",)),
     Step("functions", ["python", "-c", FUNCTIONS], ("p/report.html",)),
     Step("compare", ["forcegrasp", "compare", "data=set", "model=model.yaml", "out=c"], ("c/report.html",)),

@@ -56,7 +56,10 @@ def run(config: AddConfig) -> None:
     print_table(fit_report.printed_parameters(added.model))
     print("\n".join([lead, *(f"warning: {warning}" for warning in added.model.warnings)]))
     write_model(added.model, path)
-    print(f"wrote {path}. Train with it: {train_command(path, added.model.gripper.name_or_path)}")
+    if loaded.gripper.is_servo:
+        print(f"wrote {path}. See what is left: forcegrasp compare data={data} model={path}")
+    else:
+        print(f"wrote {path}. Train with it: {train_command(path, added.model.gripper.name_or_path)}")
     write_results(
         folder,
         "add",

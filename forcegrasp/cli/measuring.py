@@ -178,7 +178,7 @@ def table_answer(analysis: TableAnalysis) -> str:
 
 def refuse_one_grasp(loaded: Loaded[MeasurementSet]) -> None:
     """Raises ConfigError about a set of one grasp, of which none can be held out."""
-    if len(loaded.measured.grasps) < 2:
+    if loaded.held_out < 2:
         raise ConfigError(
             f"data={loaded.measured.path}: has one grasp, so that none can be held out to tell whether the error falls"
         )

@@ -8,7 +8,7 @@ from forcegrasp.cli.verb import Verb
 
 #: Files of this folder, in the order of the help.
 _FILES = (
-    *("record", "compare", "fit", "diagnose", "add"),
+    *("record", "import", "compare", "fit", "diagnose", "add"),
     *("train", "evaluate", "curves", "export", "render"),
     *("effects", "doctor", "completion"),
 )

@@ -91,6 +91,22 @@ class RecordConfig:
 
 
 @dataclass
+class ImportConfig:
+    """`forcegrasp import`."""
+
+    source: list[str] = option([], "files or folders of recordings; also given without source=")
+    out: str = option("", "folder for the set; must not exist or be empty; runs/import_TIME if empty")
+    format: str = option(
+        "", "how the recordings are written", choices=("", "sage", "bam", "emps", "dfki", "pace", "lerobot")
+    )
+    map: str = option("", "file that says which column is what, for any other CSV or Parquet")
+    joints: list[str] = option([], "joints to take; all that there are if empty")
+    mechanism: str = option("", "what was recorded, by name or description; that of the format if empty")
+    license: str = option("", "on what terms the data may be used")
+    example: bool = option(False, "write a starter set instead")
+
+
+@dataclass
 class CompareConfig:
     """`forcegrasp compare`."""
 

@@ -38,6 +38,8 @@ class Advice(ShortRepr):
 
 def advise(diagnosis: Diagnosis) -> Advice | None:
     """The next grasp to tell the last step's best effects apart; None if there are no two that explain anything."""
+    if diagnosis.target.gripper.is_servo:  # the menu is of grasps
+        return None
     rivals = _rivals(diagnosis)
     if rivals is None:
         return None

@@ -36,9 +36,9 @@ def diagnose_set(
       MeasurementError: if there are too few grasps to hold any out.
       ConfigError: if an effect is unknown, or can't show on this gripper.
     """
-    if len(loaded.measured.grasps) < LEAST_GRASPS:
+    if loaded.held_out < LEAST_GRASPS:
         raise MeasurementError(
-            f"{loaded.measured.path}: {len(loaded.measured.grasps)} grasps are too few for a diagnosis,"
+            f"{loaded.measured.path}: {loaded.held_out} grasps are too few for a diagnosis,"
             f" {LEAST_GRASPS} are needed; record more (forcegrasp record shows a plan)"
         )
     if model is None:

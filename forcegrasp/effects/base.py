@@ -68,6 +68,7 @@ class Effect:
     per: ClassVar[str] = ""
     alone: ClassVar[str] = ""
     after_noise: ClassVar[bool] = False  #: acts on readings with their noise, as rounding does
+    needs_object: ClassVar[bool] = False  #: shows only where fingers press on something
     least_channels: ClassVar[int] = 0  #: force readings that the gripper must have for it to make a difference
     # of the gripper, see for_gripper
     motors: ClassVar[int] = 2

@@ -21,6 +21,7 @@ class _Traits:
 
     motors: int
     channels: int
+    grasps: bool  #: it has fingers
     turns: bool  #: its motors turn instead of sliding
     position: float  #: factors of sizes, see :class:`~forcegrasp.physics.gripper.Gripper`
     effort: float
@@ -28,16 +29,28 @@ class _Traits:
 
     @classmethod
     def of(cls, gripper: Gripper) -> _Traits:
-        travel = [t for t, f in zip(gripper.opening.travel, gripper.fingers, strict=True) if f.motor == 0]
+        travel = [t for t, f in zip(gripper.opening.travel, gripper.fingers, strict=False) if f.motor == 0]
         turns, force = gripper.unit == "rad", gripper.force_scale
-        effort = force * (1.0 if gripper.is_direct else float(sum(travel)))
-        return cls(len(gripper.motors), len(gripper.forces), turns, gripper.position_scale, effort, force)
+        effort = force * (float(sum(travel)) if travel and not gripper.is_direct else 1.0)
+        return cls(
+            len(gripper.motors),
+            len(gripper.forces),
+            bool(gripper.fingers),
+            turns,
+            gripper.position_scale,
+            effort,
+            force,
+        )
 
 
 def effects_of(gripper: Gripper) -> dict[str, type[Effect]]:
     """Effects that can show on a gripper, by name, in the order in which they act."""
     traits = _Traits.of(gripper)
-    return {n: _adapt(e, traits) for n, e in catalogue().items() if e.least_channels <= traits.channels}
+    return {
+        name: _adapt(effect, traits)
+        for name, effect in catalogue().items()
+        if effect.least_channels <= traits.channels and (traits.grasps or not effect.needs_object)
+    }
 
 
 def effect_of(name: str, gripper: Gripper) -> type[Effect]:
@@ -49,6 +62,8 @@ def effect_of(name: str, gripper: Gripper) -> type[Effect]:
     known = effects_of(gripper) | {NoEffect.name: NoEffect}
     if name in known:
         return known[name]
+    if name in catalogue() and catalogue()[name].needs_object and gripper.is_servo:
+        raise ConfigError(f"effect {name}: is one of grasped objects; {gripper.name} grasps nothing")
     if name in catalogue():
         need = catalogue()[name].least_channels
         raise ConfigError(f"effect {name}: needs {need} force readings; {gripper.name} has {len(gripper.forces)}")
@@ -57,7 +72,7 @@ def effect_of(name: str, gripper: Gripper) -> type[Effect]:
 
 @functools.cache
 def _adapt(effect: type[Effect], traits: _Traits) -> type[Effect]:
-    if traits == _Traits(2, 2, False, 1.0, 1.0, 1.0):
+    if traits == _Traits(2, 2, True, False, 1.0, 1.0, 1.0):
         return effect
     count = {"motor": traits.motors, "channel": traits.channels}.get(effect.per, len(effect.parameters))
     factors = np.array([_factor(p, traits) for p in effect.parameters[:count]])

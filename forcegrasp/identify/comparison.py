@@ -11,7 +11,7 @@ from forcegrasp.identify.cross_validation import heldout_residual, make_folds, r
 from forcegrasp.identify.fitted_model import model_of
 from forcegrasp.identify.loading import Loaded
 from forcegrasp.identify.noise_floor import beyond_fit, numerical_error, numerical_floor
-from forcegrasp.identify.phases import PHASES, contacts
+from forcegrasp.identify.phases import contacts
 from forcegrasp.identify.progress import Progress
 from forcegrasp.identify.target import Target
 from forcegrasp.measure import MeasurementSet
@@ -53,7 +53,7 @@ class Comparison(ShortRepr):
         """One cell for each signal and phase that occurs."""
         found = []
         for k, (signal, unit) in enumerate(zip(self.target.axis.names, self.target.axis.units, strict=True)):
-            for index, phase in enumerate(PHASES):
+            for index, phase in enumerate(self.target.phases):
                 inside = self.residual[..., k][self.target.phase == index]
                 if len(inside):
                     ratio, sigma = float(np.sqrt(np.mean(inside**2))), self.target.sigma[k]
@@ -68,8 +68,8 @@ class Comparison(ShortRepr):
 
     def by_grasp_and_phase(self) -> np.ndarray:
         """rms residual ÷ noise, ``(G, phases)``; NaN where a grasp has no such phase."""
-        grid = np.full((len(self.target.grasps), len(PHASES)), np.nan)
-        for index in range(len(PHASES)):
+        grid = np.full((len(self.target.grasps), len(self.target.phases)), np.nan)
+        for index in range(len(self.target.phases)):
             inside = self.target.phase == index
             counts = inside.sum(axis=1)
             squares = np.sum(self.residual**2 * inside[:, :, None], axis=(1, 2))

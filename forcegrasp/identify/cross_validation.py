@@ -22,11 +22,19 @@ _HEAVY = 6.0
 def make_folds(grasps: Sequence[MeasuredGrasp]) -> list[np.ndarray]:
     """Indices of the grasps that each fold holds out: whole grasps, each object spread over the folds.
 
+    Of a servo's recordings, if there are enough of them, each is held out as a whole.
+
     If the set marks grasps with ``split: check``, they are the one fold.
     """
     check = np.array([i for i, g in enumerate(grasps) if g.split == "check"], dtype=int)
     if len(check):
         return [check]
+    sessions = list(dict.fromkeys(g.session for g in grasps))
+    if not any(g.object for g in grasps) and len(sessions) >= FOLDS:  # a servo's recordings, whole
+        return [
+            np.array([i for i, g in enumerate(grasps) if g.session in sessions[k::FOLDS]], dtype=int)
+            for k in range(FOLDS)
+        ]
     order = sorted(range(len(grasps)), key=lambda i: (grasps[i].object, grasps[i].session, i))
     folds = min(FOLDS, len(grasps))
     return [np.array(sorted(order[k::folds]), dtype=int) for k in range(folds)]

@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import Generic, TypeVar
 
 from forcegrasp.identify.sensor_noise import check_given_noise
-from forcegrasp.measure import FinalForceTable, MeasurementSet, check_set, check_table, read_set
+from forcegrasp.identify.windows import cut
+from forcegrasp.measure import FinalForceTable, MeasurementSet, check_servo, check_set, check_table, read_set
 from forcegrasp.models.model_file import Model
 from forcegrasp.physics.gripper import Gripper
 from forcegrasp.physics.gripper_file import load_gripper
@@ -25,6 +26,13 @@ class Loaded(ShortRepr, Generic[Measured]):
     gripper: Gripper
     warnings: list[str]
 
+    @property
+    def held_out(self) -> int:
+        """Number of grasps, or of windows of a servo's recordings, that can be held out one by one."""
+        if not isinstance(self.measured, MeasurementSet):
+            return 0
+        return len(cut(self.measured.grasps) if self.gripper.is_servo else self.measured.grasps)
+
     def summary(self) -> str:
         return f"{self.measured.summary()}; {counted(len(self.warnings), 'warning')}"
 
@@ -40,6 +48,8 @@ def load(path: str | Path) -> Loaded[MeasurementSet] | Loaded[FinalForceTable]:
     gripper = load_gripper(measured.gripper, measured.path)
     if isinstance(measured, FinalForceTable):
         return Loaded(measured, gripper, check_table(measured, gripper.stroke))
+    if gripper.is_servo:
+        return Loaded(measured, gripper, check_servo(measured))
     half_opening_m = float(gripper.opening.opening_m[-1]) / 2
     warnings = check_set(measured, gripper.stroke, half_opening_m=half_opening_m, pads_at=gripper.pads_at)
     return Loaded(measured, gripper, warnings + check_given_noise(measured, gripper.unit))

@@ -8,7 +8,6 @@ import numpy as np
 
 from forcegrasp.identify.cross_validation import rms
 from forcegrasp.identify.fit import Fit
-from forcegrasp.identify.phases import PHASES
 from forcegrasp.identify.predict import predict
 from forcegrasp.identify.target import Target
 from forcegrasp.replay.replay import Replay
@@ -80,7 +79,7 @@ def excess(residual: np.ndarray, numerical: Sequence[np.ndarray], target: Target
 def cells(target: Target) -> list[tuple[str, np.ndarray]]:
     """Positions and forces in each phase that has samples enough: name and mask ``(G, S, C)``."""
     found = []
-    for index, phase in enumerate(PHASES):
+    for index, phase in enumerate(target.phases):
         inside = target.phase == index
         if inside.sum() >= _LEAST_SAMPLES:
             for kind, part in target.axis.kinds.items():

@@ -8,6 +8,8 @@ from forcegrasp.measure.schema import MeasuredGrasp
 from forcegrasp.physics.gripper import Gripper
 
 PHASES = ("free", "first_contact", "both", "hold", "release")
+#: The same of a servo that grasps nothing.
+SERVO_PHASES = ("moving", "reversing", "holding", "released")
 #: A command that has not changed for this long is held, seconds.
 HELD_S = 0.3
 
@@ -17,14 +19,21 @@ _TRANSITION_S = 0.2
 _STALL = 0.1
 
 
+def phases_of(gripper: Gripper) -> tuple[str, ...]:
+    """Names of the phases of what a gripper, or a servo, does."""
+    return SERVO_PHASES if gripper.is_servo else PHASES
+
+
 def find_phases(grasp: MeasuredGrasp, sigma: np.ndarray, gripper: Gripper) -> np.ndarray:
-    """Phase of each sample, as an index into :data:`PHASES`, ``(T,)``, from the measured data alone.
+    """Phase of each sample, as an index into :func:`phases_of`, ``(T,)``, from the measured data alone.
 
     Args:
       grasp: the grasp.
       sigma: noise of its signals, as for :func:`contacts`.
       gripper: that recorded it.
     """
+    if gripper.is_servo:
+        return _servo_phases(grasp)
     touching = contacts(grasp, sigma, gripper)
     time, any_touch, both = grasp.time_s, np.any(touching, axis=1), np.all(touching, axis=1)
     held = held_for(grasp) >= HELD_S
@@ -44,6 +53,22 @@ def find_phases(grasp: MeasuredGrasp, sigma: np.ndarray, gripper: Gripper) -> np
     return phase
 
 
+def _servo_phases(grasp: MeasuredGrasp) -> np.ndarray:
+    """Phases of a servo: its command rests, moves, or has just turned round; or the motor is switched off."""
+    time, command = grasp.time_s, grasp.command_m[:, 0]
+    direction = np.sign(np.diff(command, prepend=command[0]))
+    moving = np.flatnonzero(direction)
+    turned = moving[1:][direction[moving[1:]] != direction[moving[:-1]]]
+    phase = np.full(len(time), SERVO_PHASES.index("moving"))
+    if len(turned):
+        since = time - time[turned][np.searchsorted(turned, np.arange(len(time)), side="right") - 1]
+        phase[(since >= 0) & (since < _TRANSITION_S)] = SERVO_PHASES.index("reversing")
+    phase[held_for(grasp) >= HELD_S] = SERVO_PHASES.index("holding")
+    if grasp.enabled is not None:
+        phase[~np.asarray(grasp.enabled, bool)] = SERVO_PHASES.index("released")
+    return phase
+
+
 def contacts(grasp: MeasuredGrasp, sigma: np.ndarray, gripper: Gripper) -> np.ndarray:
     """Which finger touches, by its force beyond what it reads in free air, ``(T, channels)``.
 
@@ -54,6 +79,8 @@ def contacts(grasp: MeasuredGrasp, sigma: np.ndarray, gripper: Gripper) -> np.nd
       sigma: noise of its signals, ``(C,)``; the forces' is enough where there are any.
       gripper: that recorded it.
     """
+    if gripper.is_servo:
+        return np.zeros(grasp.position_m.shape, bool)
     push = grasp.force_n if grasp.force_n.shape[1] else grasp.position_m - grasp.command_m
     start = push[: max(3, min(8, len(push) // 10))]
     beyond, least = push - np.median(start, axis=0), 5 * sigma[-push.shape[1] :]

@@ -60,9 +60,17 @@ class Problem:
         self, gripper: Gripper, grasps: Sequence[MeasuredGrasp], effects: Sequence[EffectSetting] = ()
     ) -> None:
         self.gripper, self.grasps, self.effects = gripper, tuple(grasps), tuple(effects)
-        self._given = {
-            "radius_m": np.array([np.nan if g.radius_m is None else g.radius_m for g in grasps]),
-            "offset_m": np.array([np.nan if g.offset_m is None else g.offset_m for g in grasps]),
+        self._given = (
+            {}
+            if gripper.is_servo
+            else {
+                "radius_m": np.array([np.nan if g.radius_m is None else g.radius_m for g in grasps]),
+                "offset_m": np.array([np.nan if g.offset_m is None else g.offset_m for g in grasps]),
+            }
+        )
+        #: what a recording's settings multiply a base parameter with, each ``(G,)``
+        self._factors = {
+            p.name: np.array([g.settings[p.times] for g in grasps]) for p in gripper.parameters.values() if p.times
         }
         self.entries = [*self._base_entries(), *self._effect_entries()]
         self.low = np.array([e.coordinate(e.low) for e in self.entries])
@@ -121,6 +129,9 @@ class Problem:
                 base[entry.parameter][entry.members] = value
             else:
                 numbers[entry.effect].append(value)
+        for name, factor in self._factors.items():
+            base[name] = base[name] * factor
+        base.setdefault("force_scale", np.ones(len(self.grasps)))
         pairs = zip(self.effects, numbers, strict=True)
         return Case(base, tuple(dataclasses.replace(one, values=np.array(values)) for one, values in pairs))
 

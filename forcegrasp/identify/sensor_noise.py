@@ -21,7 +21,9 @@ _SLOW_S = 0.1
 _LEAST_WINDOWS = 60
 
 
-def estimate_noise(grasps: Sequence[MeasuredGrasp], kinds: Mapping[str, slice]) -> np.ndarray:
+def estimate_noise(
+    grasps: Sequence[MeasuredGrasp], kinds: Mapping[str, slice], finest: np.ndarray | None = None
+) -> np.ndarray:
     """Sensor noise of each signal from its third differences, where the command is held; ``(C,)``.
 
     Third differences of a smooth signal vanish and those of white noise have variance 20 σ². Channels of one kind
@@ -30,6 +32,7 @@ def estimate_noise(grasps: Sequence[MeasuredGrasp], kinds: Mapping[str, slice]) 
     Args:
       grasps: that were measured.
       kinds: which signals are of one kind.
+      finest: less than this is not looked at, ``(C,)``.
 
     Raises:
       MeasurementError: if a signal does not vary at all, or nothing is long enough.
@@ -44,12 +47,12 @@ def estimate_noise(grasps: Sequence[MeasuredGrasp], kinds: Mapping[str, slice]) 
         values = third[:, part].ravel()
         robust = 1.4826 * np.median(np.abs(values)) if len(values) else 0.0
         estimate = (robust if robust > 0 else np.sqrt(np.mean(values**2)) if len(values) else 0.0) / np.sqrt(20)
-        if not estimate > 0:
+        sigma[part] = estimate if finest is None else np.maximum(estimate, finest[part])
+        if not (sigma[part] > 0).all():
             raise MeasurementError(
                 f"the noise of the {kind}s can't be told from the data:"
                 " give position_std_m and force_std_n in meta.yaml"
             )
-        sigma[part] = estimate
     return sigma
 
 

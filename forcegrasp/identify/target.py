@@ -10,16 +10,19 @@ import numpy as np
 from forcegrasp.effects.for_gripper import effect_of
 from forcegrasp.effects.quantisation import Quantisation
 from forcegrasp.effects.setting import EffectSetting
-from forcegrasp.identify.phases import find_phases
+from forcegrasp.identify.phases import find_phases, phases_of
 from forcegrasp.identify.rounding import find_step
 from forcegrasp.identify.sensor_noise import estimate_noise
 from forcegrasp.identify.signal_axis import SignalAxis
+from forcegrasp.identify.windows import cut
 from forcegrasp.measure.schema import MeasuredGrasp, MeasurementSet
 from forcegrasp.physics.gripper import Gripper
 from forcegrasp.short_repr import ShortRepr
 
 # Rounding to steps smaller than this many σ is hidden by the noise.
 _QUANTUM = 1.0
+# No model of a servo is held against its readings more finely than this share of their range.
+_FINEST = 1e-4
 
 
 @dataclass(frozen=True, repr=False)
@@ -36,13 +39,18 @@ class Target(ShortRepr):
     sensor_sigma: np.ndarray  #: the same without rounding, ``(C,)``
     quantum: np.ndarray  #: step that a signal's readings are multiples of, 0 if none worth noticing, ``(C,)``
     sigma_known: bool  #: whether the noise was given with the set; estimated from it otherwise
-    phase: np.ndarray  #: index into :data:`~forcegrasp.identify.phases.PHASES`, ``(G, S)``; −1 where there is no sample
+    phase: np.ndarray  #: index into :attr:`phases`, ``(G, S)``; −1 where there is no sample
     gripper: Gripper  #: whose channels they are
 
     @property
     def axis(self) -> SignalAxis:
         """The names of the channels, and which of them are positions and forces."""
         return SignalAxis(self.gripper)
+
+    @property
+    def phases(self) -> tuple[str, ...]:
+        """Names of the phases."""
+        return phases_of(self.gripper)
 
     @property
     def readings(self) -> int:
@@ -69,7 +77,7 @@ class Target(ShortRepr):
     def subset(self, keep: np.ndarray) -> Target:
         """The grasps of these indices."""
         picked = tuple(self.grasps[i] for i in keep)
-        longest = self.mask[keep].sum(axis=1).max()
+        longest = max(len(grasp.time_s) for grasp in picked)
         signals, mask, phase = (a[keep][:, :longest] for a in (self.signals, self.mask, self.phase))
         return dataclasses.replace(self, grasps=picked, signals=signals, mask=mask, phase=phase)
 
@@ -80,16 +88,17 @@ class Target(ShortRepr):
 
 def make_target(measured: MeasurementSet, gripper: Gripper) -> Target:
     """Lines up a measurement set, estimates its noise where it is not given, and finds the phases."""
-    grasps, axis = measured.grasps, SignalAxis(gripper)
+    grasps, axis = cut(measured.grasps) if gripper.is_servo else measured.grasps, SignalAxis(gripper)
     samples = max(len(g.time_s) for g in grasps)
     signals, mask = np.zeros((len(grasps), samples, len(axis))), np.zeros((len(grasps), samples), bool)
     for index, grasp in enumerate(grasps):
         n = len(grasp.time_s)
         signals[index, :n] = np.concatenate([grasp.position_m, grasp.force_n], axis=1)
-        mask[index, :n] = True
+        mask[index, :n] = True if grasp.counts is None else grasp.counts
     stds = {"position": measured.position_std_m, "force": measured.force_std_n}
     given = [stds[kind] for kind, part in axis.kinds.items() for _ in range(part.start, part.stop)]
-    estimated = estimate_noise(grasps, axis.kinds)
+    finest = _FINEST * np.ptp(signals[mask], axis=0) if gripper.is_servo else np.zeros(len(axis))
+    estimated = estimate_noise(grasps, axis.kinds, finest)
     sensor = np.array([e if g is None else g for g, e in zip(given, estimated, strict=True)], float)
     quantum = np.zeros(len(axis))
     for part in axis.kinds.values():
@@ -99,4 +108,5 @@ def make_target(measured: MeasurementSet, gripper: Gripper) -> Target:
     phase = np.full(mask.shape, -1)
     for index, grasp in enumerate(grasps):
         phase[index, : len(grasp.time_s)] = find_phases(grasp, sigma, gripper)
+    phase[~mask] = -1
     return Target(grasps, signals, mask, sigma, sensor, quantum, None not in given, phase, gripper)

@@ -29,6 +29,7 @@ from forcegrasp.measure.schema import (
     fingerprint_of_set,
     fingerprint_of_table,
 )
+from forcegrasp.measure.servo_set import read_servo_set
 from forcegrasp.measure.table import FileColumns, Table
 from forcegrasp.measure.yaml_file import Name, Positive, Text, TextRecord, load_yaml
 
@@ -37,7 +38,7 @@ class Meta(TextRecord):
     """What meta.yaml says of a set; no result depends on source and license."""
 
     format: str = Field(description=FORMAT)
-    kind: Name = Field(description="grasps or final_force")
+    kind: Name = Field(description="grasps or final_force; sets of a servo have keys of their own")
     gripper: Name = Field(description="name of one that is shipped, or path of a description")
     source: Text = Field(default="", description="where the data come from")
     license: Text = Field(default="", description="on what terms they may be used")
@@ -65,12 +66,14 @@ def read_set(path: str | Path) -> MeasurementSet | FinalForceTable:
     content = load_yaml(file)
     if content.get("format") != FORMAT:  # first, lest the keys of another format are called unknown
         raise MeasurementError(f"{show(file)}: format: must be {FORMAT}, not {show(content.get('format', ''))}")
+    if content.get("kind") == "servo":
+        _refuse_files(folder, "servo", ("grasps.csv", "table.csv"))
+        return read_servo_set(folder, content)
     meta = validate(Meta, content, show(file), MeasurementError)
     readers = {"grasps": _read_grasps, "final_force": _read_table}
     if meta.kind not in readers:
-        raise refusal(
-            show(file), "kind", f"{show(meta.kind)} is unknown{closest(meta.kind, readers)}", MeasurementError
-        )
+        problem = f"{show(meta.kind)} is unknown{closest(meta.kind, [*readers, 'servo'])}"
+        raise refusal(show(file), "kind", problem, MeasurementError)
     facts = {"path": folder, "name": folder.resolve().name}
     return readers[meta.kind](
         folder, meta, facts | meta.model_dump(include={"gripper", "source", "license", "force_std_n"})

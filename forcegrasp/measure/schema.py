@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 FORMAT = "forcegrasp-measurements/1"
 SPLITS = ("fit", "check")
 OBJECT = "o_y_m"
+#: Of servos: whether the motor is switched on (1 or 0), and a force or torque from outside, N or N·m.
+ENABLED, LOAD = "enabled", "load"
 _SIDES = {"l": "left", "r": "right"}
 
 
@@ -83,15 +85,27 @@ class MeasuredGrasp(ShortRepr):
     object_m: np.ndarray | None  #: ``(T,)``, object position along the grasp axis; None if not measured
     rows: np.ndarray | None = field(default=None, compare=False)  #: ``(T,)``, where the samples stand in their file
     columns: Columns = TWO_FINGERS
+    settings: Mapping[str, float] = field(default_factory=dict)  #: of a servo's recording, such as kp
+    enabled: np.ndarray | None = None  #: ``(T,)``, whether the motor was switched on; None if always
+    load: np.ndarray | None = None  #: ``(T,)``, force or torque from outside, N or N·m; None if there was none
+    #: Of a part of a recording: where the motors stood and how fast they moved at its start, and what of it counts.
+    start: tuple[np.ndarray, np.ndarray] | None = field(default=None, compare=False)
+    counts: np.ndarray | None = field(default=None, compare=False)  #: ``(T,)``
 
     def summary(self) -> str:
         return f"{cut(self.name)} on {cut(self.object)}, {counted(len(self.time_s), 'sample')}"
+
+    @property
+    def label(self) -> str:
+        """Its name, and that of the object, if there is one."""
+        return f"{self.name} on {self.object}" if self.object else self.name
 
     def signals(self) -> dict[str, np.ndarray]:
         """Every measured signal by its column name, each ``(T,)``."""
         values = [self.time_s, *self.command_m.T, *self.position_m.T, *self.force_n.T]
         named: dict[str, np.ndarray] = dict(zip(self.columns.signals, values, strict=True))
-        return named if self.object_m is None else named | {OBJECT: self.object_m}
+        extra = {OBJECT: self.object_m, ENABLED: self.enabled, LOAD: self.load}
+        return named | {name: np.asarray(values, float) for name, values in extra.items() if values is not None}
 
 
 @dataclass(frozen=True, repr=False)
@@ -108,6 +122,7 @@ class MeasurementSet(ShortRepr):
     grasps: tuple[MeasuredGrasp, ...]
     fingerprint: str  #: sha256 of all that a result can depend on; see ``fingerprint_of_set``
     notes: tuple[str, ...] = field(default=(), compare=False)  #: what was odd when it was read, one line each
+    kind: str = "grasps"  #: or "servo": recordings of a mechanism that grasps nothing
 
     @property
     def columns(self) -> Columns:
@@ -115,6 +130,8 @@ class MeasurementSet(ShortRepr):
         return self.grasps[0].columns if self.grasps else TWO_FINGERS
 
     def summary(self) -> str:
+        if self.kind == "servo":
+            return f"{cut(self.name)}: {counted(len(self.grasps), 'recording')}, mechanism {cut(self.gripper)}"
         objects = counted(len({grasp.object for grasp in self.grasps}), "object")
         return f"{cut(self.name)}: {counted(len(self.grasps), 'grasp')} of {objects}, gripper {cut(self.gripper)}"
 
@@ -150,6 +167,8 @@ def fingerprint_of_set(
     digest = _Digest("grasps", gripper, position_std_m, force_std_n)
     for grasp in sorted(grasps, key=lambda grasp: grasp.name):
         digest.facts(grasp.name, grasp.object, grasp.session, grasp.radius_m, grasp.offset_m, grasp.split)
+        for name in sorted(grasp.settings):
+            digest.facts(name, grasp.settings[name])
         for name, values in grasp.signals().items():
             digest.numbers(name, values)
     return digest.hex()

@@ -12,7 +12,7 @@ import yaml
 from forcegrasp.errors import MeasurementError
 from forcegrasp.measure.folder import show
 from forcegrasp.measure.samples import check_samples
-from forcegrasp.measure.schema import FORMAT, FinalForceTable, MeasurementSet
+from forcegrasp.measure.schema import ENABLED, FORMAT, LOAD, FinalForceTable, MeasurementSet
 
 
 def write_set(measured: MeasurementSet, folder: str | Path, samples: str = "csv") -> Path:
@@ -49,6 +49,26 @@ def write_set(measured: MeasurementSet, folder: str | Path, samples: str = "csv"
     return _write(folder, meta, {"grasps.csv": index.write_csv, f"samples.{samples}": write})
 
 
+def write_servo_set(measured: MeasurementSet, folder: str | Path) -> Path:
+    """Writes a set of a servo's recordings into a new or empty folder, and returns the folder.
+
+    Raises:
+      MeasurementError: if the folder is not empty or not writable, or the samples are none.
+    """
+    for recording in measured.grasps:
+        check_samples(measured.path, recording)
+    index = pl.DataFrame([{"recording": r.name, "split": r.split, **r.settings} for r in measured.grasps])
+    if index["split"].null_count() == index.height:
+        index = index.drop("split")
+    frame = pl.concat([_frame(r.name, r.signals(), "recording") for r in measured.grasps], how="diagonal")
+    frame = frame.with_columns(
+        pl.col(name).fill_null(value) for name, value in _UNDISTURBED.items() if name in frame.columns
+    )
+    meta = {"format": FORMAT, "kind": "servo", "mechanism": measured.gripper, "source": measured.source}
+    meta |= {"license": measured.license, "position_std_m": measured.position_std_m, "effort_std": measured.force_std_n}
+    return _write(folder, meta, {"recordings.csv": index.write_csv, "samples.parquet": frame.write_parquet})
+
+
 def write_table(table: FinalForceTable, folder: str | Path) -> Path:
     """Writes a table of final forces into a new or empty folder, and returns the folder.
 
@@ -59,8 +79,12 @@ def write_table(table: FinalForceTable, folder: str | Path) -> Path:
     return _write(folder, _meta(table, "final_force"), {"table.csv": pl.DataFrame(columns).write_csv})
 
 
-def _frame(name: str, signals: dict[str, np.ndarray]) -> pl.DataFrame:
-    names = pl.Series("grasp", [name], dtype=pl.String).new_from_index(0, len(signals["t_s"]))
+#: What stands where a recording does not say.
+_UNDISTURBED = {ENABLED: 1.0, LOAD: 0.0}
+
+
+def _frame(name: str, signals: dict[str, np.ndarray], column: str = "grasp") -> pl.DataFrame:
+    names = pl.Series(column, [name], dtype=pl.String).new_from_index(0, len(signals["t_s"]))
     return pl.DataFrame([names, *(pl.Series(column, np.asarray(signals[column], float)) for column in signals)])
 
 

@@ -42,9 +42,9 @@ class Gripper(ShortRepr):
     model: Path  #: of the MJCF
     fast: str  #: "sphere" or "none"
     motors: tuple[Motor, ...]  #: one, or left and right
-    fingers: tuple[Finger, Finger]  #: left, right
+    fingers: tuple[Finger, ...]  #: left, right; none of a mechanism that grasps nothing
     force: str  #: what forces are read from: "sensors", "motor" or "none"
-    object_joint: str
+    object_joint: str  #: empty where there are no fingers
     object_geom: str
     axis: int  #: 0, 1, 2 for x, y, z
     period_s: float  #: time between two commands
@@ -54,6 +54,7 @@ class Gripper(ShortRepr):
     #: Sizes of effects in the catalogue are for a stroke and a motor force of 1; these are the gripper's.
     position_scale: float
     force_scale: float
+    command: str = "position"  #: what is commanded: "position" or "effort"
 
     def summary(self) -> str:
         return f"{cut(self.name)}, {counted(len(self.parameters), 'parameter')}"
@@ -76,13 +77,28 @@ class Gripper(ShortRepr):
     @property
     def commands(self) -> tuple[Channel, ...]:
         """What is commanded, one per motor."""
+        if self.command == "effort":
+            return (Channel("command", "taudes_nm" if self.unit == "rad" else "fdes_n", self.effort_unit),)
         return tuple(
             Channel(f"command{s}", f"qdes{s}_{self.unit}", self.unit) for s in self._suffixes(len(self.motors))
         )
 
     @property
+    def is_servo(self) -> bool:
+        """Whether it is a mechanism without fingers, which grasps nothing."""
+        return not self.fingers
+
+    @property
+    def effort_unit(self) -> str:
+        """Unit of a motor's effort: "N" or "N·m"."""
+        return "N·m" if self.unit == "rad" else "N"
+
+    @property
     def forces(self) -> tuple[Channel, ...]:
         """What is read of the forces: one per finger with a sensor, or per motor whose effort is read, or none."""
+        if self.is_servo:
+            column = "tau_nm" if self.unit == "rad" else "f_n"
+            return (Channel("effort", column, self.effort_unit),) if self.force == "motor" else ()
         if self.force == "motor":
             suffixes = self._suffixes(len(self.motors))
         else:
@@ -101,7 +117,11 @@ class Gripper(ShortRepr):
     @property
     def is_direct(self) -> bool:
         """Whether each motor slides a finger of its own, so that positions of motors are positions of pads."""
-        return all(f.motor >= 0 and self.motors[f.motor].joint == f.joint for f in self.fingers) and self.unit == "m"
+        return (
+            not self.is_servo
+            and all(f.motor >= 0 and self.motors[f.motor].joint == f.joint for f in self.fingers)
+            and self.unit == "m"
+        )
 
     @property
     def nominal_gain(self) -> float:
@@ -112,7 +132,7 @@ class Gripper(ShortRepr):
     @property
     def is_shipped(self) -> bool:
         """Whether it comes with the package, and so is known by its name."""
-        return self.path.parent == shipped_folder()
+        return shipped_folder() in (self.path.parent, self.path.parent.parent)
 
     @property
     def name_or_path(self) -> str:
@@ -122,7 +142,7 @@ class Gripper(ShortRepr):
     @functools.cached_property
     def opening(self) -> OpeningLaw:
         """How wide the pads stand apart, and how far each moves, at every position of the motors."""
-        if self.is_direct:
+        if self.is_direct or self.is_servo:
             return straight_law(self.stroke)
         return measure_opening(self.spec(), self.motors, self.fingers, self.object_geom, self.axis)
 
@@ -191,7 +211,7 @@ class Gripper(ShortRepr):
         """
         check_scene(self.model)
         spec = mujoco.MjSpec.from_file(str(self.model))
-        for side, finger in zip(SIDES, self.fingers, strict=True):
+        for side, finger in zip(SIDES, self.fingers, strict=False):
             if not finger.force_sensor:
                 add_contact_sensor(spec, own_sensor(side), self.object_joint, finger.body)
         if self.force == "motor":

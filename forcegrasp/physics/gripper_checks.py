@@ -43,7 +43,7 @@ def check_gripper(gripper: Gripper, names: Mapping[str, str]) -> None:
     _check_object(gripper, model, data)
     for parameter in gripper.parameters.values():
         for write in parameter.writes:
-            _check_write(f"{gripper.path}: parameters.{parameter.name}.writes: {write.field}", model, write)
+            check_write(f"{gripper.path}: parameters.{parameter.name}.writes: {write.field}", model, write)
     try:
         _ = gripper.opening
     except ValueError as error:
@@ -154,7 +154,8 @@ def _check_object(gripper: Gripper, model: mujoco.MjModel, data: mujoco.MjData) 
         raise ConfigError(f"{where}.geom: {geom.name!r} must be a cylinder, a sphere or a box, to have a radius")
 
 
-def _check_write(where: str, model: mujoco.MjModel, write: FieldWrite) -> None:
+def check_write(where: str, model: mujoco.MjModel, write: FieldWrite) -> None:
+    """Raises ConfigError where a parameter writes what is no field of numbers, or no column of it."""
     field: np.ndarray | None = getattr(model, write.field, None) if write.field in MODEL_FIELDS else None
     if field is None or not np.issubdtype(np.asarray(field).dtype, np.floating):
         known = [name for name in MODEL_FIELDS if name.startswith(("actuator_", "dof_", "geom_"))]

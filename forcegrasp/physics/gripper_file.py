@@ -19,16 +19,18 @@ from forcegrasp.files.validate import refusal, validate
 from forcegrasp.physics.gripper import Gripper, shipped_folder
 from forcegrasp.physics.gripper_checks import check_gripper
 from forcegrasp.physics.gripper_defaults import training_of_scene
-from forcegrasp.physics.gripper_parts import BaseParameter, Finger, Motor, Training
+from forcegrasp.physics.gripper_parts import NO_TRAINING, BaseParameter, Finger, Motor
 from forcegrasp.physics.gripper_schema import (
     FIRST_FORMAT,
     FORMAT,
+    MECHANISM_FORMAT,
     ControlEntry,
     Description,
     FirstDescription,
     ScaleEntry,
 )
 from forcegrasp.physics.guard import silence_log
+from forcegrasp.physics.mechanism_file import MECHANISMS, load_mechanism
 from forcegrasp.physics.scene_file import check_scene
 
 
@@ -45,6 +47,8 @@ def load_gripper(name: str | Path, folder: str | Path = "") -> Gripper:
     name = str(name)
     if re.fullmatch(r"\w+", name):
         known = shipped_grippers()
+        if name in shipped_mechanisms():
+            return _load(shipped_folder() / MECHANISMS / f"{name}.yaml")
         if name not in known:
             raise ConfigError(f"gripper={name}: no such gripper{closest(name, known)}; or give a description's path")
         return _shipped(name)
@@ -66,6 +70,11 @@ def shipped_grippers() -> list[str]:
     return sorted(p.stem for p in shipped_folder().glob("*.yaml") if p.with_suffix(".xml").is_file())
 
 
+def shipped_mechanisms() -> list[str]:
+    """Names of the mechanisms without fingers that come with the package."""
+    return sorted(p.stem for p in (shipped_folder() / MECHANISMS).glob("*.yaml"))
+
+
 def _load(path: Path) -> Gripper:
     try:
         raw = plain_yaml.load(path)
@@ -73,6 +82,8 @@ def _load(path: Path) -> Gripper:
         why = getattr(error, "strerror", None) or str(error)
         raise refusal(path, "", f"could not read the gripper description: {why}") from error
     written = raw.get("format", "missing") if isinstance(raw, dict) else FORMAT
+    if written == MECHANISM_FORMAT:
+        return load_mechanism(path, raw)
     if written not in (FORMAT, FIRST_FORMAT):
         also = "missing; " if written == "missing" else ""
         raise refusal(path, "format", f"{also}must be {FORMAT}; {FIRST_FORMAT} is read, too")
@@ -95,7 +106,6 @@ _FIRST_NAMES = {"joint": "fingers.joints", "actuator": "fingers.actuators", "clo
 _STROKE = 0.05
 #: Largest command step where a description does not say, as a share of the stroke.
 _STEP = 1 / 15
-_NO_TRAINING = Training((0, 0), (0, 0), (0, 0), (0, 0), 0, 0, 0, {}, "", (0, 0), 0, 0, 0, 0, 0)
 
 
 def _gripper(path: Path, said: Description) -> Gripper:
@@ -122,7 +132,7 @@ def _gripper(path: Path, said: Description) -> Gripper:
             name: BaseParameter(name, p.nominal, p.low, p.high, p.unit, p.scope, tuple(p.writes))
             for name, p in said.parameters.items()
         },
-        training=_NO_TRAINING,
+        training=NO_TRAINING,
         position_scale=scale.position or strokes[0] / _STROKE,
         force_scale=scale.force,
     )

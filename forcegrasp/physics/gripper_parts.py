@@ -34,6 +34,7 @@ class BaseParameter:
     unit: str
     scope: str  #: one value for the "gripper", per "object" or per "grasp"
     writes: tuple[FieldWrite, ...]
+    times: str = ""  #: setting of a recording that multiplies the value; empty for none
 
     @property
     def logarithmic(self) -> bool:
@@ -124,3 +125,7 @@ class Training(ShortRepr):
     def force_scale(self, kappa: Softness) -> Softness:
         """f_α of an object of softness κ; 1 where it does not depend on it."""
         return self.at("force_scale", kappa) if "force_scale" in self.softness else 1.0 + 0.0 * kappa
+
+
+#: Of what is not trained on, or not yet known.
+NO_TRAINING = Training((0, 0), (0, 0), (0, 0), (0, 0), 0, 0, 0, {}, "", (0, 0), 0, 0, 0, 0, 0)

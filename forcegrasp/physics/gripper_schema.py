@@ -14,6 +14,7 @@ from forcegrasp.physics.gripper import SIDES, SPECIAL
 from forcegrasp.physics.gripper_parts import FieldWrite
 
 FORMAT, FIRST_FORMAT = "forcegrasp-gripper/2", "forcegrasp-gripper/1"
+MECHANISM_FORMAT = "forcegrasp-mechanism/1"
 _WRITE = re.compile(r"(-?)((?:actuator|dof|geom)_\w+)(?: (\d+))?")
 
 
@@ -210,3 +211,33 @@ class FirstDescription(_Description):
         fingers = {side: FingerEntry(joint=joint, force_sensor=sensor) for side, joint, sensor in sides}
         kept = {key: getattr(self, key) for key in _Description.model_fields}
         return Description(**kept, motors=motors, fingers=FingersEntry(**fingers), scale=ScaleEntry(position=1.0))
+
+
+class ServoEntry(Record):
+    """A motor of a mechanism, and the joint on which its encoder sits."""
+
+    joint: Name = Field(description="the joint on which the encoder sits")
+    actuator: Name = Field(description="the drive")
+    span: PositiveFloat = Field(description="how far it usually moves, m or rad; sizes of effects follow from it")
+
+
+class ServoParameter(ParameterEntry):
+    """A number of a mechanism that a fit may change."""
+
+    times: Name | None = Field(default=None, description="setting of a recording that multiplies the value, such as kp")
+
+
+class MechanismDescription(Record):
+    """A servo without fingers and object, whose recordings are compared with the model."""
+
+    format: str = Field(description=MECHANISM_FORMAT)
+    name: Name = Field(description="for titles and messages, and so that models know theirs")
+    model: Name = Field(description="the MJCF, beside the description", examples=["my_servo.xml"])
+    motors: Annotated[Sequence[ServoEntry], counted(1, 1, "a list of one motor")] = Field(
+        examples=["[{joint: j, actuator: a, span: 1}]"]
+    )
+    command: Literal["position", "effort"] = Field(default="position", description="what is commanded")
+    effort: Literal["motor", "none"] = Field(default="none", description="whether the motor's effort is read")
+    period_s: PositiveFloat = Field(default=0.02, description="time between two commands, s")
+    scale: ScaleEntry | None = None
+    parameters: dict[str, ServoParameter] = Field(description="the base model")

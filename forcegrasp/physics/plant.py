@@ -65,6 +65,8 @@ class Plant(SceneLayout):
         self._motor_velocity = batch.bind("qvel")[:, self._motor_v]
         self._fields: dict[str, np.ndarray] = {}
         self._base: dict[str, np.ndarray] = {}
+        self._load = np.zeros(n)
+        self._force_range: np.ndarray | None = None  # of the motors, where some are switched off
         self._friction_active: np.ndarray | None = None  # which motors' friction was stiffened, ``(n, motors)``
         self.effects = AttachedEffects(())
         self.force_scale = np.ones(n)  #: f_α, factor from the force sensors to the reading, ``(n,)``
@@ -125,7 +127,7 @@ class Plant(SceneLayout):
     @property
     def object_position(self) -> np.ndarray:
         """Object position along the grasp axis from where the scene puts it, metres, ``(n,)``."""
-        return self._qpos[:, self._object_qpos] - self._object_origin
+        return self._object_of(self._qpos)
 
     def presses(self, rows: np.ndarray) -> np.ndarray:
         """Which motors' pads an object pushes against, ``(len(rows), motors)``."""
@@ -199,13 +201,20 @@ class Plant(SceneLayout):
         ranked = sorted(effects, key=lambda pair: pair[0].rank)
         self.effects = AttachedEffects([effect.attach(self, rows) for effect, rows in ranked])
 
-    def reset(self, ids: np.ndarray, offset_m: np.ndarray, position: np.ndarray | None = None) -> None:
+    def reset(
+        self,
+        ids: np.ndarray,
+        offset_m: np.ndarray,
+        position: np.ndarray | None = None,
+        velocity: np.ndarray | None = None,
+    ) -> None:
         """Starts grasps anew, after their parameters were written.
 
         Args:
           ids: the rows, ascending.
           offset_m: where their objects stand along the grasp axis, ``(len(ids),)``.
           position: where the motors stand, m or rad, ``(len(ids), motors)``; as in the scene by default.
+          velocity: of the motors, m/s or rad/s, ``(len(ids), motors)``; they stand still by default.
         """
         for name, field in self._fields.items():  # whatever effects made of it
             field[ids] = self._base[name][ids]
@@ -218,7 +227,11 @@ class Plant(SceneLayout):
         self.batch.reset(ids, stage=mujoco.mjtStage.mjSTAGE_NONE.value, **keyframe)
         if position is not None:
             self._place(ids, position)
-        self._qpos[ids, self._object_qpos] = self._object_origin + offset_m
+        if velocity is not None:
+            self._motor_velocity[ids] = velocity * self._signs
+        if not self.gripper.is_servo:
+            self._qpos[ids, self._object_qpos] = self._object_origin + offset_m
+        self._force_range = None
         self.batch.forward(ids)
         self.position = self._motors_of(self._qpos)
         self.pad_shift_m[ids] = 0
@@ -266,6 +279,20 @@ class Plant(SceneLayout):
             self._read()
             fresh = np.zeros(self.n, bool)
 
+    def disturb(self, load: np.ndarray, enabled: np.ndarray) -> None:
+        """Says what acts on the motors from outside until the next call.
+
+        Args:
+          load: force or torque on each motor, N or N·m, ``(n,)``; positive opens.
+          enabled: whether the motors are switched on, ``(n,)``.
+        """
+        self._load = load
+        self.batch.bind("qfrc_applied")[:, self._motor_v] = load[:, None] * self._signs
+        ranges = self.field("actuator_forcerange")
+        if self._force_range is None:
+            self._force_range = ranges[:, self.actuators].copy()
+        ranges[:, self.actuators] = np.where(enabled[:, None, None], self._force_range, 0.0)
+
     def play(self, commands: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Holds each command for one physics step, as :meth:`advance` does, in one call of the engine.
 
@@ -288,7 +315,7 @@ class Plant(SceneLayout):
         record = self.batch.rollout(commands.shape[1], control, record=["qpos", "sensordata"])
         sensors, scale = record["sensordata"], self.force_scale[:, None, None]
         force = self._channels_of(sensors, self._pads_of(sensors) * scale, scale)
-        return self._motors_of(record["qpos"]), force, record["qpos"][..., self._object_qpos] - self._object_origin
+        return self._motors_of(record["qpos"]), force, self._object_of(record["qpos"])
 
     @property
     def acts_in_steps(self) -> bool:
@@ -308,8 +335,9 @@ class Plant(SceneLayout):
         self._write_friction()
         self._write_pad_shift()
         push = self.batch.bind("qfrc_applied")
-        push[:, self._motor_v] = self._to_motors(self.finger_push_n) * self._signs
-        push[:, self.object_dof] = self.object_push_n
+        push[:, self._motor_v] = (self._to_motors(self.finger_push_n) + self._load[:, None]) * self._signs
+        if not self.gripper.is_servo:
+            push[:, self.object_dof] = self.object_push_n
 
     def _write_friction(self) -> None:
         if not self.friction.any() and "dof_frictionloss" not in self._fields:

@@ -27,30 +27,47 @@ class SceneLayout:
         joints = [model.joint(motor.joint) for motor in gripper.motors]
         #: degrees of freedom of the motors (left, right, or the one), and of the object along the grasp axis
         self.motor_dofs = [joint.dofadr[0] for joint in joints]
-        object_joint = model.joint(gripper.object_joint)
-        is_free = object_joint.type[0] == mujoco.mjtJoint.mjJNT_FREE
-        self._object_qpos = object_joint.qposadr[0] + (gripper.axis if is_free else 0)
-        self._object_origin = model.qpos0[self._object_qpos]  # the middle of the grasp is where the scene puts it
-        self.object_dof = object_joint.dofadr[0] + (gripper.axis if is_free else 0)
-        #: degrees of freedom of everything but the object
-        self.gripper_dofs = [i for i in range(model.nv) if model.dof_jntid[i] != object_joint.id]
+        self._find_object(gripper, model)
         self.actuators = [model.actuator(motor.actuator).id for motor in gripper.motors]
         # where motors stand in the engine's arrays: slices, for they are read and written in every step
         self._motor_q = _slice(*(joint.qposadr[0] for joint in joints))
         self._motor_v, self._drives = _slice(*self.motor_dofs), _slice(*self.actuators)
-        self._object_body = model.geom(gripper.object_geom).bodyid[0]
-        #: geoms of the object
-        self.object_geoms = np.flatnonzero(model.geom_bodyid == self._object_body)
         self._pads = [_Pads.find(model, finger.body) for finger in gripper.fingers]
         self._signs = np.array([motor.sign for motor in gripper.motors])
         self._origins = np.array([motor.closed for motor in gripper.motors])
-        self._command_scale, self._command_zero = command_law(gripper.motors, model)
+        self._command_scale, self._command_zero = np.ones(self.motors), np.zeros(self.motors)
+        if gripper.command == "position":
+            self._command_scale, self._command_zero = command_law(gripper.motors, model)
+        movers = [finger.motor for finger in gripper.fingers] or [-1, -1]
         #: Which motor moves each side, and how far its pads go per unit of it; 0 for a side that stands still.
-        self._mover = np.array([max(finger.motor, 0) for finger in gripper.fingers])
-        self.travel = np.where([f.motor >= 0 for f in gripper.fingers], gripper.opening.travel, 0.0)
-        self._readings = [_reading(model, *pair) for pair in zip(SIDES, gripper.fingers, strict=True)]
+        self._mover = np.array([max(motor, 0) for motor in movers])
+        self.travel = np.where([motor >= 0 for motor in movers], gripper.opening.travel, 0.0)
+        self._readings = [_reading(model, *pair) for pair in zip(SIDES, gripper.fingers, strict=False)]
         self._efforts = self._effort_readings(model)
         self._felt = [i for i, finger in enumerate(gripper.fingers) if finger.force_sensor]
+
+    def _find_object(self, gripper: Gripper, model: mujoco.MjModel) -> None:
+        """Where the object stands in the engine's arrays, if there is one."""
+        #: geoms of the object
+        self.object_geoms = np.empty(0, int)
+        #: degrees of freedom of everything but the object
+        self.gripper_dofs = list(range(model.nv))
+        if gripper.is_servo:
+            return
+        joint = model.joint(gripper.object_joint)
+        is_free = joint.type[0] == mujoco.mjtJoint.mjJNT_FREE
+        self._object_qpos = joint.qposadr[0] + (gripper.axis if is_free else 0)
+        self._object_origin = model.qpos0[self._object_qpos]  # the middle of the grasp is where the scene puts it
+        self.object_dof = joint.dofadr[0] + (gripper.axis if is_free else 0)
+        self.gripper_dofs = [i for i in range(model.nv) if model.dof_jntid[i] != joint.id]
+        self._object_body = model.geom(gripper.object_geom).bodyid[0]
+        self.object_geoms = np.flatnonzero(model.geom_bodyid == self._object_body)
+
+    def _object_of(self, qpos: np.ndarray) -> np.ndarray:
+        """Object positions along the grasp axis from where the scene puts it, metres, ``(...)``; 0 without one."""
+        if self.gripper.is_servo:
+            return np.zeros(qpos.shape[:-1])
+        return qpos[..., self._object_qpos] - self._object_origin
 
     def _effort_readings(self, model: mujoco.MjModel) -> tuple[list[int], np.ndarray]:
         """Where the motors' efforts are read, and the fingertip newtons of each, pressing positive, per unit of it."""
@@ -60,6 +77,9 @@ class SceneLayout:
         factors = np.empty(self.motors)
         for index, motor in enumerate(self.gripper.motors):
             drive = model.actuator(motor.actuator)
+            if self.gripper.is_servo:
+                factors[index] = motor.sign
+                continue
             length_per_position = self._command_scale[index] * drive.gainprm[0] / -drive.biasprm[1]
             factors[index] = -length_per_position / self.travel[self._moved_by(index)].sum()
         return addresses, factors
@@ -101,6 +121,8 @@ class SceneLayout:
 
     def _pads_of(self, sensors: np.ndarray) -> np.ndarray:
         # contiguous, lest the order of the sum depend on n
+        if not self._readings:
+            return np.zeros((*sensors.shape[:-1], 2))
         sums = [np.ascontiguousarray(sensors[..., part]).sum(axis=-1) for part in self._readings]
         return np.stack(sums, axis=-1)
 

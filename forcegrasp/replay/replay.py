@@ -98,7 +98,18 @@ class Replay:
             self._fresh[start, index] = True
         #: Motions of all grasps that may be asked for again, by what was simulated; see :meth:`remember`.
         self.remembered: dict[bytes, Motion] = {}
-        self.start_m = np.stack([start_position(g, gripper.stroke) for g in self.grasps])
+        starts_at = [g.start or (start_position(g, gripper.stroke), np.zeros(len(gripper.motors))) for g in self.grasps]
+        #: where the motors stand at the first sample, m or rad, and how fast they move, ``(grasps, motors)``
+        self.start_m, self._start_velocity = (np.stack([pair[i] for pair in starts_at]) for i in (0, 1))
+        self._disturbed = any(g.load is not None or g.enabled is not None for g in self.grasps)
+        if self._disturbed:
+            ones = [np.ones(len(g.time_s)) for g in self.grasps]
+            loads = [np.zeros(len(o)) if g.load is None else g.load for g, o in zip(self.grasps, ones, strict=True)]
+            enabled = [o if g.enabled is None else g.enabled for g, o in zip(self.grasps, ones, strict=True)]
+            self._load, self._enabled = (
+                np.stack([self._at_steps(np.asarray(v, float), s) for v, s in zip(values, starts, strict=True)], axis=1)
+                for values in (loads, enabled)
+            )
 
     def remember(self, key: bytes, motion: Motion, rows: np.ndarray) -> None:
         """Keeps these rows of a motion under a name; the ones kept longest ago are forgotten."""
@@ -134,17 +145,20 @@ class Replay:
         plant = Plant(self.gripper, n, self.tier, THREADS, self._step_factor, self._other_collisions)
         plant.attach([(e.effect(e.values, self.dt, e.variant), e.rows) for e in effects if len(e.rows)])
         ids = np.arange(n)
-        plant.reset(ids, write_base(plant, ids, base), self.start_m[grasp])
+        offset = write_base(plant, ids, base)
+        plant.reset(ids, offset, self.start_m[grasp], self._start_velocity[grasp] if self.gripper.is_servo else None)
         position, force = (np.empty((n, self._steps, width)) for width in (plant.motors, plant.channels))
         objects = np.empty((n, self._steps))
         position[:, 0], force[:, 0], objects[:, 0] = plant.position, plant.transduced_force, plant.object_position
-        if not plant.acts_in_steps:
+        if not plant.acts_in_steps and not self._disturbed:
             commands = self._command[:-1, grasp].swapaxes(0, 1)
             position[:, 1:], force[:, 1:], objects[:, 1:] = plant.play(commands)
         else:
             for step in range(self._steps - 1):
                 if self._encoders_known:
                     plant.recorded_position = self._encoder[step, grasp]
+                if self._disturbed:
+                    plant.disturb(self._load[step, grasp], self._enabled[step, grasp] > 0)
                 plant.advance(self._command[step, grasp], 1, self._fresh[step, grasp])
                 position[:, step + 1], force[:, step + 1] = plant.position, plant.transduced_force
                 objects[:, step + 1] = plant.object_position

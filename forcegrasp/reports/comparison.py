@@ -11,7 +11,6 @@ from rich.text import Text as Plain
 
 from forcegrasp.identify.comparison import Cell, Comparison
 from forcegrasp.identify.cross_validation import rms
-from forcegrasp.identify.phases import PHASES
 from forcegrasp.identify.target import Target
 from forcegrasp.reports import figures
 from forcegrasp.reports.html import Picture, Section, Table, Text
@@ -74,7 +73,7 @@ def compare_json(comparison: Comparison, name: str, model: str, notes: list[str]
         "signals": {signal: _signal_json(comparison, k) for k, signal in enumerate(target.axis.names)},
         "phases": {
             phase: {cell.signal: _cell_json(cell) for cell in cells if cell.phase == phase}
-            for phase in PHASES
+            for phase in comparison.target.phases
             if any(cell.phase == phase for cell in cells)
         },
         "floor_ratio": comparison.floor_ratio(),
@@ -150,7 +149,7 @@ def printed(comparison: Comparison) -> Printed:
     for signal in names:
         table.add_column(words(signal), no_wrap=True)
     cells = {(cell.phase, cell.signal): cell for cell in comparison.cells()}
-    for phase in PHASES:
+    for phase in comparison.target.phases:
         row = [cells.get((phase, signal)) for signal in names]
         if any(row):
             table.add_row(words(phase), *(_printed_cell(cell) for cell in row))
@@ -172,9 +171,7 @@ def _printed_cell(cell: Cell | None) -> Plain:
 def details(comparison: Comparison) -> list[str]:
     """Lines below the table: worst grasps, what the error goes with, and the noise."""
     errors, target = comparison.by_grasp(), comparison.target
-    worst = [
-        f"{target.grasps[i].name} on {target.grasps[i].object} ({errors[i]:.1f} ×)" for i in worst_grasps(comparison)
-    ]
+    worst = [f"{target.grasps[i].label} ({errors[i]:.1f} ×)" for i in worst_grasps(comparison)]
     lines = [f"worst grasps: {', '.join(worst)}"]
     name, kind, share = comparison.explanations()[0]
     if share >= _WORTH_TELLING and not at_floor(comparison.floor_ratio(), comparison.floor):
@@ -202,7 +199,7 @@ def sections(comparison: Comparison, notes: list[str]) -> list[Section]:
             [
                 Picture(
                     figures.heat_map(
-                        comparison.by_grasp_and_phase(), [f"{g.name} · {g.object}" for g in target.grasps], PHASES
+                        comparison.by_grasp_and_phase(), [f"{g.label}" for g in target.grasps], comparison.target.phases
                     ),
                     "Error ÷ sensor noise of each grasp (rows) in each phase, all signals together. 1 is the noise."
                     + (" The worst forty are shown." if len(target.grasps) > 40 else ""),
@@ -219,9 +216,9 @@ def sections(comparison: Comparison, notes: list[str]) -> list[Section]:
 
 def _by_signal_and_phase(comparison: Comparison) -> Section:
     cells, names = comparison.cells(), comparison.target.axis.names
-    grid = np.full((len(PHASES), len(names)), np.nan)
+    grid = np.full((len(comparison.target.phases), len(names)), np.nan)
     for cell in cells:
-        grid[PHASES.index(cell.phase), names.index(cell.signal)] = cell.ratio
+        grid[comparison.target.phases.index(cell.phase), names.index(cell.signal)] = cell.ratio
     rows = [
         (
             words(c.signal),
@@ -235,7 +232,7 @@ def _by_signal_and_phase(comparison: Comparison) -> Section:
     ]
     head = ("signal", "phase", "samples", "rms error", "÷ noise", "mean of measured − model")
     shown = ~np.all(np.isnan(grid), axis=1)
-    phases = [words(phase) for phase, there in zip(PHASES, shown, strict=True) if there]
+    phases = [words(phase) for phase, there in zip(comparison.target.phases, shown, strict=True) if there]
     return Section(
         "Error by signal and phase",
         [
@@ -262,7 +259,7 @@ def _worst(comparison: Comparison) -> Section:
         blocks.append(
             Picture(
                 figures.overlay(target, index, comparison.predicted[index]),
-                f"Grasp {grasp.name} on {grasp.object}: error {errors[index]:.2f} × noise. Dots are measured, lines are"
+                f"Grasp {grasp.label}: error {errors[index]:.2f} × noise. Dots are measured, lines are"
                 " the model's; below, measured − model ÷ noise, with a band of ± 2.",
             )
         )

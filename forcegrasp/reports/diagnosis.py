@@ -17,7 +17,6 @@ from forcegrasp.effects import Effect
 from forcegrasp.effects.for_gripper import effect_of
 from forcegrasp.identify.fit import Fit
 from forcegrasp.identify.intervals import listed, reached_bound
-from forcegrasp.identify.phases import PHASES
 from forcegrasp.identify.verdict import Verdict
 from forcegrasp.reports import figures
 from forcegrasp.reports.comparison import dependence_section, noise_sentence, value_text, words, worst_cell
@@ -267,12 +266,12 @@ def _left_sections(diagnosis: Diagnosis) -> list[Section]:
     blocks: list = [
         Text(f"{sentence[0].upper()}{sentence[1:]}."),
         Picture(
-            figures.heat_map(left.by_grasp_and_phase(), [f"{g.name} · {g.object}" for g in target.grasps], PHASES),
+            figures.heat_map(left.by_grasp_and_phase(), [f"{g.label}" for g in target.grasps], target.phases),
             f"Error of {model} ÷ sensor noise, of each grasp in each phase. 1 is the noise.",
         ),
         Picture(
             figures.overlay(target, worst, left.predicted[worst]),
-            f"Grasp {grasp.name} on {grasp.object}, the worst under {model}: error {left.by_grasp()[worst]:.2f} ×"
+            f"Grasp {grasp.label}, the worst under {model}: error {left.by_grasp()[worst]:.2f} ×"
             " noise. Dots are measured, lines are the model's.",
         ),
         Text(f"S{noise_sentence(target)[1:]}."),

@@ -72,7 +72,7 @@ def overlay(target: Target, index: int, predicted: np.ndarray) -> Figure:
     """One grasp: measured and predicted positions and forces, residuals ÷ noise below. ``predicted``: ``(S, C)``."""
     grasp = target.grasps[index]
     time, keep = grasp.time_s - grasp.time_s[0], _thin(len(grasp.time_s))
-    measured = target.signals[index][keep]
+    measured, predicted = target.signals[index][: len(time)][keep], predicted[: len(time)]
     residual = (measured - predicted[keep]) / target.sigma
     figure = Figure(figsize=(9.5, 4.6), layout="constrained")
     grid = figure.subplots(2, len(target.axis.kinds), sharex=True, height_ratios=(2.2, 1), squeeze=False)

@@ -161,8 +161,7 @@ def fit_sections(base: BaseFit, target: Target, model: Model) -> list[Section]:
     grasp = target.grasps[worst]
     picture = Picture(
         figures.overlay(target, worst, base.fit.predicted[worst]),
-        f"Grasp {grasp.name} on {grasp.object}, the worst: error {errors[worst]:.2f} × noise. Dots are measured, lines"
-        " are the model's.",
+        f"Grasp {grasp.label}, the worst: error {errors[worst]:.2f} × noise. Dots are measured, lines are the model's.",
     )
     return [parameters_section(model), Section("Starts", gate), Section("The worst grasp", [picture])]
 
@@ -239,7 +238,7 @@ def symptom_picture(target: Target, before: Fit, after: Fit, effect: type[Effect
     errors = [np.sqrt(np.sum(fit.residual[index, :, signal] ** 2) / count) for fit in (before, after)]
     return Picture(
         figures.symptom(target, index, signal, before.predicted[index], after.predicted[index], effect.name),
-        f"Where {effect.name} helps most: {words(target.axis.names[signal])} of grasp {grasp.name} on {grasp.object};"
+        f"Where {effect.name} helps most: {words(target.axis.names[signal])} of grasp {grasp.label};"
         f" error {errors[0]:.2f} × noise without it, {errors[1]:.2f} × with it. Below: measured − model ÷ noise, band"
         " ± 2.",
     )

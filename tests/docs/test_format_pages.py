@@ -9,8 +9,15 @@ from doc_pages import PAGES
 
 from forcegrasp.files.validate import Record
 from forcegrasp.measure.read import Meta
+from forcegrasp.measure.servo_set import ServoMeta
 from forcegrasp.models.model_file import _File
-from forcegrasp.physics.gripper_schema import Description, ParameterEntry, TrainingEntry
+from forcegrasp.physics.gripper_schema import (
+    Description,
+    MechanismDescription,
+    ParameterEntry,
+    ServoParameter,
+    TrainingEntry,
+)
 
 
 def keys_of(record: type[Record]) -> set[str]:
@@ -27,6 +34,9 @@ def keys_of(record: type[Record]) -> set[str]:
         ("docs/your-gripper.md", ParameterEntry),
         ("docs/your-gripper.md", TrainingEntry),
         ("docs/compare-your-data.md", Meta),
+        ("docs/servos.md", ServoMeta),
+        ("docs/servos.md", MechanismDescription),
+        ("docs/servos.md", ServoParameter),
         ("docs/compare-your-data.md", _File),
     ],
 )

@@ -1,0 +1,64 @@
+"""Recordings of a servo as a measurement set of a mechanism."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from forcegrasp.errors import ConfigError, MeasurementError
+from forcegrasp.importers.recording import Recording
+from forcegrasp.measure.schema import MeasuredGrasp, MeasurementSet, columns_of, fingerprint_of_set
+from forcegrasp.measure.servo_set import settings_of
+from forcegrasp.physics.gripper import Gripper
+
+
+def as_set(recordings: Sequence[Recording], mechanism: Gripper, source: str, license: str) -> MeasurementSet:
+    """The set that recordings of one joint make.
+
+    Args:
+      recordings: each of one joint.
+      mechanism: that they are of.
+      source: where they come from.
+      license: on what terms they may be used.
+
+    Raises:
+      ConfigError: if the mechanism has fingers.
+      MeasurementError: if a recording has several joints, another command, or lacks a setting.
+    """
+    if not mechanism.is_servo:
+        raise ConfigError(f"mechanism={mechanism.name}: has fingers; write its measurements as a set of grasps")
+    found = tuple(_recording(one, mechanism) for one in recordings)
+    names = [one.name for one in found]
+    if twice := sorted({name for name in names if names.count(name) > 1}):
+        raise MeasurementError(f"{twice[0]}: two recordings have this name; import them one by one")
+    name = mechanism.name_or_path
+    return MeasurementSet(
+        path=Path(source), name=Path(source).name, gripper=name, source=source, license=license, position_std_m=None,
+        force_std_n=None, grasps=found, fingerprint=fingerprint_of_set(name, None, None, found), kind="servo",
+    )  # fmt: skip
+
+
+def _recording(one: Recording, mechanism: Gripper) -> MeasuredGrasp:
+    if len(one.joints) != 1:
+        named = ", ".join(one.joints)
+        raise MeasurementError(f"{one.name}: has several joints, {named}; choose one: joints=[{one.joints[-1]}]")
+    if (one.command_unit != "") != (mechanism.command == "effort"):
+        holds = one.command_unit or "positions"
+        raise MeasurementError(
+            f"{one.name}: commands are {holds}; {mechanism.name} takes {mechanism.command}s: choose another mechanism"
+        )
+    settings = settings_of(mechanism)
+    if missing := [name for name in settings if name not in one.settings]:
+        raise MeasurementError(f"{one.name}: does not say {', '.join(missing)}, which {mechanism.name} needs")
+    effort = np.empty((len(one.time_s), 0))
+    if mechanism.forces:
+        if one.effort is None:
+            raise MeasurementError(f"{one.name}: has no effort, which {mechanism.name} reads; say `effort: none` there")
+        effort = one.effort
+    return MeasuredGrasp(
+        name=one.name, object="", session=one.name, radius_m=None, offset_m=None, split=None, time_s=one.time_s,
+        command_m=one.command, position_m=one.position, force_n=effort, object_m=None, columns=columns_of(mechanism),
+        settings={name: one.settings[name] for name in settings}, enabled=one.enabled, load=one.load,
+    )  # fmt: skip

@@ -1,0 +1,146 @@
+"""Sets of a servo's recordings: ``meta.yaml`` with ``kind: servo``, ``recordings.csv``, and all samples."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import polars as pl
+from pydantic import Field
+
+from forcegrasp.errors import ConfigError, MeasurementError, closest
+from forcegrasp.files.validate import refusal, validate
+from forcegrasp.measure.csv_file import read_csv
+from forcegrasp.measure.folder import find_file, show
+from forcegrasp.measure.parquet_file import read_parquet
+from forcegrasp.measure.samples import check_samples
+from forcegrasp.measure.schema import (
+    ENABLED,
+    FORMAT,
+    LOAD,
+    SPLITS,
+    MeasuredGrasp,
+    MeasurementSet,
+    columns_of,
+    fingerprint_of_set,
+)
+from forcegrasp.measure.table import FileColumns, Table
+from forcegrasp.measure.yaml_file import Name, Positive, Text, TextRecord
+from forcegrasp.physics.gripper import Gripper
+
+#: What only such a set may hold.
+INDEX = "recordings.csv"
+
+
+class ServoMeta(TextRecord):
+    """What meta.yaml says of a set of a servo; no result depends on source and license."""
+
+    format: str = Field(description=FORMAT)
+    kind: Name = Field(description="servo")
+    mechanism: Name = Field(description="name of one that is shipped, or path of a description")
+    source: Text = Field(default="", description="where the data come from")
+    license: Text = Field(default="", description="on what terms they may be used")
+    position_std_m: Positive | None = Field(default=None, description="noise of the positions, m or rad")
+    effort_std: Positive | None = Field(default=None, description="noise of the efforts, N or N·m")
+
+
+def read_servo_set(folder: Path, content: dict[str, Any]) -> MeasurementSet:
+    """Reads a set whose meta.yaml was loaded.
+
+    Raises:
+      MeasurementError: if anything is missing, unknown or broken: file, row, column and what to do.
+    """
+    from forcegrasp.physics.gripper_file import load_gripper  # brings MuJoCo, which nothing else here needs
+
+    place = show(folder / "meta.yaml")
+    meta = validate(ServoMeta, content, place, MeasurementError)
+    try:
+        mechanism = load_gripper(meta.mechanism, folder)
+    except ConfigError as error:
+        raise refusal(place, "mechanism", str(error).removeprefix("gripper="), MeasurementError) from error
+    if not mechanism.is_servo:
+        raise refusal(
+            place, "mechanism", f"{mechanism.name} has fingers; its sets are of kind grasps", MeasurementError
+        )
+    settings = settings_of(mechanism)
+    index = read_csv(
+        find_file(folder, INDEX), FileColumns(("recording", "split"), settings, optional=("split",), blank=("split",))
+    )
+    columns = columns_of(mechanism)
+    in_samples = FileColumns(("recording",), (*columns.signals, ENABLED, LOAD), optional=(ENABLED, LOAD))
+    if os.path.lexists(folder / "samples.parquet"):
+        samples = read_parquet(find_file(folder, "samples.parquet"), in_samples)
+    else:
+        samples = read_csv(find_file(folder, "samples.csv"), in_samples)
+    recordings = _recordings(folder, index, samples, mechanism)
+    return MeasurementSet(
+        path=folder,
+        name=folder.resolve().name,
+        gripper=meta.mechanism,
+        source=meta.source,
+        license=meta.license,
+        position_std_m=meta.position_std_m,
+        force_std_n=meta.effort_std,
+        grasps=recordings,
+        fingerprint=fingerprint_of_set(meta.mechanism, meta.position_std_m, meta.effort_std, recordings),
+        notes=index.notes() + samples.notes(),
+        kind="servo",
+    )
+
+
+def settings_of(mechanism: Gripper) -> tuple[str, ...]:
+    """Settings that each recording of a mechanism must have, such as kp."""
+    return tuple(dict.fromkeys(p.times for p in mechanism.parameters.values() if p.times))
+
+
+def _recordings(folder: Path, index: Table, samples: Table, mechanism: Gripper) -> tuple[MeasuredGrasp, ...]:
+    names = index.frame["recording"].to_list()
+    for place in np.flatnonzero(index.frame["recording"].is_duplicated().to_numpy())[1:]:
+        raise index.refuse(int(place), "recording", f"{show(names[place])} is there already; give it another name")
+    numbered = samples.frame.with_row_index("row", offset=samples.first_row)
+    parts = {str(key[0]): part for key, part in numbered.partition_by("recording", as_dict=True).items()}
+    found = []
+    for place, facts in enumerate(index.frame.iter_rows(named=True)):
+        name, split = facts["recording"], facts.get("split") or None
+        if name not in parts:
+            raise index.refuse(
+                place, "recording", f"{show(name)} has no samples in {samples.path.name}; remove the row"
+            )
+        if split and split not in SPLITS:
+            raise index.refuse(place, "split", f"{show(split)} is unknown{closest(split, SPLITS)}; or leave it empty")
+        found.append(_recording(facts, split, parts.pop(name), mechanism))
+    for name, part in parts.items():
+        row = int(part["row"][0]) - samples.first_row
+        raise samples.refuse(row, "recording", f"{show(name)} is not in {INDEX}{closest(name, names[:1000])}")
+    for one in found:
+        check_samples(folder, one)
+    return tuple(found)
+
+
+def _recording(facts: dict[str, Any], split: str | None, part: pl.DataFrame, mechanism: Gripper) -> MeasuredGrasp:
+    columns = columns_of(mechanism)
+
+    def together(names: tuple[str, ...]) -> np.ndarray:
+        values = [part[name].to_numpy() for name in names]
+        return np.stack(values, axis=1) if values else np.empty((part.height, 0))
+
+    return MeasuredGrasp(
+        name=facts["recording"],
+        object="",
+        session=facts["recording"],
+        radius_m=None,
+        offset_m=None,
+        split=split,
+        time_s=np.array(part["t_s"].to_numpy()),
+        command_m=together(columns.command),
+        position_m=together(columns.position),
+        force_n=together(columns.force),
+        object_m=None,
+        rows=part["row"].to_numpy().astype(np.int64),
+        columns=columns,
+        settings={name: float(facts[name]) for name in settings_of(mechanism)},
+        enabled=part[ENABLED].to_numpy() > 0 if ENABLED in part.columns else None,
+        load=np.array(part[LOAD].to_numpy()) if LOAD in part.columns else None,
+    )

@@ -1,0 +1,79 @@
+"""Reads the description of a servo without fingers: a gripper that grasps nothing."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+from typing import Any
+
+import mujoco
+
+from forcegrasp.errors import closest
+from forcegrasp.files.validate import refusal, validate
+from forcegrasp.physics.gripper import Gripper
+from forcegrasp.physics.gripper_checks import check_write
+from forcegrasp.physics.gripper_parts import NO_TRAINING, BaseParameter, Motor
+from forcegrasp.physics.gripper_schema import MechanismDescription, ScaleEntry
+from forcegrasp.physics.guard import silence_log
+from forcegrasp.physics.scene_file import check_scene
+
+#: Where those are that come with the package, below its descriptions of grippers.
+MECHANISMS = "mechanisms"
+# Travel for which the sizes of effects in the catalogue are typical; metres, or as many radians.
+_STROKE = 0.05
+
+
+def load_mechanism(path: Path, raw: dict[str, Any]) -> Gripper:
+    """The mechanism of a description that was read.
+
+    Raises:
+      ConfigError: if it can't be right; names the file and the line's key.
+    """
+    said = validate(MechanismDescription, raw, path)
+    (entry,), scale = said.motors, said.scale or ScaleEntry()
+    motor = Motor(entry.actuator, entry.joint, 0.0, entry.span, "m")
+    mechanism = Gripper(
+        name=said.name,
+        path=path,
+        model=path.parent / said.model,
+        fast="none",
+        motors=(motor,),
+        fingers=(),
+        force="motor" if said.effort == "motor" else "none",
+        object_joint="",
+        object_geom="",
+        axis=0,
+        period_s=said.period_s,
+        max_step=entry.span / 15,
+        parameters={
+            name: BaseParameter(name, p.nominal, p.low, p.high, p.unit, p.scope, tuple(p.writes), p.times or "")
+            for name, p in said.parameters.items()
+        },
+        training=NO_TRAINING,
+        position_scale=scale.position or entry.span / _STROKE,
+        force_scale=scale.force,
+        command=said.command,
+    )
+    return _in_scene(mechanism)
+
+
+def _in_scene(mechanism: Gripper) -> Gripper:
+    """Checks names and fields against the scene, and takes the unit of the motor from it."""
+    silence_log()
+    check_scene(mechanism.model)
+    try:
+        model = mujoco.MjSpec.from_file(str(mechanism.model)).compile()
+    except (ValueError, RuntimeError) as error:
+        raise refusal(mechanism.model, "", f"MuJoCo refuses it: {error}") from error
+    (motor,) = mechanism.motors
+    for key, name, known in (
+        ("motors.joint", motor.joint, [model.joint(i).name for i in range(model.njnt)]),
+        ("motors.actuator", motor.actuator, [model.actuator(i).name for i in range(model.nu)]),
+    ):
+        if name not in known:
+            raise refusal(mechanism.path, key, f"{mechanism.model.name} has no {name!r}{closest(name, known)}")
+    for parameter in mechanism.parameters.values():
+        for write in parameter.writes:
+            check_write(f"{mechanism.path}: parameters.{parameter.name}.writes: {write.field}", model, write)
+    turns = model.joint(motor.joint).type[0] == mujoco.mjtJoint.mjJNT_HINGE
+    return dataclasses.replace(mechanism, motors=(dataclasses.replace(motor, unit="rad" if turns else "m"),))

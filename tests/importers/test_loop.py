@@ -1,0 +1,115 @@
+"""From a servo's log to the missing effect: the starter set, cut into windows, compared and diagnosed."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from forcegrasp.diagnosis.diagnose_set import chosen_effects, diagnose_set
+from forcegrasp.errors import ConfigError, MeasurementError
+from forcegrasp.identify import loading, windows
+from forcegrasp.identify.progress import silent
+from forcegrasp.importers.example import FRICTION_NM, example_set
+from forcegrasp.measure import check_servo, write_servo_set
+from forcegrasp.measure.schema import MeasuredGrasp, MeasurementSet
+from forcegrasp.physics import load_gripper
+from forcegrasp.physics.plant import Plant
+from forcegrasp.replay.replay import Replay
+
+
+@pytest.fixture(scope="module")
+def example() -> MeasurementSet:
+    return example_set()
+
+
+def test_the_friction_hidden_in_the_starter_set_is_found(example, tmp_path):
+    few = dataclasses.replace(example, grasps=example.grasps[1:4])
+    loaded = loading.load(write_servo_set(few, tmp_path / "set"))
+    diagnosis, _ = diagnose_set(loaded, None, ["coulomb_friction", "command_deadband"], 0, silent)
+    assert diagnosis.preferred == ("quantisation", "coulomb_friction")
+    assert diagnosis.error_after < 1.1 * diagnosis.floor < 0.5 * diagnosis.error_before
+    (friction,) = [one.values[0] for one in diagnosis.fit.problem.case(diagnosis.fit.vector).effects]
+    assert friction == pytest.approx(FRICTION_NM, rel=0.05)
+    assert {cell.phase for cell in loaded_cells(diagnosis)} <= {"moving", "reversing", "holding", "released"}
+
+
+def loaded_cells(diagnosis):
+    from forcegrasp.reports.findings import remaining
+
+    return remaining(diagnosis).cells()
+
+
+def test_a_set_is_read_as_it_was_written(example, tmp_path):
+    read = loading.load(write_servo_set(example, tmp_path / "set")).measured
+    assert isinstance(read, MeasurementSet)
+    assert read.fingerprint == example.fingerprint
+    assert [one.name for one in read.grasps] == [one.name for one in example.grasps]
+    np.testing.assert_array_equal(read.grasps[0].position_m, example.grasps[0].position_m)
+
+
+def test_windows_start_where_the_servo_was(example):
+    sine = next(one for one in example.grasps if one.name == "sine")
+    exact = 0.5 + 0.2 * np.sin(np.pi * sine.time_s[:, None])
+    parts = windows.cut([dataclasses.replace(sine, position_m=exact)])
+    assert len(parts) == 12
+    for part in parts[1:]:
+        index = int(np.argmin(np.abs(exact - part.position_m[0])))
+        assert part.start is not None
+        speed = 0.2 * np.pi * np.cos(np.pi * (part.time_s[0] + float(part.name.split()[1])))
+        assert part.start[0] == pytest.approx(exact[index], abs=2e-3)
+        assert part.start[1] == pytest.approx(speed, abs=0.12)  # names are rounded to 0.1 s
+        assert part.counts is not None
+        assert not part.counts[:10].any()
+
+
+def test_a_load_pushes_and_a_motor_that_is_off_does_not():
+    mechanism = load_gripper("emps")
+    plant, ids = Plant(mechanism, 3), np.arange(3)
+    plant.reset(ids, np.zeros(3), np.zeros((3, 1)), np.zeros((3, 1)))
+    plant.disturb(np.array([0.0, 100.0, 100.0]), np.array([True, True, False]))
+    plant.advance(np.zeros((3, 1)), 300)
+    still, held, free = plant.position[:, 0]
+    assert still == 0
+    assert held == pytest.approx(100 / 1370754, rel=0.01)  # the drive's stiffness
+    assert free > 10 * held
+
+
+def test_recordings_with_a_load_are_replayed_with_it(example):
+    one = example.grasps[0]
+    loaded = dataclasses.replace(one, load=np.full(len(one.time_s), 0.3), start=(one.position_m[0], np.zeros(1)))
+    plain = dataclasses.replace(one, start=(one.position_m[0], np.zeros(1)))
+    mechanism = load_gripper("so101_jaw")
+    base = {name: np.full(2, p.nominal) for name, p in mechanism.parameters.items()}
+    motion = Replay(mechanism, [plain, loaded]).simulate(np.arange(2), base)
+    assert (motion.position[1, -1] - motion.position[0, -1]) == pytest.approx(0.3 / 17.8, rel=0.05)
+
+
+def spoilt(example: MeasurementSet, **changes) -> MeasurementSet:
+    one: MeasuredGrasp = dataclasses.replace(example.grasps[0], **changes)
+    return dataclasses.replace(example, grasps=(one,))
+
+
+def test_what_no_effect_explains_is_refused(example):
+    one = example.grasps[4]
+    command, position = one.command_m, one.position_m
+    for changes, match in (
+        ({"position_m": np.zeros_like(position)}, "never changes"),
+        ({"position_m": 1000 * position}, "looks like counts or degrees"),
+        ({"command_m": np.roll(position, 1, axis=0), "position_m": position}, "is the position itself"),
+        ({"command_m": np.rad2deg(command), "position_m": position}, "degrees"),
+        ({"command_m": -command, "position_m": position}, "turned round"),
+    ):
+        with pytest.raises(MeasurementError, match=match) as caught:
+            check_servo(spoilt(example, **changes))
+        assert "\n" not in str(caught.value)
+
+
+def test_effects_of_grasped_objects_are_not_a_servos():
+    mechanism = load_gripper("so101_jaw")
+    names = {effect.name for effect in chosen_effects(mechanism, [])}
+    assert {"coulomb_friction", "command_delay", "backlash"} <= names
+    assert not names & {"adhesion", "object_friction", "stiffening_contact", "force_lag"}
+    with pytest.raises(ConfigError, match="adhesion: is one of grasped objects; so101_jaw grasps nothing"):
+        chosen_effects(mechanism, ["adhesion"])
