@@ -14,7 +14,7 @@ NOTES = """
   format=sage|bam|emps|dfki|pace|lerobot
                    how it is written; each has a mechanism, the model that it is compared with, except pace
   map=FILE         for any CSV or Parquet: which column is what, in which unit; see docs/servos.md
-  joints=[Jaw]     which joint, where a log has several
+  'joints=[Jaw]'   which joint, where a log has several
 """
 
 
@@ -33,8 +33,9 @@ def run(config: ImportConfig) -> None:
         return
     if not config.source:
         raise ConfigError("which recordings? forcegrasp import SOURCE format=sage, or example=true for a starter set")
-    recordings = read_source([Path(source) for source in config.source], config.format, config.map, config.joints)
-    name = config.mechanism or (FORMATS[config.format].MECHANISM if config.format else "")
+    form = "" if config.format == "map" else config.format
+    recordings = read_source([Path(source) for source in config.source], form, config.map, config.joints)
+    name = config.mechanism or (FORMATS[form].MECHANISM if form else "")
     if not name:
         raise ConfigError("mechanism: what was recorded? Give the name of a shipped one, or a description's path")
     measured = as_set(recordings, load_gripper(name), ", ".join(config.source), config.license)

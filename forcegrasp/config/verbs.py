@@ -97,7 +97,9 @@ class ImportConfig:
     source: list[str] = option([], "files or folders of recordings; also given without source=")
     out: str = option("", "folder for the set; must not exist or be empty; runs/import_TIME if empty")
     format: str = option(
-        "", "how the recordings are written", choices=("", "sage", "bam", "emps", "dfki", "pace", "lerobot")
+        "map",
+        "how the recordings are written; map: as the file of map= says",
+        choices=("map", "sage", "bam", "emps", "dfki", "pace", "lerobot"),
     )
     map: str = option("", "file that says which column is what, for any other CSV or Parquet")
     joints: list[str] = option([], "joints to take; all that there are if empty")

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import io
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from forcegrasp.errors import MeasurementError
-from forcegrasp.files.bounded import read_bytes
 from forcegrasp.importers.recording import Recording
+from forcegrasp.importers.torch_file import read_tensors
 
 MECHANISM = ""  #: none that comes with the package
-_MAX_BYTES = 1_000_000_000
 _NEEDED = ("time", "dof_pos", "des_dof_pos")
 
 
@@ -28,18 +26,17 @@ def read(file: Path) -> Recording:
     Raises:
       MeasurementError: if it holds anything else, or lacks a tensor.
     """
-    import torch
-
     try:
-        content: Any = torch.load(io.BytesIO(read_bytes(file, _MAX_BYTES)), map_location="cpu", weights_only=True)
-    except Exception as error:  # torch raises whatever its reader meets
+        content = read_tensors(file)
+    except (OSError, ValueError) as error:
         raise MeasurementError(
-            f"{file}: holds more than tensors, or is no .pt file: nothing in it was executed"
+            f"{file}: holds more than tensors, or is no .pt file ({error}); nothing in it was executed"
         ) from error
-    there = sorted(content) if isinstance(content, dict) else []
-    if missing := [name for name in _NEEDED if name not in there or not isinstance(content[name], torch.Tensor)]:
-        raise MeasurementError(f"{file}: no tensor {', '.join(missing)}; it has {', '.join(map(str, there)) or 'none'}")
-    time_s, position, command = (content[name].double().numpy() for name in _NEEDED)
+    if missing := [name for name in _NEEDED if not isinstance(content.get(name), np.ndarray)]:
+        raise MeasurementError(
+            f"{file}: no tensor {', '.join(missing)}; it has {', '.join(map(str, content)) or 'none'}"
+        )
+    time_s, position, command = (content[name].astype(float) for name in _NEEDED)
     position, command = (np.atleast_2d(a.T).T for a in (position, command))
     if not len(time_s) == len(position) == len(command) or position.shape != command.shape:
         raise MeasurementError(

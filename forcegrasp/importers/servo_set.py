@@ -43,7 +43,7 @@ def as_set(recordings: Sequence[Recording], mechanism: Gripper, source: str, lic
 def _recording(one: Recording, mechanism: Gripper) -> MeasuredGrasp:
     if len(one.joints) != 1:
         named = ", ".join(one.joints)
-        raise MeasurementError(f"{one.name}: has several joints, {named}; choose one: joints=[{one.joints[-1]}]")
+        raise MeasurementError(f"{one.name}: has several joints, {named}; choose one: 'joints=[{one.joints[-1]}]'")
     if (one.command_unit != "") != (mechanism.command == "effort"):
         holds = one.command_unit or "positions"
         raise MeasurementError(

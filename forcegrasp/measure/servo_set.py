@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import polars as pl
@@ -28,7 +28,9 @@ from forcegrasp.measure.schema import (
 )
 from forcegrasp.measure.table import FileColumns, Table
 from forcegrasp.measure.yaml_file import Name, Positive, Text, TextRecord
-from forcegrasp.physics.gripper import Gripper
+
+if TYPE_CHECKING:
+    from forcegrasp.physics.gripper import Gripper
 
 #: What only such a set may hold.
 INDEX = "recordings.csv"
