@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,12 +13,11 @@ from forcegrasp.errors import ConfigError, MeasurementError, closest
 from forcegrasp.files.validate import refusal, validate
 from forcegrasp.measure.csv_file import read_csv
 from forcegrasp.measure.folder import find_file, open_folder, show
-from forcegrasp.measure.parquet_file import read_parquet
+from forcegrasp.measure.joined import check_names, check_splits, read_samples, samples_of_each, side_by_side
 from forcegrasp.measure.samples import check_samples
 from forcegrasp.measure.schema import (
     FORMAT,
     OBJECT,
-    SPLITS,
     Columns,
     FinalForceTable,
     MeasuredGrasp,
@@ -99,13 +96,7 @@ def _read_grasps(folder: Path, meta: Meta, facts: dict[str, Any]) -> Measurement
     in_samples = FileColumns(("grasp",), (*columns.signals, OBJECT), optional=(OBJECT,), blank=(OBJECT,))
     table = read_csv(find_file(folder, "grasps.csv"), _GRASPS)
     _check_grasps(table)
-    both = [name for name in ("samples.csv", "samples.parquet") if os.path.lexists(folder / name)]
-    if len(both) == 2:
-        raise MeasurementError(f"{show(folder)}: has samples.csv and samples.parquet; remove one")
-    if both == ["samples.parquet"]:
-        samples = read_parquet(find_file(folder, "samples.parquet"), in_samples)
-    else:
-        samples = read_csv(find_file(folder, "samples.csv"), in_samples)
+    samples = read_samples(folder, in_samples)
     grasps = _grasps(folder, table, samples, columns)
     return MeasurementSet(
         **facts,
@@ -130,12 +121,6 @@ def gripper_columns(gripper: str, folder: Path, place: str) -> Columns:
         raise refusal(place, "gripper", str(error).removeprefix("gripper="), MeasurementError) from error
 
 
-def side_by_side(samples: Mapping[str, np.ndarray] | pl.DataFrame, names: Sequence[str]) -> np.ndarray:
-    """Some columns of samples as an array, ``(T, len(names))``, which may be none."""
-    values = [np.asarray(samples[name], float) for name in names]
-    return np.stack(values, axis=1) if values else np.empty((len(samples["t_s"]), 0))
-
-
 def _refuse_files(folder: Path, kind: str, names: tuple[str, ...]) -> None:
     for name in names:
         if (folder / name).exists():
@@ -147,35 +132,16 @@ def _refuse_files(folder: Path, kind: str, names: tuple[str, ...]) -> None:
 def _check_grasps(table: Table) -> None:
     """Raises MeasurementError about a name that is there twice, a radius that is none, or an unknown split."""
     frame = table.frame
-    names = frame["grasp"].to_list()
-    for index in np.flatnonzero(frame["grasp"].is_duplicated().to_numpy()).tolist():
-        first = names.index(names[index])
-        if first < index:
-            again = f"{show(names[index])} is there already, in row {table.first_row + first}; give it another name"
-            raise table.refuse(index, "grasp", again)
+    check_names(table, "grasp")
     for index, radius in enumerate(frame["object_radius_m"]):
         if radius is not None and radius <= 0:
             raise table.refuse(index, "object_radius_m", f"{radius:g} must be positive; leave it empty if not known")
-    if "split" in frame.columns:
-        for index, split in enumerate(frame["split"]):
-            if split and split not in SPLITS:
-                raise table.refuse(
-                    index, "split", f"{show(split)} is unknown{closest(split, SPLITS)}; or leave it empty"
-                )
+    check_splits(table)
 
 
 def _grasps(folder: Path, table: Table, samples: Table, columns: Columns) -> tuple[MeasuredGrasp, ...]:
     """Joins the rows of grasps.csv with their samples, which may be interleaved."""
-    names = table.frame["grasp"].to_list()
-    numbered = samples.frame.with_row_index("row", offset=samples.first_row)
-    parts = {str(key[0]): part for key, part in numbered.partition_by("grasp", as_dict=True).items()}
-    for name, part in parts.items():
-        if name not in set(names):
-            index = int(part["row"][0]) - samples.first_row
-            raise samples.refuse(index, "grasp", f"{show(name)} is not in grasps.csv{closest(name, names[:1000])}")
-    for index, name in enumerate(names):
-        if name not in parts:
-            raise table.refuse(index, "grasp", f"{show(name)} has no samples in {samples.path.name}; remove the row")
+    parts = samples_of_each(table, samples, "grasp")
     rows = table.frame.iter_rows(named=True)
     grasps = tuple(_grasp(samples, facts, parts[facts["grasp"]], columns) for facts in rows)
     for grasp in grasps:

@@ -31,8 +31,9 @@ from pydantic import AfterValidator, model_validator
 from forcegrasp.errors import MeasurementError, closest
 from forcegrasp.files.validate import counted, must, refusal, text, validate, wrong
 from forcegrasp.measure.folder import MAX_ROWS, show
+from forcegrasp.measure.joined import side_by_side
 from forcegrasp.measure.names import misfits
-from forcegrasp.measure.read import gripper_columns, side_by_side
+from forcegrasp.measure.read import gripper_columns
 from forcegrasp.measure.samples import check_samples
 from forcegrasp.measure.schema import (
     OBJECT,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,17 +9,16 @@ import numpy as np
 import polars as pl
 from pydantic import Field
 
-from forcegrasp.errors import ConfigError, MeasurementError, closest
+from forcegrasp.errors import ConfigError, MeasurementError
 from forcegrasp.files.validate import refusal, validate
 from forcegrasp.measure.csv_file import read_csv
 from forcegrasp.measure.folder import find_file, show
-from forcegrasp.measure.parquet_file import read_parquet
+from forcegrasp.measure.joined import check_names, check_splits, read_samples, samples_of_each, side_by_side
 from forcegrasp.measure.samples import check_samples
 from forcegrasp.measure.schema import (
     ENABLED,
     FORMAT,
     LOAD,
-    SPLITS,
     MeasuredGrasp,
     MeasurementSet,
     columns_of,
@@ -72,10 +70,7 @@ def read_servo_set(folder: Path, content: dict[str, Any]) -> MeasurementSet:
     )
     columns = columns_of(mechanism)
     in_samples = FileColumns(("recording",), (*columns.signals, ENABLED, LOAD), optional=(ENABLED, LOAD))
-    if os.path.lexists(folder / "samples.parquet"):
-        samples = read_parquet(find_file(folder, "samples.parquet"), in_samples)
-    else:
-        samples = read_csv(find_file(folder, "samples.csv"), in_samples)
+    samples = read_samples(folder, in_samples)
     recordings = _recordings(folder, index, samples, mechanism)
     return MeasurementSet(
         path=folder,
@@ -98,47 +93,28 @@ def settings_of(mechanism: Gripper) -> tuple[str, ...]:
 
 
 def _recordings(folder: Path, index: Table, samples: Table, mechanism: Gripper) -> tuple[MeasuredGrasp, ...]:
-    names = index.frame["recording"].to_list()
-    for place in np.flatnonzero(index.frame["recording"].is_duplicated().to_numpy())[1:]:
-        raise index.refuse(int(place), "recording", f"{show(names[place])} is there already; give it another name")
-    numbered = samples.frame.with_row_index("row", offset=samples.first_row)
-    parts = {str(key[0]): part for key, part in numbered.partition_by("recording", as_dict=True).items()}
-    found = []
-    for place, facts in enumerate(index.frame.iter_rows(named=True)):
-        name, split = facts["recording"], facts.get("split") or None
-        if name not in parts:
-            raise index.refuse(
-                place, "recording", f"{show(name)} has no samples in {samples.path.name}; remove the row"
-            )
-        if split and split not in SPLITS:
-            raise index.refuse(place, "split", f"{show(split)} is unknown{closest(split, SPLITS)}; or leave it empty")
-        found.append(_recording(facts, split, parts.pop(name), mechanism))
-    for name, part in parts.items():
-        row = int(part["row"][0]) - samples.first_row
-        raise samples.refuse(row, "recording", f"{show(name)} is not in {INDEX}{closest(name, names[:1000])}")
+    check_names(index, "recording")
+    check_splits(index)
+    parts = samples_of_each(index, samples, "recording")
+    found = [_recording(facts, parts[facts["recording"]], mechanism) for facts in index.frame.iter_rows(named=True)]
     for one in found:
         check_samples(folder, one)
     return tuple(found)
 
 
-def _recording(facts: dict[str, Any], split: str | None, part: pl.DataFrame, mechanism: Gripper) -> MeasuredGrasp:
+def _recording(facts: dict[str, Any], part: pl.DataFrame, mechanism: Gripper) -> MeasuredGrasp:
     columns = columns_of(mechanism)
-
-    def together(names: tuple[str, ...]) -> np.ndarray:
-        values = [part[name].to_numpy() for name in names]
-        return np.stack(values, axis=1) if values else np.empty((part.height, 0))
-
     return MeasuredGrasp(
         name=facts["recording"],
         object="",
         session=facts["recording"],
         radius_m=None,
         offset_m=None,
-        split=split,
+        split=facts.get("split") or None,
         time_s=np.array(part["t_s"].to_numpy()),
-        command_m=together(columns.command),
-        position_m=together(columns.position),
-        force_n=together(columns.force),
+        command_m=side_by_side(part, columns.command),
+        position_m=side_by_side(part, columns.position),
+        force_n=side_by_side(part, columns.force),
         object_m=None,
         rows=part["row"].to_numpy().astype(np.int64),
         columns=columns,
