@@ -56,6 +56,12 @@ def _recording(one: Recording, mechanism: Gripper) -> MeasuredGrasp:
     if mechanism.forces:
         if one.effort is None:
             raise MeasurementError(f"{one.name}: has no effort, which {mechanism.name} reads; say `effort: none` there")
+        if not one.effort_signed or one.effort_unit != mechanism.effort_unit:
+            what = f"in {one.effort_unit}" if one.effort_signed else "without a sign"
+            raise MeasurementError(
+                f"{one.name}: its efforts are {what}; {mechanism.name} reads {mechanism.effort_unit} with a sign:"
+                " say `effort: none` there"
+            )
         effort = one.effort
     return MeasuredGrasp(
         name=one.name, object="", session=one.name, radius_m=None, offset_m=None, split=None, time_s=one.time_s,

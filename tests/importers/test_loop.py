@@ -12,6 +12,8 @@ from forcegrasp.errors import ConfigError, MeasurementError
 from forcegrasp.identify import loading, windows
 from forcegrasp.identify.progress import silent
 from forcegrasp.importers.example import FRICTION_NM, example_set
+from forcegrasp.importers.recording import Recording
+from forcegrasp.importers.servo_set import as_set
 from forcegrasp.measure import check_servo, write_servo_set
 from forcegrasp.measure.schema import MeasuredGrasp, MeasurementSet
 from forcegrasp.physics import load_gripper
@@ -113,3 +115,14 @@ def test_effects_of_grasped_objects_are_not_a_servos():
     assert not names & {"adhesion", "object_friction", "stiffening_contact", "force_lag"}
     with pytest.raises(ConfigError, match="adhesion: is one of grasped objects; so101_jaw grasps nothing"):
         chosen_effects(mechanism, ["adhesion"])
+
+
+@pytest.mark.parametrize(
+    ("changes", "match"), [({"effort_signed": False}, "without a sign"), ({"effort_unit": "A"}, "in A")]
+)
+def test_efforts_that_the_mechanism_does_not_read_are_refused(changes, match):
+    time, zeros = np.arange(20) * 0.01, np.zeros((20, 1))
+    plain = Recording("one", ("carriage",), time, zeros, zeros, effort=zeros, effort_unit="N")
+    assert as_set([plain], load_gripper("emps"), "", "").grasps[0].force_n.shape == (20, 1)
+    with pytest.raises(MeasurementError, match=match):
+        as_set([dataclasses.replace(plain, **changes)], load_gripper("emps"), "", "")
