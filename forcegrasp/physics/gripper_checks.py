@@ -4,18 +4,36 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from pathlib import Path
 
 import mujoco
 import numpy as np
 from mujoco.batch import MODEL_FIELDS
 
 from forcegrasp.errors import ConfigError, closest
+from forcegrasp.files.validate import refusal
 from forcegrasp.physics.gripper import SIDES, Gripper
 from forcegrasp.physics.gripper_parts import FieldWrite, Finger, Motor
+from forcegrasp.physics.guard import silence_log
+from forcegrasp.physics.scene_file import check_scene
 
 #: Physics steps that divide a control step well and keep a simulation affordable. Seconds.
 _TIMESTEP_S = (5e-5, 0.02)
 _NETFORCE = 3  #: index of reduce="netforce" among a contact sensor's ways to reduce
+
+
+def compile_scene(path: Path) -> mujoco.MjModel:
+    """A scene as it is written, without the sensors that a simulator adds: their names may be what is wrong.
+
+    Raises:
+      ConfigError: if it can't be read, or MuJoCo refuses it.
+    """
+    silence_log()
+    check_scene(path)
+    try:
+        return mujoco.MjSpec.from_file(str(path)).compile()
+    except (ValueError, RuntimeError) as error:
+        raise refusal(path, "", f"MuJoCo refuses it: {error}") from error
 
 
 def check_gripper(gripper: Gripper, names: Mapping[str, str]) -> None:
@@ -25,7 +43,7 @@ def check_gripper(gripper: Gripper, names: Mapping[str, str]) -> None:
       gripper: as read.
       names: what messages call the parts of its description.
     """
-    model = _scene_alone(gripper)
+    model = compile_scene(gripper.model)
     low, high = _TIMESTEP_S
     if not low <= model.opt.timestep <= high:  # which may be NaN
         raise ConfigError(f"{gripper.model}: timestep={model.opt.timestep:g}: must lie in [{low:g}, {high:g}] s")
@@ -49,14 +67,6 @@ def check_gripper(gripper: Gripper, names: Mapping[str, str]) -> None:
     except ValueError as error:
         raise ConfigError(f"{gripper.path}: motors: {error}") from error
     gripper.compile("fast")
-
-
-def _scene_alone(gripper: Gripper) -> mujoco.MjModel:
-    """The scene without the sensors that a simulator adds: their names may be what is wrong."""
-    try:
-        return mujoco.MjSpec.from_file(str(gripper.model)).compile()
-    except (ValueError, RuntimeError) as error:
-        raise ConfigError(f"{gripper.model}: MuJoCo refuses it: {' '.join(str(error).split())}") from error
 
 
 def _check_names(gripper: Gripper, model: mujoco.MjModel, names: Mapping[str, str]) -> None:

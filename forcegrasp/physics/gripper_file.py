@@ -17,9 +17,9 @@ from forcegrasp.errors import ConfigError, closest
 from forcegrasp.files import plain_yaml
 from forcegrasp.files.validate import refusal, validate
 from forcegrasp.physics.gripper import Gripper, shipped_folder
-from forcegrasp.physics.gripper_checks import check_gripper
+from forcegrasp.physics.gripper_checks import check_gripper, compile_scene
 from forcegrasp.physics.gripper_defaults import training_of_scene
-from forcegrasp.physics.gripper_parts import NO_TRAINING, BaseParameter, Finger, Motor
+from forcegrasp.physics.gripper_parts import NO_TRAINING, STEP_SHARE, TYPICAL_STROKE, Finger, Motor
 from forcegrasp.physics.gripper_schema import (
     FIRST_FORMAT,
     FORMAT,
@@ -29,9 +29,7 @@ from forcegrasp.physics.gripper_schema import (
     FirstDescription,
     ScaleEntry,
 )
-from forcegrasp.physics.guard import silence_log
 from forcegrasp.physics.mechanism_file import MECHANISMS, load_mechanism
-from forcegrasp.physics.scene_file import check_scene
 
 
 def load_gripper(name: str | Path, folder: str | Path = "") -> Gripper:
@@ -102,10 +100,6 @@ _NAMES = {"joint": "motors.joint", "actuator": "motors.actuator", "closed": "mot
           "sensor": "fingers.force_sensor"}  # fmt: skip
 _FIRST_NAMES = {"joint": "fingers.joints", "actuator": "fingers.actuators", "closed": "fingers.closed",
                 "open": "fingers.open", "sensor": "fingers.force_sensors"}  # fmt: skip
-#: Stroke for which the sizes of effects in the catalogue are typical; metres, or as many radians.
-_STROKE = 0.05
-#: Largest command step where a description does not say, as a share of the stroke.
-_STEP = 1 / 15
 
 
 def _gripper(path: Path, said: Description) -> Gripper:
@@ -127,25 +121,17 @@ def _gripper(path: Path, said: Description) -> Gripper:
         object_geom=said.object.geom,
         axis="xyz".index(said.object.axis),
         period_s=control.period_s,
-        max_step=control.max_step or strokes[0] * _STEP,
-        parameters={
-            name: BaseParameter(name, p.nominal, p.low, p.high, p.unit, p.scope, tuple(p.writes))
-            for name, p in said.parameters.items()
-        },
+        max_step=control.max_step or strokes[0] * STEP_SHARE,
+        parameters={name: p.named(name) for name, p in said.parameters.items()},
         training=NO_TRAINING,
-        position_scale=scale.position or strokes[0] / _STROKE,
+        position_scale=scale.position or strokes[0] / TYPICAL_STROKE,
         force_scale=scale.force,
     )
 
 
 def _in_scene(gripper: Gripper) -> Gripper:
     """Fills in what names of the scene stand for: units of motors, bodies of fingers, and what moves them."""
-    silence_log()
-    check_scene(gripper.model)
-    try:
-        model = mujoco.MjSpec.from_file(str(gripper.model)).compile()
-    except (ValueError, RuntimeError) as error:
-        raise refusal(gripper.model, "", f"MuJoCo refuses it: {error}") from error
+    model = compile_scene(gripper.model)
     joints = {model.joint(i).name: i for i in range(model.njnt)}
     hinge = mujoco.mjtJoint.mjJNT_HINGE
     units = ["rad" if m.joint in joints and model.jnt_type[joints[m.joint]] == hinge else "m" for m in gripper.motors]

@@ -12,6 +12,10 @@ from forcegrasp.short_repr import ShortRepr
 #: Of what a base parameter has one value each.
 SCOPES = ("gripper", "object", "grasp")
 Softness = TypeVar("Softness", float, np.ndarray)
+#: Stroke for which the sizes of effects in the catalogue are typical; metres, or as many radians.
+TYPICAL_STROKE = 0.05
+#: Largest command step where a description does not say, as a share of the stroke.
+STEP_SHARE = 1 / 15
 
 
 @dataclass(frozen=True)

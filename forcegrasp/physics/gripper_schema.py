@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
 from collections.abc import Sequence
 from typing import Annotated, Literal
@@ -11,7 +12,7 @@ from pydantic import AfterValidator, Field, PlainValidator, PositiveFloat, model
 from forcegrasp.errors import closest
 from forcegrasp.files.validate import Record, counted, must, text, wrong
 from forcegrasp.physics.gripper import SIDES, SPECIAL
-from forcegrasp.physics.gripper_parts import FieldWrite
+from forcegrasp.physics.gripper_parts import BaseParameter, FieldWrite
 
 FORMAT, FIRST_FORMAT = "forcegrasp-gripper/2", "forcegrasp-gripper/1"
 MECHANISM_FORMAT = "forcegrasp-mechanism/1"
@@ -98,6 +99,10 @@ class ParameterEntry(Record):
             bounds = f"low={self.low:g} and high={self.high:g}"
             raise wrong(f"{self.nominal:g} must lie between {bounds}", "nominal")
         return self
+
+    def named(self, name: str) -> BaseParameter:
+        """The parameter of this name."""
+        return BaseParameter(name, self.nominal, self.low, self.high, self.unit, self.scope, tuple(self.writes))
 
 
 class ControlEntry(Record):
@@ -225,6 +230,10 @@ class ServoParameter(ParameterEntry):
     """A number of a mechanism that a fit may change."""
 
     times: Name | None = Field(default=None, description="setting of a recording that multiplies the value, such as kp")
+
+    def named(self, name: str) -> BaseParameter:
+        """The parameter of this name, with the setting that multiplies it."""
+        return dataclasses.replace(super().named(name), times=self.times or "")
 
 
 class MechanismDescription(Record):

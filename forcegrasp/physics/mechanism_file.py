@@ -11,16 +11,12 @@ import mujoco
 from forcegrasp.errors import closest
 from forcegrasp.files.validate import refusal, validate
 from forcegrasp.physics.gripper import Gripper
-from forcegrasp.physics.gripper_checks import check_write
-from forcegrasp.physics.gripper_parts import NO_TRAINING, BaseParameter, Motor
+from forcegrasp.physics.gripper_checks import check_write, compile_scene
+from forcegrasp.physics.gripper_parts import NO_TRAINING, STEP_SHARE, TYPICAL_STROKE, Motor
 from forcegrasp.physics.gripper_schema import MechanismDescription, ScaleEntry
-from forcegrasp.physics.guard import silence_log
-from forcegrasp.physics.scene_file import check_scene
 
 #: Where those are that come with the package, below its descriptions of grippers.
 MECHANISMS = "mechanisms"
-# Travel for which the sizes of effects in the catalogue are typical; metres, or as many radians.
-_STROKE = 0.05
 
 
 def load_mechanism(path: Path, raw: dict[str, Any]) -> Gripper:
@@ -44,13 +40,10 @@ def load_mechanism(path: Path, raw: dict[str, Any]) -> Gripper:
         object_geom="",
         axis=0,
         period_s=said.period_s,
-        max_step=entry.span / 15,
-        parameters={
-            name: BaseParameter(name, p.nominal, p.low, p.high, p.unit, p.scope, tuple(p.writes), p.times or "")
-            for name, p in said.parameters.items()
-        },
+        max_step=entry.span * STEP_SHARE,
+        parameters={name: p.named(name) for name, p in said.parameters.items()},
         training=NO_TRAINING,
-        position_scale=scale.position or entry.span / _STROKE,
+        position_scale=scale.position or entry.span / TYPICAL_STROKE,
         force_scale=scale.force,
         command=said.command,
     )
@@ -59,12 +52,7 @@ def load_mechanism(path: Path, raw: dict[str, Any]) -> Gripper:
 
 def _in_scene(mechanism: Gripper) -> Gripper:
     """Checks names and fields against the scene, and takes the unit of the motor from it."""
-    silence_log()
-    check_scene(mechanism.model)
-    try:
-        model = mujoco.MjSpec.from_file(str(mechanism.model)).compile()
-    except (ValueError, RuntimeError) as error:
-        raise refusal(mechanism.model, "", f"MuJoCo refuses it: {error}") from error
+    model = compile_scene(mechanism.model)
     (motor,) = mechanism.motors
     for key, name, known in (
         ("motors.joint", motor.joint, [model.joint(i).name for i in range(model.njnt)]),
