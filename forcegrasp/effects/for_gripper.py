@@ -29,18 +29,12 @@ class _Traits:
 
     @classmethod
     def of(cls, gripper: Gripper) -> _Traits:
-        travel = [t for t, f in zip(gripper.opening.travel, gripper.fingers, strict=False) if f.motor == 0]
+        pairs = zip(gripper.opening.travel, gripper.sides, strict=True) if gripper.sides else ()
+        travel = [t for t, (_, finger) in pairs if finger.motor == 0]
         turns, force = gripper.unit == "rad", gripper.force_scale
         effort = force * (float(sum(travel)) if travel and not gripper.is_direct else 1.0)
-        return cls(
-            len(gripper.motors),
-            len(gripper.forces),
-            bool(gripper.fingers),
-            turns,
-            gripper.position_scale,
-            effort,
-            force,
-        )
+        motors, channels = len(gripper.motors), len(gripper.forces)
+        return cls(motors, channels, not gripper.is_servo, turns, gripper.position_scale, effort, force)
 
 
 def effects_of(gripper: Gripper) -> dict[str, type[Effect]]:

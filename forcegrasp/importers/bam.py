@@ -10,7 +10,7 @@ import numpy as np
 
 from forcegrasp.errors import MeasurementError
 from forcegrasp.files.bounded import read_bytes
-from forcegrasp.importers.recording import Recording
+from forcegrasp.importers.recording import Recording, files_below
 
 MECHANISM = "xl330_pendulum"
 _MAX_BYTES = 200_000_000
@@ -20,7 +20,7 @@ _SETTINGS = ("kp", "mass", "length", "arm_mass", "vin")
 
 def find(source: Path) -> list[Path]:
     """Files of recordings at or below a folder, or the file itself."""
-    return [source] if source.is_file() else sorted(source.glob("**/*.json"))
+    return files_below(source, "*.json")
 
 
 def read(file: Path) -> Recording:

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from forcegrasp.errors import MeasurementError
-from forcegrasp.importers.plain_csv import read_columns
 from forcegrasp.importers.recording import Recording
+from forcegrasp.importers.tables import read_columns
 
 MECHANISM = "dfki_pendulum"
 _NEEDED = ("time", "position", "torque")

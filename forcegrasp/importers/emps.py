@@ -9,7 +9,7 @@ import numpy as np
 
 from forcegrasp.errors import MeasurementError
 from forcegrasp.files.bounded import read_bytes
-from forcegrasp.importers.recording import Recording
+from forcegrasp.importers.recording import Recording, files_below
 
 MECHANISM = "emps"
 _MAX_BYTES = 200_000_000
@@ -18,7 +18,7 @@ _NEEDED = ("t", "qg", "qm", "vir", "gtau", "kp", "kv")
 
 def find(source: Path) -> list[Path]:
     """Files of recordings at or below a folder, or the file itself."""
-    return [source] if source.is_file() else sorted(source.glob("**/*.mat"))
+    return files_below(source, "*.mat")
 
 
 def read(file: Path) -> Recording:

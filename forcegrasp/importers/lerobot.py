@@ -12,6 +12,7 @@ import numpy as np
 from forcegrasp.errors import MeasurementError
 from forcegrasp.files.bounded import read_bytes
 from forcegrasp.importers.recording import Recording
+from forcegrasp.importers.tables import read_parquet
 
 MECHANISM = "so101_jaw"
 _MAX_BYTES = 50_000_000
@@ -31,12 +32,7 @@ def read_all(file: Path) -> Iterator[Recording]:
     Raises:
       MeasurementError: if a column is missing; all are named.
     """
-    import polars as pl
-
-    try:
-        table = pl.read_parquet(file)
-    except (OSError, pl.exceptions.PolarsError) as error:
-        raise MeasurementError(f"{file}: can't be read as Parquet: {error}") from error
+    table = read_parquet(file)
     if missing := [name for name in _NEEDED if name not in table.columns]:
         raise MeasurementError(f"{file}: no column {', '.join(missing)}; it has {', '.join(table.columns)}")
     names = _names(file)

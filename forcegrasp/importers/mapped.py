@@ -23,10 +23,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import polars as pl
 
 from forcegrasp.errors import MeasurementError, closest
-from forcegrasp.importers.plain_csv import read_columns
 from forcegrasp.importers.recording import Recording
+from forcegrasp.importers.tables import read_columns, read_parquet
 from forcegrasp.measure.yaml_file import load_yaml
 
 TIMES = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
@@ -159,11 +160,6 @@ def _recording(name: str, rows: Mapping[str, np.ndarray], m: Map, notes: tuple[s
 def _table(file: Path) -> dict[str, np.ndarray]:
     if file.suffix != ".parquet":
         return read_columns(file)
-    import polars as pl
-
-    try:
-        table = pl.read_parquet(file)
-    except (OSError, pl.exceptions.PolarsError) as error:
-        raise MeasurementError(f"{file}: can't be read as Parquet: {error}") from error
+    table = read_parquet(file)
     kept = [name for name, kind in table.schema.items() if kind.is_numeric() or kind == pl.Boolean]
     return {name: table[name].cast(pl.Float64).to_numpy() for name in kept}

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from forcegrasp.errors import MeasurementError
-from forcegrasp.importers.recording import Recording
+from forcegrasp.importers.recording import Recording, files_below
 from forcegrasp.importers.torch_file import read_tensors
 
 MECHANISM = ""  #: none that comes with the package
@@ -17,7 +17,7 @@ _NEEDED = ("time", "dof_pos", "des_dof_pos")
 
 def find(source: Path) -> list[Path]:
     """Files of recordings at or below a folder, or the file itself."""
-    return [source] if source.is_file() else sorted(source.glob("**/*.pt"))
+    return files_below(source, "*.pt")
 
 
 def read(file: Path) -> Recording:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 
@@ -49,6 +50,11 @@ class Recording(ShortRepr):
             self.name, tuple(wanted), self.time_s, self.command[:, pick], self.position[:, pick], self.command_unit,
             effort, self.effort_unit, self.effort_signed, self.enabled, self.load, self.settings, self.notes,
         )  # fmt: skip
+
+
+def files_below(source: Path, pattern: str) -> list[Path]:
+    """The file itself, or the files of a folder, and of those below it, whose names are like the pattern."""
+    return [source] if source.is_file() else sorted(source.glob(f"**/{pattern}"))
 
 
 def steady_rate(name: str, time_s: np.ndarray) -> None:

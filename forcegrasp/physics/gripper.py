@@ -89,6 +89,11 @@ class Gripper(ShortRepr):
         return not self.fingers
 
     @property
+    def sides(self) -> list[tuple[str, Finger]]:
+        """The name of each side, left and right, with its finger; none of a mechanism that grasps nothing."""
+        return [] if self.is_servo else list(zip(SIDES, self.fingers, strict=True))
+
+    @property
     def effort_unit(self) -> str:
         """Unit of a motor's effort: "N" or "N·m"."""
         return "N·m" if self.unit == "rad" else "N"
@@ -102,7 +107,7 @@ class Gripper(ShortRepr):
         if self.force == "motor":
             suffixes = self._suffixes(len(self.motors))
         else:
-            suffixes = [f"_{side[0]}" for side, f in zip(SIDES, self.fingers, strict=True) if f.force_sensor]
+            suffixes = [f"_{side[0]}" for side, f in self.sides if f.force_sensor]
         return tuple(Channel(f"force{s}", f"f{s}_n", "N") for s in suffixes)
 
     @staticmethod
@@ -211,7 +216,7 @@ class Gripper(ShortRepr):
         """
         check_scene(self.model)
         spec = mujoco.MjSpec.from_file(str(self.model))
-        for side, finger in zip(SIDES, self.fingers, strict=False):
+        for side, finger in self.sides:
             if not finger.force_sensor:
                 add_contact_sensor(spec, own_sensor(side), self.object_joint, finger.body)
         if self.force == "motor":

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from forcegrasp.physics.gripper import SIDES, Gripper, effort_sensor, own_sensor
+from forcegrasp.physics.gripper import Gripper, effort_sensor, own_sensor
 from forcegrasp.physics.gripper_parts import Finger
 from forcegrasp.physics.opening import command_law
 
@@ -42,7 +42,7 @@ class SceneLayout:
         #: Which motor moves each side, and how far its pads go per unit of it; 0 for a side that stands still.
         self._mover = np.array([max(motor, 0) for motor in movers])
         self.travel = np.where([motor >= 0 for motor in movers], gripper.opening.travel, 0.0)
-        self._readings = [_reading(model, *pair) for pair in zip(SIDES, gripper.fingers, strict=False)]
+        self._readings = [_reading(model, *pair) for pair in gripper.sides]
         self._efforts = self._effort_readings(model)
         self._felt = [i for i, finger in enumerate(gripper.fingers) if finger.force_sensor]
 

@@ -1,4 +1,4 @@
-"""Reads a CSV file of numbers by its header."""
+"""Reads tables of numbers, CSV or Parquet, by the names of their columns."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import io
 from pathlib import Path
 
 import numpy as np
+import polars as pl
 
 from forcegrasp.errors import MeasurementError
 from forcegrasp.files.bounded import read_bytes
@@ -38,6 +39,18 @@ def read_columns(file: Path) -> dict[str, np.ndarray]:
         if None not in numbers:
             found[name] = np.array(numbers, float)
     return found
+
+
+def read_parquet(file: Path) -> pl.DataFrame:
+    """The table of a Parquet file.
+
+    Raises:
+      MeasurementError: if it can't be read.
+    """
+    try:
+        return pl.read_parquet(file)
+    except (OSError, pl.exceptions.PolarsError) as error:
+        raise MeasurementError(f"{file}: can't be read as Parquet: {error}") from error
 
 
 def _number(cell: str) -> float | None:
