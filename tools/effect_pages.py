@@ -23,6 +23,9 @@ PERIOD_S, JUMP = 0.04, 9.0
 NOISE_M, NOISE_N = 27e-6, 0.013
 FORCE_SCALE, RADIUS_M = 2.0, 0.025
 
+#: Where effects of servos alone are shown, and steps of its command, rad.
+_SERVO, _SERVO_STEPS = "so101_jaw", (0.0, 0.3, 0.0, -0.2, 0.1)
+
 
 @dataclass(frozen=True)
 class Show:
@@ -63,6 +66,30 @@ _PLANS = {
         "slow ramps and pauses in free air, and a slow squeeze",
         ((26, 0.0012, 0.2), (27, 0.0012, 0.2), (26.6, 0.0012, 0.2), (23, 0.004, 0.3)),
     ),
+    "load_friction": Show(
+        "holds at growing loads, each approached while closing and while opening",
+        ((24, 0.02, 0.24), (22.6, 0.02, 0.3), (23.3, 0.01, 0.3), (20, 0.02, 0.3), (21.6, 0.01, 0.3), (27, 0.02, 0.2)),
+    ),
+    "back_emf": Show(
+        "steps of growing size in free air and into the object, and a release",
+        ((26.9, JUMP, 0.4), (25.1, JUMP, 0.5), (27.4, JUMP, 0.5), (21, JUMP, 0.7), (27, JUMP, 0.6)),
+    ),
+    "position_deadband": Show(
+        "steps of 0.4 and 1.5 mm in free air, a squeeze, a release in small increments",
+        ((27.1, JUMP, 0.3), (26.7, JUMP, 0.3), (27.1, JUMP, 0.3), (25.6, JUMP, 0.4), (27.1, JUMP, 0.4),
+         (22.5, 0.015, 0.3), (23.5, 0.0025, 0.3)),
+    ),
+    "presliding": Show(
+        "reversals of 0.1 to 0.8 mm in free air, and a squeeze",
+        ((26.2, 0.008, 0.2), (26.3, 0.008, 0.2), (26.1, 0.008, 0.2), (26.5, 0.008, 0.2), (25.9, 0.008, 0.2),
+         (26.7, 0.008, 0.2), (22.5, 0.015, 0.3), (22.8, 0.006, 0.3)),
+    ),
+    "direction_friction": Show(
+        "fast ramps, opening and closing, in free air; a squeeze and a release",
+        ((25.6, 0.02, 0.4), (27.4, 0.02, 0.4), (25.6, 0.02, 0.4), (22, 0.02, 0.3), (27, 0.02, 0.4)),
+    ),
+    "readout_skew": _STEPS,
+    "elastic_transmission": Show("steps of a servo's jaw", ()),
     "force_limit": Show(
         "squeezes of growing strength, as fast steps",
         ((23.8, JUMP, 0.5), (22.5, JUMP, 0.5), (21, JUMP, 0.6), (19, JUMP, 0.6), (26, JUMP, 0.4)),
@@ -89,6 +116,8 @@ _PLANS = {
     ),
     "object_friction": _OFF_CENTRE,
     "force_crosstalk": _OFF_CENTRE,
+    "swapped_forces": _OFF_CENTRE,
+    "object_size": Show("a squeeze, a hold, a release", ((25.8, 0.02, 0.2), (22, 0.01, 0.6), (26.5, 0.01, 0.2))),
     "force_hysteresis": Show(
         "the same squeeze and release at two speeds",
         ((25, 0.03, 0.1), (21, 0.012, 0.08), (25.2, 0.012, 0.2), (21, 0.003, 0.08), (25.2, 0.003, 0.2)),
@@ -141,6 +170,9 @@ def simulate(effect: type[Effect], show: Show) -> tuple[np.ndarray, np.ndarray, 
 
 def draw(effect: type[Effect], path: Path) -> None:
     """Draws base against effect: positions, forces, and their difference in units of sensor noise."""
+    if effect.servo_only:
+        draw_servo(effect, path)
+        return
     import matplotlib
 
     matplotlib.use("Agg")
@@ -178,6 +210,40 @@ def draw(effect: type[Effect], path: Path) -> None:
     Image.open(path).convert("RGB").quantize(96).save(path, optimize=True)
 
 
+def draw_servo(effect: type[Effect], path: Path) -> None:
+    """Draws base against effect on a servo: position, and the difference of the two."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+    from PIL import Image
+
+    plant = Plant(load_gripper(_SERVO), 2, threads=1)
+    plant.attach([(effect(effect.typical_values()[None], plant.dt), np.array([1]))])
+    plant.reset(np.arange(2), np.zeros(2))
+    command, read = np.repeat(_SERVO_STEPS, 250), []
+    for target in command:
+        plant.advance(np.full((2, 1), target))
+        read.append(plant.measured_position[:, 0])
+    time, position = plant.dt * np.arange(1, len(read) + 1), np.array(read)
+    figure, (top, bottom) = plt.subplots(
+        2, 1, sharex=True, figsize=(9, 4.6), height_ratios=(3, 1.6), constrained_layout=True
+    )
+    top.plot(time, command, "k:", lw=1, label="command")
+    top.plot(time, position[:, 0], color="0.6", lw=2.4, label="base model")
+    top.plot(time, position[:, 1], color="tab:red", lw=1.3, label=f"with {effect.name}")
+    bottom.plot(time, position[:, 1] - position[:, 0], "tab:green", label="difference")
+    for ax, text in ((top, "position [rad]"), (bottom, "difference [rad]")):
+        ax.set_ylabel(text)
+        ax.grid(alpha=0.3)
+    bottom.set_xlabel("time [s]")
+    handles = [*top.get_lines(), *bottom.get_lines()]
+    figure.legend(handles=handles, loc="outside upper center", ncol=len(handles), frameon=False)
+    figure.savefig(path, dpi=85)
+    plt.close(figure)
+    Image.open(path).convert("RGB").quantize(96).save(path, optimize=True)
+
+
 def size(effect: type[Effect]) -> str:
     """The typical size in words."""
     return ", ".join(f"{p.name} = {p.typical:g}{'' if p.unit == '1' else ' ' + p.unit}" for p in effect.parameters)
@@ -199,7 +265,7 @@ def page(effect: type[Effect]) -> str:
         "",
         f"    {effect.formula}",
         "",
-        f"Stage: {effect.stage}. Source: {effect.source}.",
+        f"Family: {effect.family}. Stage: {effect.stage}. Source: {effect.source}.",
         "",
         "| parameter | meaning | unit | bounds | typical | not there at |",
         "|---|---|---|---|---|---|",
@@ -207,6 +273,9 @@ def page(effect: type[Effect]) -> str:
     for p in effect.parameters:
         null = "any" if p.null == p.typical else f"{p.null:g}"
         lines.append(f"| `{p.name}` | {p.doc} | {p.unit} | {p.low:g} to {p.high:g} | {p.typical:g} | {null} |")
+    for nested in effect.contains:
+        at = ", ".join(f"`{name}` = {value:g}" for name, value in nested.at.items())
+        lines += ["", f"At {at} it is [{nested.effect}]({nested.effect}.md)."]
     if effect.look_alikes:
         lines += ["", "## What looks like it", ""]
         lines += [f"- [{name}]({name}.md): {get_effect(name).symptom}" for name in effect.look_alikes]
@@ -226,11 +295,12 @@ def index() -> str:
         "These pages are made by `python tools/effect_pages.py`.",
     ]
     for stage in STAGES:
-        lines += ["", f"## {stage.capitalize()}", "", "| effect | you see | looks like |", "|---|---|---|"]
+        lines += ["", f"## {stage.capitalize()}", "", "| effect | family | you see | looks like |", "|---|---|---|---|"]
         for effect in catalogue().values():
             if effect.stage == stage:
                 alike = ", ".join(f"[{name}]({name}.md)" for name in effect.look_alikes)
-                lines.append(f"| [{effect.name}]({effect.name}.md) | {effect.symptom} | {alike} |")
+                cells = (f"[{effect.name}]({effect.name}.md)", effect.family, effect.symptom, alike)
+                lines.append("| " + " | ".join(cells) + " |")
     return "\n".join(lines) + "\n"
 
 

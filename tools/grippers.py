@@ -128,10 +128,13 @@ def hidden_in(gripper: str) -> list[str]:
 
 
 def jobs(grippers: list[str], sets: int, plain: int) -> Iterator[tuple[str, str, int]]:
-    """Gripper, what is hidden, and seed of each set."""
-    for gripper in grippers:
-        yield from ((gripper, NOTHING, seed) for seed in range(1, plain + 1))
-        yield from ((gripper, effect, seed) for effect in hidden_in(gripper) for seed in range(1, sets + 1))
+    """Gripper, what is hidden, and seed of each set: some of all first, so that a stopped campaign says of each."""
+    for seed in range(1, max(sets, plain) + 1):
+        for gripper in grippers:
+            if seed <= plain:
+                yield gripper, NOTHING, seed
+            if seed <= sets:
+                yield from ((gripper, effect, seed) for effect in hidden_in(gripper))
 
 
 def diagnose(grippers: list[str], sets: int, plain: int, grasps: int, folder: Path) -> None:

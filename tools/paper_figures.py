@@ -22,7 +22,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Rectangle
-from real_table import FORCE_N
+from real_table import FORCE_N, SECOND
 
 from forcegrasp.calibration import (
     closing_speed,
@@ -100,7 +100,7 @@ def stiffness() -> Drawn:
     """Appendix, comparison of final forces: regression of f(T) on Δq, and the f_α that matches the robot's slopes."""
     stairs, scales = staircase(KAPPAS), default_gripper().training.force_scale(KAPPAS)
     unit = staircase(values={"force_scale": 1.0}).slopes[0].n_per_m
-    robot = {name: (stairs.delta_m, FORCE_N[name], slope) for name, slope in PAPER_SLOPES_N_M.items()}
+    robot = {name: (stairs.delta_m, FORCE_N[SECOND, name], slope) for name, slope in PAPER_SLOPES_N_M.items()}
     figure = draw_staircase(
         stairs, [f"κ = {k:g}, $f_\\alpha$ = {a:g}" for k, a in zip(KAPPAS, scales, strict=True)], robot
     )

@@ -13,7 +13,7 @@ from types import FrameType
 from mujoco.batch import Batch
 
 from forcegrasp.cli.measuring import refuse_table
-from forcegrasp.diagnosis import search, signatures
+from forcegrasp.diagnosis import signatures, step
 from forcegrasp.diagnosis.diagnose_set import diagnose_set
 from forcegrasp.diagnosis.refine import refine
 from forcegrasp.identify.base_fit import fit_base
@@ -29,7 +29,7 @@ PARTS = {
     signatures.Signatures.simulate.__code__: "signatures of all effects",
     signatures.best_sizes.__code__: "sizes around the best signatures",
     refine.__code__: "rough fits with one more effect",
-    search._Start.refine_on_reference_tier.__code__: "fits of the best ones to the end",
+    step._Start.refine_on_reference_tier.__code__: "fits of the best ones to the end",
 }
 
 

@@ -173,7 +173,7 @@ class DiagnoseResult(Result):
 
     @property
     def verdict(self) -> Verdict:
-        """One of "effect", "one_of", "explained", "unknown" and "not_fitted"."""
+        """One of "effect", "one_of", "data", "explained", "unknown" and "not_fitted"."""
         return self.diagnosis.verdict
 
     @property
@@ -220,7 +220,7 @@ class DiagnoseResult(Result):
 
     def models(self) -> dict[str, Model]:
         base = {measuring.BASE_MODEL: self._base_model} if self.from_base else {}
-        return base | ({"model.yaml": self.model} if self.verdict.names_effects else {})
+        return base | ({"model.yaml": self.model} if self.verdict.lacks_effects else {})
 
     def summary(self) -> str:
         found = f"{self.verdict} {some(self.effects)}".strip()

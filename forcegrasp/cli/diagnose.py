@@ -15,8 +15,9 @@ NOTES = """
   model=FILE       what forcegrasp fit or add wrote; its parameters are fitted again
   'effects=[A,B]'  see forcegrasp effects
 
-  The verdict is one of: effect (one or several, in the order found), one_of (these data can't tell which), explained
-  (nothing is missing), unknown (none of the effects), not_fitted (the base model can't be fitted to these data).
+  The verdict is one of: effect (one or several, in the order found), one_of (these data can't tell which), data (the
+  set seems to be wrong, not the model), explained (nothing is missing), unknown (none of the effects), not_fitted (the
+  base model can't be fitted to these data).
   Beside the report, base_model.yaml holds the base model that was fitted, if none is given; if effects are found,
   model.yaml holds the model with all of them (with one_of: with the first).
 """
@@ -65,8 +66,9 @@ def run(config: DiagnoseConfig) -> None:
     if model is None:
         write_model(base_model(diagnosis.base, diagnosis.target, loaded), out / BASE_MODEL)
         print(f"wrote {known}: the base model, fitted to this set")
-    if diagnosis.verdict.names_effects:
-        print(f"add it: forcegrasp add data={data} model={known} effect={diagnosis.effects[0]} out=better.yaml")
+    if diagnosis.verdict.lacks_effects:
+        first = next(iter(diagnosis.shares()), diagnosis.effects[0])  # rounding is in the noise already
+        print(f"add it: forcegrasp add data={data} model={known} effect={first} out=better.yaml")
         better = model_of(diagnosis.fit, diagnosis.target, loaded, diagnosis.numerical)
         write_model(better, out / "model.yaml")
         print(f"or take the model with {', '.join(e.effect.name for e in better.effects)}: {out / 'model.yaml'}")

@@ -12,10 +12,10 @@ from forcegrasp.errors import ConfigError, closest
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from forcegrasp.effects import Effect, Parameter
+    from forcegrasp.effects import Effect, Nested, Parameter
 
 NOTES = """
-  without a name   every effect by stage: symptom, and parameters with unit, bounds and a size worth noticing
+  without a name   every effect by stage: family, symptom, and parameters with unit, bounds and a size worth noticing
   NAME             one in full: formula, source, variants, what looks like it, and what separates them
   gripper=GRIPPER  as that gripper has them, by name or the path of a description: as many parameters as it has motors
                    or force readings, in its units, with its sizes; without it those of the catalogue
@@ -48,20 +48,19 @@ def run(arguments: list[str]) -> None:
     if not given:
         print(in_full(get_effect(names[0])) if names else overview(catalogue().values()), end="")
         return
-    from forcegrasp.effects.for_gripper import effect_of, effects_of
+    from forcegrasp.effects.for_gripper import effect_of, effects_of, why_left_out
     from forcegrasp.physics import load_gripper
 
     gripper = load_gripper(given[0])
     if names:
         print(in_full(effect_of(names[0], gripper)), end="")
         return
-    known = effects_of(gripper)
-    left_out = ", ".join(name for name in catalogue() if name not in known)
-    print(overview(known.values()), end="")
-    if left_out:
-        print(
-            f"Left out, as they need more force readings than {gripper.name} has ({len(gripper.forces)}): {left_out}."
-        )
+    print(overview(effects_of(gripper).values()), end="")
+    left_out: dict[str, list[str]] = {}
+    for effect in catalogue().values():
+        left_out.setdefault(why_left_out(effect, gripper), []).append(effect.name)
+    for why in filter(None, left_out):
+        print(*textwrap.wrap(f"Left out: {', '.join(left_out[why])}. Each {why}.", WIDTH), sep="\n")
 
 
 def overview(effects: Iterable[type[Effect]]) -> str:
@@ -73,7 +72,7 @@ def overview(effects: Iterable[type[Effect]]) -> str:
         lines += ["", stage] if lines else [stage]
         for effect in effects:
             if effect.stage == stage:
-                lines += ["", f"  {effect.name}", *_wrapped(effect.symptom)]
+                lines += ["", f"  {effect.name}", *_wrapped(f"{effect.family}: {effect.symptom}")]
                 lines += [_parameter(p) for p in effect.parameters]
     return "\n".join([*lines, "", "forcegrasp effects NAME explains one of them.", ""])
 
@@ -87,12 +86,14 @@ def in_full(effect: type[Effect]) -> str:
         lines += [*_wrapped(" ".join(rest.split()), indent=2), ""]
     rows = [
         ("stage", effect.stage),
+        ("family", effect.family),
         ("symptom", effect.symptom),
         ("formula", effect.formula),
         ("source", effect.source),
         ("variants", ", ".join(filter(None, effect.variants))),
         ("looks like", ", ".join(effect.look_alikes)),
         ("separated by", effect.separates),
+        ("contains", "; ".join(map(contained, effect.contains))),
     ]
     for title, text in rows:
         if text:
@@ -101,6 +102,11 @@ def in_full(effect: type[Effect]) -> str:
     if effect.parameters:
         lines += ["", "parameters", *(_parameter(p, indent=2) for p in effect.parameters)]
     return "\n".join(lines) + "\n"
+
+
+def contained(nested: Nested) -> str:
+    """A simpler effect that an effect is at certain values, in words."""
+    return f"{nested.effect}, at " + ", ".join(f"{name} = {value:g}" for name, value in nested.at.items())
 
 
 def _parameter(p: Parameter, indent: int = 4) -> str:

@@ -13,7 +13,7 @@ NOTES = """
   SOURCE           a file, or a folder of recordings; each recording is an episode of the set
   format=sage|bam|emps|dfki|pace|lerobot
                    how it is written; each has a mechanism, the model that it is compared with, except pace
-  map=FILE         for any CSV or Parquet: which column is what, in which unit; see docs/servos.md
+  map=FILE         for any CSV, Parquet or ROS bag: which column is what, in which unit; see docs/servos.md
   'joints=[Jaw]'   which joint, where a log has several
 """
 
@@ -38,10 +38,12 @@ def run(config: ImportConfig) -> None:
     name = config.mechanism or (FORMATS[form].MECHANISM if form else "")
     if not name:
         raise ConfigError("mechanism: what was recorded? Give the name of a shipped one, or a description's path")
-    measured = as_set(recordings, load_gripper(name), ", ".join(config.source), config.license)
+    mechanism = load_gripper(name)
+    measured = as_set(recordings, mechanism, ", ".join(config.source), config.license)
     for note in dict.fromkeys(note for one in recordings for note in one.notes):
         print(f"note: {note}")
-    check_servo(measured)
+    for warning in check_servo(measured, [motor.stroke for motor in mechanism.motors], mechanism.unsigned):
+        print(f"warning: {warning}")
     write_servo_set(measured, out)
     samples = sum(len(one.time_s) for one in measured.grasps)
     print(f"wrote {out}: {len(measured.grasps)} recordings, {samples:,} samples of {name}")

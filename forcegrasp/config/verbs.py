@@ -101,7 +101,7 @@ class ImportConfig:
         "how the recordings are written; map: as the file of map= says",
         choices=("map", "sage", "bam", "emps", "dfki", "pace", "lerobot"),
     )
-    map: str = option("", "file that says which column is what, for any other CSV or Parquet")
+    map: str = option("", "file that says which column is what, for any other CSV, Parquet or ROS bag")
     joints: list[str] = option([], "joints to take; all that there are if empty")
     mechanism: str = option("", "what was recorded, by name or description; that of the format if empty")
     license: str = option("", "on what terms the data may be used")

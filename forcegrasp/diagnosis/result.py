@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from forcegrasp.diagnosis.noise_check import Noise
+from forcegrasp.diagnosis.odd_grasps import OddGrasp
 from forcegrasp.diagnosis.signatures import Score
 from forcegrasp.diagnosis.verdict import explained_share
 from forcegrasp.effects import Effect
@@ -34,6 +36,7 @@ class Candidate(ShortRepr):
     share: float  #: share of the mean square beyond the noise that it explains
     largest_fall: float  #: largest share by which the error of a signal in a phase falls
     signature: np.ndarray  #: unit vector, ``(N,)``
+    replaces: str = ""  #: the effect that it contains and takes the place of, if one is in the model
 
     def summary(self) -> str:
         sizes = some(f"{name} {value:.3g}" for name, value in self.parameters().items())
@@ -65,6 +68,11 @@ class Step(ShortRepr):
     error_after: float
 
     @property
+    def replaces(self) -> str:
+        """The effect of an earlier step that this one's contains, and takes the place of."""
+        return self.candidates[0].replaces if self.effects and self.candidates else ""
+
+    @property
     def verdict(self) -> Verdict | None:
         """Whether one effect was found or several that can't be told apart; None if there is none."""
         if not self.effects:
@@ -83,6 +91,12 @@ class Step(ShortRepr):
         )
 
 
+def kept_steps(steps: Sequence[Step]) -> list[Step]:
+    """The steps that found something that no later step put something richer in place of."""
+    replaced = {step.replaces for step in steps}
+    return [step for step in steps if step.effects and step.effects[0] not in replaced]
+
+
 @dataclass(frozen=True, repr=False)
 class Diagnosis(ShortRepr):
     """What the data say that the model lacks."""
@@ -99,18 +113,32 @@ class Diagnosis(ShortRepr):
     numerical: tuple[np.ndarray, ...] = field(default=())  #: of the final fit, each ``(G, S, C)``
     floor: float = 1.0  #: error that sensor noise and the model's own numerical error leave
     left: str = ""  #: where there is more than that, in words; empty if nowhere
+    odd: tuple[OddGrasp, ...] = ()  #: grasps that a fit of all others misses by far
     noise: Noise | None = None  #: what the noise is, if the residuals show that it is not as assumed
 
     @property
     def preferred(self) -> tuple[str, ...]:
         """The effects that were found and are in the final model: of those that can't be told apart the first."""
-        return tuple(step.effects[0] for step in self.steps if step.effects)
+        return tuple(step.effects[0] for step in kept_steps(self.steps))
 
     @property
     def explained(self) -> float:
         """Share of the held-out mean square beyond the noise that the effects found explain."""
         noise = self.error_after if self.noise is not None and not self.left else 1.0
         return float(np.clip(explained_share(self.error_before, self.error_after, noise), 0.0, 1.0))
+
+    def shares(self) -> dict[str, float]:
+        """Share of the held-out mean square beyond the noise that each effect of the final model explains.
+
+        An effect that took the place of one that it contains has that one's share, too. Rounding is part of the noise.
+        """
+        shares: dict[str, float] = {}
+        found = [step for step in self.steps if step.effects and not step.is_counted]
+        beyond = max(found[0].error_before ** 2 - 1.0, 1e-9) if found else 1.0
+        for step in found:
+            fall = (step.error_before**2 - step.error_after**2) / beyond
+            shares[step.effects[0]] = float(fall) + shares.pop(step.replaces, 0.0)
+        return shares
 
     def summary(self) -> str:
         change = f"error {self.error_before:.2f} → {self.error_after:.2f} × noise, floor {self.floor:.2f}"

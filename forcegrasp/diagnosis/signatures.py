@@ -31,10 +31,18 @@ class Score(ShortRepr):
 
 
 class Background:
-    """Directions that no effect gets credit for: the fitted parameters, and the model's own numerical error."""
+    """Directions that no effect gets credit for: the fitted parameters, and the model's own numerical error.
 
-    def __init__(self, fit: Fit, numerical: Sequence[np.ndarray]) -> None:
-        columns = [fit.jacobian.reshape(-1, len(fit.problem)), *(n.reshape(-1, 1) for n in numerical)]
+    Args:
+      fit: whose parameters count.
+      numerical: errors of the model, each ``(G, S, C)``.
+      without: index of a parameter that does not count.
+    """
+
+    def __init__(self, fit: Fit, numerical: Sequence[np.ndarray], without: int | None = None) -> None:
+        slopes = fit.jacobian.reshape(-1, len(fit.problem))
+        slopes = slopes if without is None else np.delete(slopes, without, axis=1)
+        columns = [slopes, *(n.reshape(-1, 1) for n in numerical)]
         matrix = np.concatenate(columns, axis=1)
         norms = np.linalg.norm(matrix, axis=0)
         left, singular, _ = np.linalg.svd(matrix[:, norms > 0] / norms[norms > 0], full_matrices=False)
@@ -79,6 +87,8 @@ class Signatures:
           For each effect and variant all its trials' scores, best first; effects that leave no trace are missing.
         """
         residual, tried = fit.residual.ravel(), self._trials(effects)
+        if not tried:
+            return []
         change = np.stack([self._changes[trial] for trial in tried], axis=1)
         clean = background.remove(change)
         found: dict[tuple[type[Effect], str], list[Score]] = {}

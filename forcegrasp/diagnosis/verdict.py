@@ -25,7 +25,9 @@ def explained_share(before: float, after: float, noise: float = 1.0) -> float:
     return (before**2 - after**2) / max(before**2 - noise**2, 1e-9)
 
 
-def conclude(found: Sequence[Verdict], before: float, after: float, floor: float, left: bool) -> Verdict:
+def conclude(
+    found: Sequence[Verdict], before: float, after: float, floor: float, left: bool, only_of_set: bool = False
+) -> Verdict:
     """The verdict: that of the weakest step, if what was found explains enough.
 
     Args:
@@ -34,10 +36,13 @@ def conclude(found: Sequence[Verdict], before: float, after: float, floor: float
       after: the same with them.
       floor: what noise and the simulation's own error leave.
       left: whether something is left that is neither.
+      only_of_set: whether all that was found is of the set, and not of the gripper.
     """
     if not found:
         return Verdict.UNKNOWN if left else Verdict.EXPLAINED
     enough = EXPLAINED_FAR if after > FAR * floor else EXPLAINED
     if left and explained_share(before, after) < enough:
         return Verdict.UNKNOWN
-    return Verdict.ONE_OF if Verdict.ONE_OF in found else Verdict.EFFECT
+    if Verdict.ONE_OF in found:
+        return Verdict.ONE_OF
+    return Verdict.DATA if only_of_set else Verdict.EFFECT

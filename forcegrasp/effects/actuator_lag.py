@@ -12,6 +12,7 @@ class ActuatorLag(Effect):
 
     name = "actuator_lag"
     stage = "actuator"
+    family = "delay"
     symptom = "like a delay, but rounded: steps in the command arrive as exponentials"
     formula = "τ du'/dt = u − u'"
     source = "first-order lag; MuJoCo's `dyntype=filterexact` does the same for one value per model"
@@ -20,7 +21,7 @@ class ActuatorLag(Effect):
     parameters = (Parameter("time_constant_s", "time constant τ", "s", 0.0, 0.5, 0.05, trials=(0.01, 0.04, 0.12)),)
 
     def init(self, which: np.ndarray) -> State:
-        return {"held": self.position[which]}
+        return {"held": self.resting_command[which]}
 
     def command(self, command: np.ndarray, fresh: np.ndarray) -> np.ndarray:
         held, weight = self.state["held"], first_order_weight(self.dt, self["time_constant_s"])

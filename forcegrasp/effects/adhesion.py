@@ -13,6 +13,7 @@ class Adhesion(Effect):
 
     name = "adhesion"
     stage = "contact"
+    family = "contact"
     needs_object = True
     symptom = "negative force at light touches and at release; the pad lets go late"
     formula = "F = F_contact − F_a while in contact, −F_a max(0, 1 − gap / d) after it"

@@ -17,10 +17,11 @@ class Backlash(Effect):
 
     name = "backlash"
     stage = "transmission"
+    family = "lost motion"
     symptom = "motion is lost after each reversal, however small the load; contact comes late"
     formula = "p ← clip(p, m − g/2, m + g/2)"
     source = "play operator (Krasnosel'skii and Pokrovskii 1989)"
-    look_alikes = ("force_deadzone", "adhesion", "coulomb_friction")
+    look_alikes = ("force_deadzone", "adhesion", "coulomb_friction", "elastic_transmission")
     separates = "pauses, reversals and partial releases in contact, at several speeds"
     parameters = (
         Parameter(
@@ -28,6 +29,7 @@ class Backlash(Effect):
         ),
     )
     variants = ("play", "loose", "command")
+    variant_needs = {"play": "pads", "loose": "pads", "command": "position loop"}  # noqa: RUF012 never changed
 
     def init(self, which: np.ndarray) -> State:
         return {"pad": self.position[which]}

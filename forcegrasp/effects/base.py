@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -28,9 +29,20 @@ class Parameter:
     null: float = 0.0  #: value at which the effect is not there at all; may be infinite
     logarithmic: bool = False  #: fitted by its logarithm
     trials: tuple[float, ...] = ()  #: sizes that a diagnosis tries
-    #: What its sizes are proportional to, from gripper to gripper: the motors' "position" or "effort", a contact's
-    #: "force", or its inverse, "compliance"; empty if they are alike for all.
+    #: What its sizes are proportional to, from gripper to gripper: the motors' "position", "effort" or "damping",
+    #: a contact's "force", or its inverse, "compliance"; empty if they are alike for all.
     follows: str = ""
+    #: Value in model files that were written before the parameter existed; None: files must have it.
+    if_missing: float | None = None
+
+
+@dataclass(frozen=True)
+class Nested:
+    """A simpler effect that an effect is at certain values of its parameters."""
+
+    effect: str
+    at: Mapping[str, float]  #: parameters of the richer effect, and the values at which it is the simpler one
+    same: Mapping[str, str]  #: parameters of the richer effect, and what the simpler one calls them
 
 
 class Effect:
@@ -53,6 +65,9 @@ class Effect:
 
     name: ClassVar[str]
     stage: ClassVar[str]
+    family: ClassVar[str] = "other"  #: what kind of thing it is, in plain words, such as friction or delay
+    #: Simpler effects that it is a generalisation of; names of parameters are those of the catalogue.
+    contains: ClassVar[tuple[Nested, ...]] = ()
     symptom: ClassVar[str]  #: what a user sees
     formula: ClassVar[str]
     source: ClassVar[str]
@@ -61,6 +76,8 @@ class Effect:
     parameters: ClassVar[tuple[Parameter, ...]]
     #: Ways in which the effect is known to occur; a diagnosis tries each under the one name.
     variants: ClassVar[tuple[str, ...]] = ("",)
+    #: What a variant needs, if it is "pads", or "position loop" where efforts may be commanded; see for_gripper.
+    variant_needs: ClassVar[Mapping[str, str]] = {}
     #: Position among the effects of the same stage; smaller acts first.
     order: ClassVar[int] = 0
     #: "motor" or "channel" if there is a parameter for each of them, left and right; `alone` stands for these words in
@@ -68,12 +85,16 @@ class Effect:
     per: ClassVar[str] = ""
     alone: ClassVar[str] = ""
     after_noise: ClassVar[bool] = False  #: acts on readings with their noise, as rounding does
+    of_set: ClassVar[bool] = False  #: not of the gripper: what the measurement set says is wrong
     needs_object: ClassVar[bool] = False  #: shows only where fingers press on something
+    servo_only: ClassVar[bool] = False  #: of drives alone; where fingers grasp, another effect has its part
+    needs_position_loop: ClassVar[bool] = False  #: has no meaning where efforts are commanded
+    base_parameter: ClassVar[str] = ""  #: one that says the same; where a gripper has it, the effect is left out
     least_channels: ClassVar[int] = 0  #: force readings that the gripper must have for it to make a difference
     # of the gripper, see for_gripper
     motors: ClassVar[int] = 2
     channels: ClassVar[int] = 2
-    position_scale: ClassVar[float] = 1.0
+    commands_effort: ClassVar[bool] = False
 
     plant: Plant  #: what it acts on, once attached
 
@@ -118,6 +139,11 @@ class Effect:
         return self.plant.position[self.rows]
 
     @property
+    def resting_command(self) -> np.ndarray:
+        """What is commanded where motors rest, ``(rows, motors)``: their positions, or no effort."""
+        return np.zeros_like(self.position) if self.commands_effort else self.position
+
+    @property
     def encoder(self) -> np.ndarray:
         """What the gripper's own driver reads as positions, m or rad, ``(rows, motors)``; as recorded, if it was."""
         known = self.plant.recorded_position
@@ -151,8 +177,12 @@ class Effect:
         """Commanded positions on their way to the motors, m or rad. ``fresh`` ``(rows,)``: this is a new command."""
         return command
 
+    def motor_range(self, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Least and largest force that the motors may give in this step, N or N·m, ``(rows, motors)``."""
+        return low, high
+
     def act(self) -> Contribution:
-        """What it adds to this step: friction of the motors, a shift of the pads, forces."""
+        """What it adds to this step: friction of the motors, forces on them, a shift of the pads."""
         return Contribution()
 
     def interaction(self, force: np.ndarray) -> np.ndarray:
@@ -197,7 +227,7 @@ class Effect:
     @classmethod
     def hooks(cls) -> set[str]:
         """Names of the hooks that this effect overrides."""
-        names = ("change_model", "command", "act", "interaction", "read_force", "read_position")
+        names = ("change_model", "command", "motor_range", "act", "interaction", "read_force", "read_position")
         return {name for name in names if getattr(cls, name) is not getattr(Effect, name)}
 
     @classmethod

@@ -16,10 +16,12 @@ class CommandDeadband(Effect):
 
     name = "command_deadband"
     stage = "command"
+    family = "lost motion"
+    needs_position_loop = True
     symptom = "small position deltas do nothing; slow ramps become stairs"
     formula = "u' = u if |u − q| > b (position) or |u − u'| > b (held), else u' stays"
     source = "TIAGo's driver sends no command when |q_des − q| ≤ 0.3 mm (authors' code)"
-    look_alikes = ("backlash", "stiction")
+    look_alikes = ("backlash", "stiction", "position_deadband")
     separates = "slow ramps with small increments: stairs follow the commands and not the force"
     parameters = (
         Parameter(

@@ -12,17 +12,18 @@ class CommandDelay(Effect):
 
     name = "command_delay"
     stage = "command"
+    family = "delay"
     symptom = "all motion is shifted in time alike, in free air and in contact"
     formula = "u'(t) = u(t − d)"
     source = "dead time; MuJoCo's actuator `delay` does the same for one value per model"
-    look_alikes = ("actuator_lag", "force_delay")
+    look_alikes = ("actuator_lag", "force_delay", "readout_skew")
     separates = "fast steps: a delayed response keeps its corner, a lagged one is rounded"
     parameters = (Parameter("delay_s", "time until a command acts", "s", 0.0, 0.4, 0.06, trials=(0.015, 0.05, 0.12)),)
     order = 1  # after a dead band, which is the driver's
 
     def init(self, which: np.ndarray) -> State:
         steps = self["delay_s"][which, 0] / self.dt
-        return delay_line(self.position[which], steps, self.longest("delay_s") / self.dt)
+        return delay_line(self.resting_command[which], steps, self.longest("delay_s") / self.dt)
 
     def command(self, command: np.ndarray, fresh: np.ndarray) -> np.ndarray:
         return delayed(self.state, command)

@@ -15,16 +15,18 @@ class EncoderBias(Effect):
 
     name = "encoder_bias"
     stage = "sensor"
+    family = "offset"
     symptom = "positions are off by a constant, in free air and in contact"
     formula = "q' = q + b, per finger"
     source = "homing error"
-    look_alikes = ("coulomb_friction", "finger_compliance")
-    separates = "approaching one command from both sides: a bias does not flip"
+    look_alikes = ("coulomb_friction", "finger_compliance", "motor_offset")
+    separates = "approaching one command from both sides: a bias does not flip; a harder servo: a bias stays as it is"
     parameters = (
         Parameter("left_m", "offset of the left encoder", "m", -0.01, 0.01, 0.0003, follows="position"),
         Parameter("right_m", "offset of the right encoder", "m", -0.01, 0.01, -0.0002, follows="position"),
     )
     variants = ("reading", "loop")
+    variant_needs = {"loop": "position loop"}  # noqa: RUF012 never changed
     order = 9
     per, alone = "motor", "offset"
 

@@ -15,6 +15,7 @@ class FingerCompliance(Effect):
 
     name = "finger_compliance"
     stage = "transmission"
+    family = "elasticity"
     needs_object = True
     symptom = "the encoder runs ahead of the pad by an amount that grows with the force"
     formula = "p = m + c F_pad"

@@ -21,7 +21,8 @@ class _Traits:
 
     motors: int
     channels: int
-    grasps: bool  #: it has fingers
+    pads: bool  #: it has fingers
+    commands_effort: bool
     turns: bool  #: its motors turn instead of sliding
     position: float  #: factors of sizes, see :class:`~forcegrasp.physics.gripper.Gripper`
     effort: float
@@ -34,17 +35,31 @@ class _Traits:
         turns, force = gripper.unit == "rad", gripper.force_scale
         effort = force * (float(sum(travel)) if travel and not gripper.is_direct else 1.0)
         motors, channels = len(gripper.motors), len(gripper.forces)
-        return cls(motors, channels, not gripper.is_servo, turns, gripper.position_scale, effort, force)
+        kind = not gripper.is_servo, gripper.command != "position", turns
+        return cls(motors, channels, *kind, gripper.position_scale, effort, force)
 
 
 def effects_of(gripper: Gripper) -> dict[str, type[Effect]]:
     """Effects that can show on a gripper, by name, in the order in which they act."""
     traits = _Traits.of(gripper)
-    return {
-        name: _adapt(effect, traits)
-        for name, effect in catalogue().items()
-        if effect.least_channels <= traits.channels and (traits.grasps or not effect.needs_object)
-    }
+    return {name: _adapt(effect, traits) for name, effect in catalogue().items() if not why_left_out(effect, gripper)}
+
+
+def why_left_out(effect: type[Effect], gripper: Gripper) -> str:
+    """Why an effect can't show on a gripper; empty if it can."""
+    if effect.needs_object and gripper.is_servo:
+        return f"is one of grasped objects; {gripper.name} grasps nothing"
+    if effect.servo_only and not gripper.is_servo:
+        return f"is one of servos alone; {gripper.name} has fingers"
+    if effect.needs_position_loop and gripper.command != "position":
+        return f"needs positions that are commanded; of {gripper.name} it is the effort"
+    if effect.base_parameter in gripper.parameters:
+        return f"is the base parameter {effect.base_parameter} of {gripper.name}"
+    if effect.least_channels > len(gripper.forces):
+        return f"needs {effect.least_channels} force readings; {gripper.name} has {len(gripper.forces)}"
+    if not _variants(effect, _Traits.of(gripper)):
+        return f"needs pads, or positions that are commanded; {gripper.name} has neither"
+    return ""
 
 
 def effect_of(name: str, gripper: Gripper) -> type[Effect]:
@@ -56,19 +71,25 @@ def effect_of(name: str, gripper: Gripper) -> type[Effect]:
     known = effects_of(gripper) | {NoEffect.name: NoEffect}
     if name in known:
         return known[name]
-    if name in catalogue() and catalogue()[name].needs_object and gripper.is_servo:
-        raise ConfigError(f"effect {name}: is one of grasped objects; {gripper.name} grasps nothing")
     if name in catalogue():
-        need = catalogue()[name].least_channels
-        raise ConfigError(f"effect {name}: needs {need} force readings; {gripper.name} has {len(gripper.forces)}")
+        raise ConfigError(f"effect {name}: {why_left_out(catalogue()[name], gripper)}")
     raise ConfigError(f"effect {name}: no such effect{closest(name, known)}")
+
+
+def _variants(effect: type[Effect], traits: _Traits) -> tuple[str, ...]:
+    """The variants that can show."""
+    there = {"": True, "pads": traits.pads, "position loop": not traits.commands_effort}
+    return tuple(v for v in effect.variants if there[effect.variant_needs.get(v, "")])
 
 
 @functools.cache
 def _adapt(effect: type[Effect], traits: _Traits) -> type[Effect]:
-    if traits == _Traits(2, 2, True, False, 1.0, 1.0, 1.0):
+    if traits == _Traits(2, 2, True, False, False, 1.0, 1.0, 1.0):
         return effect
-    count = {"motor": traits.motors, "channel": traits.channels}.get(effect.per, len(effect.parameters))
+    each = {"motor": traits.motors, "channel": traits.channels}
+    if not traits.pads:  # joints of a mechanism have no left and right: what an effect does to them is alike
+        each = {what: min(1, count) for what, count in each.items()}
+    count = each.get(effect.per, len(effect.parameters))
     factors = np.array([_factor(p, traits) for p in effect.parameters[:count]])
     parameters = tuple(
         _rename(p, float(f), effect, traits, alone=bool(effect.per) and count == 1)
@@ -87,26 +108,31 @@ def _adapt(effect: type[Effect], traits: _Traits) -> type[Effect]:
 
     return type(effect.__name__, (effect,), {
         "__doc__": effect.__doc__, "__module__": effect.__module__, "parameters": parameters,
-        "motors": traits.motors, "channels": traits.channels, "position_scale": traits.position,
+        "motors": traits.motors, "channels": traits.channels, "commands_effort": traits.commands_effort,
+        "variants": _variants(effect, traits),
         "trials": classmethod(trials), "index": classmethod(index),
     })  # fmt: skip
 
 
 def _factor(parameter: Parameter, traits: _Traits) -> float:
     factors = {"position": traits.position, "effort": traits.effort, "force": traits.force, "": 1.0}
-    return 1 / traits.force if parameter.follows == "compliance" else factors[parameter.follows]
+    factors |= {"compliance": 1 / traits.force, "damping": traits.effort / traits.position}
+    return factors[parameter.follows]
 
 
 def _rename(parameter: Parameter, factor: float, effect: type[Effect], traits: _Traits, alone: bool) -> Parameter:
     name, unit = parameter.name, parameter.unit
-    if traits.turns and parameter.follows == "position":
+    if traits.turns and parameter.follows in ("position", "damping"):
         name, unit = name.replace("_m", "_rad"), unit.replace("m", "rad", 1)
-    if traits.turns and parameter.follows == "effort":
+    if traits.turns and parameter.follows in ("effort", "damping"):
         name, unit = name.replace("_n", "_nm").replace("force", "torque"), unit.replace("N", "N·m")
     if alone:
         name = name.replace("left", effect.alone)
     doc = parameter.doc.replace("the left ", "the ") if alone else parameter.doc
     sizes = {key: getattr(parameter, key) * factor for key in ("low", "high", "typical")}
     null = parameter.null if parameter.null in (0.0, np.inf) else parameter.null * factor
+    missing = None if parameter.if_missing is None else parameter.if_missing * factor
     trials = tuple(size * factor for size in parameter.trials)
-    return dataclasses.replace(parameter, name=name, unit=unit, doc=doc, null=null, trials=trials, **sizes)
+    return dataclasses.replace(
+        parameter, name=name, unit=unit, doc=doc, null=null, if_missing=missing, trials=trials, **sizes
+    )

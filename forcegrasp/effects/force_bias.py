@@ -12,6 +12,7 @@ class ForceBias(Effect):
 
     name = "force_bias"
     stage = "sensor"
+    family = "force sensor"
     symptom = "force is not zero in free air"
     formula = "f' = f + b, per finger"
     source = "sensor offset"

@@ -15,6 +15,7 @@ class ForceDeadzone(Effect):
 
     name = "force_deadzone"
     stage = "sensor"
+    family = "force sensor"
     symptom = "force stays 0 at a light touch"
     formula = "f' = sign(f) max(|f| − z, 0) (subtract), or f if |f| ≥ z else 0 (gate)"
     source = "preloaded tactile skins, thresholded drivers"

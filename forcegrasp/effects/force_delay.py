@@ -12,6 +12,7 @@ class ForceDelay(Effect):
 
     name = "force_delay"
     stage = "sensor"
+    family = "force sensor"
     symptom = "force is shifted in time against position"
     formula = "f'(t) = f(t − d)"
     source = "dead time; MuJoCo's sensor `delay` does the same for one value per model"

@@ -12,6 +12,7 @@ class ForceDrift(Effect):
 
     name = "force_drift"
     stage = "sensor"
+    family = "force sensor"
     symptom = "force in free air and in holds has a slope"
     formula = "f' = f + s t, per finger"
     source = "thermal drift of strain gauges"

@@ -15,6 +15,7 @@ class ForceHysteresis(Effect):
 
     name = "force_hysteresis"
     stage = "sensor"
+    family = "force sensor"
     symptom = "loading and unloading curves differ, at any speed"
     formula = "f₁ ← clip(f₁, f − w/2, f + w/2); f' ← max(f₁, min(f', (1 + h) f₁))"
     source = "play and generalised play operators (Krasnosel'skii and Pokrovskii 1989)"

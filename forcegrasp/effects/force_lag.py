@@ -12,6 +12,7 @@ class ForceLag(Effect):
 
     name = "force_lag"
     stage = "sensor"
+    family = "force sensor"
     symptom = "force is smoothed, position is not"
     formula = "τ df'/dt = f − f'"
     source = "first-order low-pass filter, at the physics rate"

@@ -13,10 +13,11 @@ class ForceLimit(Effect):
 
     name = "force_limit"
     stage = "actuator"
+    family = "drive limit"
     symptom = "force reaches a plateau whatever the command; fast motion is slower than modelled"
     formula = "|F_motor| ≤ F_max"
     source = "MuJoCo's actuator `forcerange`"
-    look_alikes = ("force_saturation", "rate_limit")
+    look_alikes = ("force_saturation", "rate_limit", "back_emf")
     separates = "the finger's position: a limited motor stops closing, a saturated sensor does not"
     parameters = (
         Parameter(

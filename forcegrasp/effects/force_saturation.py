@@ -12,6 +12,7 @@ class ForceSaturation(Effect):
 
     name = "force_saturation"
     stage = "sensor"
+    family = "force sensor"
     symptom = "force reaches a plateau at one value, for all objects alike, while the finger goes on closing"
     formula = "f' = clip(f, −F, F)"
     source = "range of the sensor or its amplifier"

@@ -10,6 +10,7 @@ class NoEffect(Effect):
 
     name = "none"
     stage = "sensor"
+    family = "none"
     symptom = "nothing but sensor noise is left"
     formula = "y = x"
     source = "null member of the catalogue"

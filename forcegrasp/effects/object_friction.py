@@ -13,6 +13,7 @@ class ObjectFriction(Effect):
 
     name = "object_friction"
     stage = "object"
+    family = "contact"
     needs_object = True
     symptom = "the second finger's force lags; off-centre grasps push the object less far"
     formula = "|F| ≤ F_t at rest, F = −F_t sign(v) in motion"

@@ -12,6 +12,7 @@ class Quantisation(Effect):
 
     name = "quantisation"
     stage = "sensor"
+    family = "resolution"
     symptom = "few distinct values"
     formula = "y' = s round(y / s)"
     source = "resolution of the converter"

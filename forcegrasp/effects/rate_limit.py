@@ -12,10 +12,12 @@ class RateLimit(Effect):
 
     name = "rate_limit"
     stage = "command"
+    family = "drive limit"
+    needs_position_loop = True
     symptom = "fast commands become ramps of one constant slope; slow ones are followed"
     formula = "|du'/dt| ≤ v"
     source = "slew limit of position drivers"
-    look_alikes = ("force_limit", "actuator_lag", "command_delay")
+    look_alikes = ("force_limit", "actuator_lag", "command_delay", "back_emf")
     separates = "steps of several sizes: the slope stays, the time to arrive grows with the step"
     parameters = (
         Parameter(

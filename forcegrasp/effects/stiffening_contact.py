@@ -17,6 +17,7 @@ class StiffeningContact(Effect):
 
     name = "stiffening_contact"
     stage = "contact"
+    family = "contact"
     needs_object = True
     symptom = "the curve of force over squeeze is more convex than modelled"
     formula = "d(r) with power p + Δp instead of p (MuJoCo's solimp), and F = F_contact + F₁ (δ / 1 mm)³"

@@ -13,6 +13,7 @@ class ViscoelasticContact(Effect):
 
     name = "viscoelastic_contact"
     stage = "contact"
+    family = "contact"
     needs_object = True
     symptom = "force decays during a hold while the finger creeps inward; the peak depends on speed"
     formula = "F = F_contact + max(0, k (δ − x)), τ dx/dt = δ − x, δ the depth of the pad in the object"

@@ -10,6 +10,7 @@ import numpy as np
 from scipy.stats import chi2, t
 
 from forcegrasp.final_force.causes import CAUSES, causes_of
+from forcegrasp.final_force.sessions import LEAST_REPEATS, Repeats, repeats_of
 from forcegrasp.final_force.shapes import (
     BASE,
     FURTHER,
@@ -63,6 +64,7 @@ class TableAnalysis(ShortRepr):
     slopes_differ_p: float | None = None  #: probability of slopes that differ this much if all objects had one
     slope_ratio: tuple[float, float, float] | None = None  #: largest ÷ smallest slope with its 95 % interval
     shared: dict[str, float] = field(default_factory=dict)  #: rms error, N, with one onset "travel" or one "force"
+    repeats: Repeats = Repeats(0, math.nan)  #: squeezes that were repeated, and what sessions differ by
     training: Training | None = None  #: of the gripper, if its objects' force scale follows the softness κ
 
     def summary(self) -> str:
@@ -99,6 +101,8 @@ def analyse_table(table: FinalForceTable, gripper: Gripper) -> TableAnalysis:
       gripper: whose nominal `position_gain`, if it has one, turns slopes into f_α.
     """
     rows, skipped = _usable(table)
+    repeats = _repeats(rows)
+    rows = {name: r.without(repeats.correction(r.sessions)) for name, r in rows.items()}
     gain = gripper.parameters["position_gain"].nominal if "position_gain" in gripper.parameters else None
     facts = {
         "position_gain": gain,
@@ -109,7 +113,7 @@ def analyse_table(table: FinalForceTable, gripper: Gripper) -> TableAnalysis:
         return TableAnalysis(table, rows, skipped, Verdict.NOT_FITTED, f"no object can be fitted ({why})", **facts)
     rng = np.random.default_rng(_SEED)
     fits = {shape: {name: fit_shape(shape, r.delta_m, r.force_n) for name, r in rows.items()} for shape in _shapes()}
-    noise, noise_from, known = _noise(table, rows, fits)
+    noise, noise_from, known = _noise(table, repeats, rows, fits)
     p_family = _family(rows, fits, noise if known else None, rng)
     base = Candidate(BASE, fits[BASE], 1.0, 0.0, 0.0)
     candidates = [_candidate(shape, fits[shape], base, p_family[shape], noise) for shape in FURTHER]
@@ -129,7 +133,7 @@ def analyse_table(table: FinalForceTable, gripper: Gripper) -> TableAnalysis:
         table, rows, skipped, verdict, reason, effects if verdict is Verdict.ONE_OF else (), found, noise, noise_from,
         base, tuple(candidates), intervals, slopes_differ_p=slopes_differ(best, rows),
         slope_ratio=slope_ratio(best, rows, rng),
-        shared=shared_onset(rows, fits) if found and "dead_zone" in found else {}, **facts,
+        shared=shared_onset(rows, fits) if found and "dead_zone" in found else {}, repeats=repeats, **facts,
     )  # fmt: skip
 
 
@@ -149,8 +153,15 @@ def _usable(table: FinalForceTable) -> tuple[dict[str, Rows], dict[str, str]]:
         elif not _grows(x, y):
             skipped[name] = "its force does not grow with the delta beyond the scatter"
         else:
-            rows[name] = Rows(x, y)
+            sessions = tuple(np.array(table.sessions)[chosen].tolist()) if table.sessions else ()
+            rows[name] = Rows(x, y, sessions)
     return rows, skipped
+
+
+def _repeats(rows: Mapping[str, Rows]) -> Repeats:
+    objects = [name for name, r in rows.items() for _ in r.force_n]
+    delta, force = (np.concatenate([getattr(r, key) for r in rows.values()] or [[]]) for key in ("delta_m", "force_n"))
+    return repeats_of(objects, delta, force, [session for r in rows.values() for session in r.sessions])
 
 
 def _grows(x: np.ndarray, y: np.ndarray) -> bool:
@@ -169,7 +180,9 @@ def _rounding(rows: Mapping[str, Rows]) -> float:
     return max(step / np.sqrt(12), _LEAST_NOISE_N)
 
 
-def _noise(table: FinalForceTable, rows: Mapping[str, Rows], fits: Mapping) -> tuple[float, str, bool]:
+def _noise(
+    table: FinalForceTable, repeats: Repeats, rows: Mapping[str, Rows], fits: Mapping
+) -> tuple[float, str, bool]:
     """Noise of a force, N, in words where it comes from, and whether it is known apart from the fits."""
     left = {shape: sum(float(np.sum(fit.residual**2)) for fit in of.values()) for shape, of in fits.items()}
     best, freedom = min(
@@ -177,14 +190,9 @@ def _noise(table: FinalForceTable, rows: Mapping[str, Rows], fits: Mapping) -> t
         key=lambda pair: pair[0] / pair[1],
     )
     scatter = float(np.sqrt(best / freedom))
-    spread, repeats = 0.0, 0
-    for r in rows.values():
-        for delta in np.unique(r.delta_m):
-            same = r.force_n[r.delta_m == delta]
-            spread, repeats = spread + float(np.sum((same - same.mean()) ** 2)), repeats + len(same) - 1
     named = [("given with the table", table.force_std_n)]
-    if repeats >= LEAST_ROWS:
-        named.append((f"from {repeats} repeated squeezes", float(np.sqrt(spread / repeats))))
+    if repeats.freedom >= LEAST_REPEATS:
+        named.append((f"from {repeats.freedom} repeated squeezes", repeats.noise_n))
     for source, sigma in named:
         if sigma:
             # Where no shape comes down to it, it is no measure of what chance does to a table.

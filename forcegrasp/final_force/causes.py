@@ -42,6 +42,7 @@ _ONSETS = {
     ),
     "coulomb_friction": Cause("the motor must overcome it first", lambda o: {"force_n": o.motor_n}),
     "stiction": Cause("the motor must overcome it first", lambda o: {"breakaway_n": o.motor_n}),
+    "presliding": Cause("the motor must overcome it first, bristles and all", lambda o: {"force_n": o.motor_n}),
     "backlash": Cause(
         "half the gap is lost: ahead of the encoder always, behind it if one target was held",
         lambda o: {"gap_m": 2 * o.travel_m},
@@ -65,6 +66,9 @@ _GATES = {
     "command_deadband": Cause(
         "commands within the band are dropped, larger ones pass in full (its `position` form)",
         lambda o: {"threshold_m": o.travel_m},
+    ),
+    "position_deadband": Cause(
+        "the position loop rests within the band, and beyond it acts in full", lambda o: {"band_m": o.travel_m}
     ),
     "force_deadzone": Cause(
         "small readings are dropped, larger ones pass in full (its `gate` form)",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
@@ -67,6 +68,11 @@ class Rows(ShortRepr):
 
     delta_m: np.ndarray  #: ``(n,)``
     force_n: np.ndarray  #: ``(n,)``
+    sessions: tuple[str, ...] = ()  #: of each row; empty if the table does not say
+
+    def without(self, shift_n: np.ndarray) -> Rows:
+        """The rows with a shift of each session taken out, ``(n,)`` or empty."""
+        return dataclasses.replace(self, force_n=self.force_n - shift_n) if len(shift_n) else self
 
 
 @dataclass(frozen=True, repr=False)

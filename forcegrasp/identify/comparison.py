@@ -66,15 +66,29 @@ class Comparison(ShortRepr):
         squares = np.sum(self.residual**2, axis=(1, 2))
         return np.sqrt(squares / (self.residual.shape[-1] * self.target.mask.sum(axis=1)))
 
-    def by_grasp_and_phase(self) -> np.ndarray:
-        """rms residual ÷ noise, ``(G, phases)``; NaN where a grasp has no such phase."""
-        grid = np.full((len(self.target.grasps), len(self.target.phases)), np.nan)
-        for index in range(len(self.target.phases)):
-            inside = self.target.phase == index
-            counts = inside.sum(axis=1)
-            squares = np.sum(self.residual**2 * inside[:, :, None], axis=(1, 2))
-            grid[counts > 0, index] = np.sqrt(squares[counts > 0] / (self.residual.shape[-1] * counts[counts > 0]))
-        return grid
+    def by_grasp_and_phase(self) -> tuple[np.ndarray, list[str]]:
+        """rms residual ÷ noise, ``(rows, phases)``, and the names of the rows: grasps, or a servo's recordings.
+
+        NaN where a row has no such phase.
+        """
+        rows = self.target.recordings or {g.label: np.array([i]) for i, g in enumerate(self.target.grasps)}
+        grid = np.full((len(rows), len(self.target.phases)), np.nan)
+        for row, indices in enumerate(rows.values()):
+            for index in range(len(self.target.phases)):
+                inside = self.residual[indices][self.target.phase[indices] == index]
+                if inside.size:
+                    grid[row, index] = np.sqrt(np.mean(inside**2))
+        return grid, list(rows)
+
+    def by_recording(self) -> dict[str, dict[str, float]]:
+        """Error ÷ noise of each of a servo's recordings, by signal: held out of the fit, if it could be."""
+        found: dict[str, dict[str, float]] = {}
+        for name, indices in self.target.recordings.items():
+            held = self.heldout[indices]
+            residual = np.where(np.isfinite(held), held, self.residual[indices])[self.target.mask[indices]]
+            rms_of = np.sqrt(np.mean(residual**2, axis=0)) if len(residual) else np.full(residual.shape[-1], np.nan)
+            found[name] = dict(zip(self.target.axis.names, rms_of.tolist(), strict=True))
+        return found
 
     def floor_ratio(self) -> float:
         """Held-out rms residual ÷ sensor noise; of the grasps themselves where none were held out."""

@@ -7,8 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from forcegrasp.identify.fit import Fit
+from forcegrasp.identify.predict import predict
 from forcegrasp.identify.target import Target
 from forcegrasp.measure.schema import MeasuredGrasp
+from forcegrasp.replay.replay import Replay
 
 #: Number of folds where a set does not say which grasps to check with.
 FOLDS = 6
@@ -17,12 +19,15 @@ FOLDS = 6
 _RIDGE = 1.0
 # Residuals beyond this many σ count linearly: one bad grasp must not decide.
 _HEAVY = 6.0
+# A step that changes more than this share of a fold's squares is simulated, in these lengths: of a servo whose fit is
+# further than so many times the noise off, and of any fit that is nearer, where steps are small if they are right.
+_FAR, _COUNTS, _COUNTS_NEAR, _SHARES = 3.0, 0.02, 0.05, (1.0, 0.5, 0.25, 0.1)
 
 
 def make_folds(grasps: Sequence[MeasuredGrasp]) -> list[np.ndarray]:
     """Indices of the grasps that each fold holds out: whole grasps, each object spread over the folds.
 
-    Of a servo's recordings, if there are enough of them, each is held out as a whole.
+    A servo's recordings are held out as wholes; of a single one, its windows.
 
     If the set marks grasps with ``split: check``, they are the one fold.
     """
@@ -30,10 +35,11 @@ def make_folds(grasps: Sequence[MeasuredGrasp]) -> list[np.ndarray]:
     if len(check):
         return [check]
     sessions = list(dict.fromkeys(g.session for g in grasps))
-    if not any(g.object for g in grasps) and len(sessions) >= FOLDS:  # a servo's recordings, whole
+    if not any(g.object for g in grasps) and len(sessions) > 1:
+        count = min(FOLDS, len(sessions))
         return [
-            np.array([i for i, g in enumerate(grasps) if g.session in sessions[k::FOLDS]], dtype=int)
-            for k in range(FOLDS)
+            np.array([i for i, g in enumerate(grasps) if g.session in sessions[k::count]], dtype=int)
+            for k in range(count)
         ]
     order = sorted(range(len(grasps)), key=lambda i: (grasps[i].object, grasps[i].session, i))
     folds = min(FOLDS, len(grasps))
@@ -43,20 +49,50 @@ def make_folds(grasps: Sequence[MeasuredGrasp]) -> list[np.ndarray]:
 def heldout_residual(fit: Fit, target: Target, folds: Sequence[np.ndarray]) -> np.ndarray:
     """Residuals of each grasp under the parameters that the other folds' grasps give, ``(G, S, C)``; NaN if in no fold.
 
-    Exact where the model is linear in its parameters over their uncertainty.
+    One linear step from the fit of all grasps takes a fold's own out. That is exact where the model is linear in its
+    parameters over their uncertainty. A step that counts, of a servo or near the noise, is simulated, and shortened
+    until the other folds' error falls.
     """
     p = len(fit.problem)
     jacobian, residual = fit.jacobian, fit.residual
     inner = np.einsum("gskp,gskq->gpq", jacobian, jacobian, optimize=True)
     slope = np.einsum("gskp,gsk->gp", jacobian, residual, optimize=True)
     held = np.full(residual.shape, np.nan)
+    doubtful: list[tuple[np.ndarray, np.ndarray]] = []
+    far = fit.cost > _FAR**2 * target.readings
+    counts = (_COUNTS if target.gripper.is_servo else np.inf) if far else _COUNTS_NEAR
     for fold in folds:
         rest = np.setdiff1d(np.arange(len(target.grasps)), fold)
         if len(rest) == 0:
             continue
         step = np.linalg.lstsq(inner[rest].sum(axis=0) + _RIDGE * np.eye(p), slope[rest].sum(axis=0), rcond=None)[0]
-        held[fold] = residual[fold] - jacobian[fold] @ step
+        change = jacobian[fold] @ step
+        held[fold] = residual[fold] - change
+        if np.sum(change**2) > counts * np.sum(residual[fold] ** 2):
+            doubtful.append((fold, step))
+    if doubtful:
+        _simulate(fit, target, doubtful, held)
     return held
+
+
+def _simulate(fit: Fit, target: Target, doubtful: list[tuple[np.ndarray, np.ndarray]], held: np.ndarray) -> None:
+    """Replaces residuals of folds by simulated ones, of the longest step that lowers the error of the others."""
+    problem, replay = fit.problem, Replay(fit.problem.gripper, fit.problem.grasps)
+    everything = np.sum(fit.residual**2)
+    for scale in _SHARES:
+        vectors = [np.clip(fit.vector + scale * step, problem.low, problem.high) for _, step in doubtful]
+        residuals = target.residual(predict(replay, [problem.case(vector) for vector in vectors]))
+        left = []
+        for (fold, step), residual in zip(doubtful, residuals, strict=True):
+            others = np.sum(residual**2) - np.sum(residual[fold] ** 2)
+            if others <= everything - np.sum(fit.residual[fold] ** 2):
+                held[fold] = residual[fold]
+            else:
+                left.append((fold, step))
+        if not (doubtful := left):
+            return
+    for fold, _ in doubtful:  # the others' own optimum is where the fit is
+        held[fold] = fit.residual[fold]
 
 
 def log_likelihood(residual: np.ndarray) -> np.ndarray:

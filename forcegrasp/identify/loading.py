@@ -11,7 +11,7 @@ from forcegrasp.identify.sensor_noise import check_given_noise
 from forcegrasp.identify.windows import cut
 from forcegrasp.measure import FinalForceTable, MeasurementSet, check_servo, check_set, check_table, read_set
 from forcegrasp.models.model_file import Model
-from forcegrasp.physics.gripper import Gripper
+from forcegrasp.physics.gripper import SKEW, Gripper
 from forcegrasp.physics.gripper_file import load_gripper
 from forcegrasp.short_repr import ShortRepr, counted
 
@@ -31,7 +31,8 @@ class Loaded(ShortRepr, Generic[Measured]):
         """Number of grasps, or of windows of a servo's recordings, that can be held out one by one."""
         if not isinstance(self.measured, MeasurementSet):
             return 0
-        return len(cut(self.measured.grasps) if self.gripper.is_servo else self.measured.grasps)
+        grasps, gripper = self.measured.grasps, self.gripper
+        return len(cut(grasps, gripper.parameters.get(SKEW)) if gripper.is_servo else grasps)
 
     def summary(self) -> str:
         return f"{self.measured.summary()}; {counted(len(self.warnings), 'warning')}"
@@ -49,7 +50,9 @@ def load(path: str | Path) -> Loaded[MeasurementSet] | Loaded[FinalForceTable]:
     if isinstance(measured, FinalForceTable):
         return Loaded(measured, gripper, check_table(measured, gripper.stroke))
     if gripper.is_servo:
-        return Loaded(measured, gripper, check_servo(measured))
+        return Loaded(
+            measured, gripper, check_servo(measured, [motor.stroke for motor in gripper.motors], gripper.unsigned)
+        )
     half_opening_m = float(gripper.opening.opening_m[-1]) / 2
     warnings = check_set(measured, gripper.stroke, half_opening_m=half_opening_m, pads_at=gripper.pads_at)
     return Loaded(measured, gripper, warnings + check_given_noise(measured, gripper.unit))

@@ -54,11 +54,13 @@ def find_phases(grasp: MeasuredGrasp, sigma: np.ndarray, gripper: Gripper) -> np
 
 
 def _servo_phases(grasp: MeasuredGrasp) -> np.ndarray:
-    """Phases of a servo: its command rests, moves, or has just turned round; or the motor is switched off."""
-    time, command = grasp.time_s, grasp.command_m[:, 0]
-    direction = np.sign(np.diff(command, prepend=command[0]))
-    moving = np.flatnonzero(direction)
-    turned = moving[1:][direction[moving[1:]] != direction[moving[:-1]]]
+    """Phases of a servo: its command rests, moves, or that of a joint has just turned round; or it is switched off."""
+    time, turns = grasp.time_s, []
+    for command in grasp.command_m.T:
+        direction = np.sign(np.diff(command, prepend=command[0]))
+        moving = np.flatnonzero(direction)
+        turns.append(moving[1:][direction[moving[1:]] != direction[moving[:-1]]])
+    turned = np.unique(np.concatenate(turns))
     phase = np.full(len(time), SERVO_PHASES.index("moving"))
     if len(turned):
         since = time - time[turned][np.searchsorted(turned, np.arange(len(time)), side="right") - 1]

@@ -9,6 +9,7 @@ import numpy as np
 
 from forcegrasp.effects import Effect
 from forcegrasp.effects.setting import EffectSetting
+from forcegrasp.physics.gripper import EFFORT_SCALE, OF_READINGS, SKEW
 from forcegrasp.replay.replay import EffectOn, Motion, Replay, join
 from forcegrasp.short_repr import ShortRepr
 
@@ -22,7 +23,7 @@ class Case(ShortRepr):
 
     def simulation_key(self) -> bytes:
         """Equal for cases that differ in nothing but sensors: they share one simulation."""
-        parts = [value.tobytes() for name, value in sorted(self.base.items()) if name != "force_scale"]
+        parts = [value.tobytes() for name, value in sorted(self.base.items()) if name not in OF_READINGS]
         for one in self.effects:
             if not one.effect.reads_only(one.variant):
                 parts.append(f"{one.effect.name}/{one.variant}/".encode() + one.values.tobytes())
@@ -45,8 +46,10 @@ def predict(replay: Replay, cases: Sequence[Case]) -> np.ndarray:
     place = {key: np.arange(count) + n * count for n, key in enumerate([*known, *fresh])}
     replay.remember(keys[0], motion, place[keys[0]])
     rows = np.concatenate([place[key] for key in keys])
-    scale = np.concatenate([case.base["force_scale"] for case in cases])
-    readings = replay.read(motion, rows, scale, _spread(cases, count, lambda e: e.effect.reads()))
+    of_force = EFFORT_SCALE if EFFORT_SCALE in cases[0].base else "force_scale"
+    scale = np.concatenate([case.base[of_force] for case in cases])
+    skew = np.concatenate([case.base[SKEW] for case in cases]) if SKEW in cases[0].base else None
+    readings = replay.read(motion, rows, scale, _spread(cases, count, lambda e: e.effect.reads()), skew)
     signals = np.concatenate([readings.position, readings.force], axis=-1)
     return signals.reshape(len(cases), count, *signals.shape[1:])
 
@@ -54,7 +57,7 @@ def predict(replay: Replay, cases: Sequence[Case]) -> np.ndarray:
 def _simulate(replay: Replay, cases: Sequence[Case]) -> Motion:
     """All grasps of one case after those of the other."""
     count = len(replay.grasps)
-    base = {name: np.concatenate([c.base[name] for c in cases]) for name in cases[0].base if name != "force_scale"}
+    base = {name: np.concatenate([c.base[name] for c in cases]) for name in cases[0].base if name not in OF_READINGS}
     effects = _spread(cases, count, lambda e: not e.effect.reads_only(e.variant))
     return replay.simulate(np.tile(np.arange(count), len(cases)), base, effects)
 

@@ -111,6 +111,10 @@ class Problem:
                 entries.append(Entry(name, p.name, index, everyone, *bounds, *kind))
         return entries
 
+    def first_entry(self, effect: int) -> int:
+        """Index of the first parameter of one of the effects; the others of it follow."""
+        return [entry.effect for entry in self.entries].index(effect)
+
     def start(self) -> np.ndarray:
         """Nominal base parameters, and effects as they were given, ``(entries,)``."""
         return np.array([e.coordinate(e.start) for e in self.entries])

@@ -16,7 +16,7 @@ from forcegrasp.identify.sensor_noise import estimate_noise
 from forcegrasp.identify.signal_axis import SignalAxis
 from forcegrasp.identify.windows import cut
 from forcegrasp.measure.schema import MeasuredGrasp, MeasurementSet
-from forcegrasp.physics.gripper import Gripper
+from forcegrasp.physics.gripper import SKEW, Gripper
 from forcegrasp.short_repr import ShortRepr
 
 # Rounding to steps smaller than this many σ is hidden by the noise.
@@ -46,6 +46,17 @@ class Target(ShortRepr):
     def axis(self) -> SignalAxis:
         """The names of the channels, and which of them are positions and forces."""
         return SignalAxis(self.gripper)
+
+    @property
+    def part(self) -> str:
+        """What one of its grasps is called: a "grasp", or a "window" of a servo's recording."""
+        return "window" if self.gripper.is_servo else "grasp"
+
+    @property
+    def recordings(self) -> dict[str, np.ndarray]:
+        """Indices of the windows of each of a servo's recordings; of grasps, which are judged one by one, none."""
+        names = [grasp.session for grasp in self.grasps] if self.gripper.is_servo else []
+        return {name: np.flatnonzero(np.array(names) == name) for name in dict.fromkeys(names)}
 
     @property
     def phases(self) -> tuple[str, ...]:
@@ -88,7 +99,8 @@ class Target(ShortRepr):
 
 def make_target(measured: MeasurementSet, gripper: Gripper) -> Target:
     """Lines up a measurement set, estimates its noise where it is not given, and finds the phases."""
-    grasps, axis = cut(measured.grasps) if gripper.is_servo else measured.grasps, SignalAxis(gripper)
+    axis = SignalAxis(gripper)
+    grasps = cut(measured.grasps, gripper.parameters.get(SKEW)) if gripper.is_servo else measured.grasps
     samples = max(len(g.time_s) for g in grasps)
     signals, mask = np.zeros((len(grasps), samples, len(axis))), np.zeros((len(grasps), samples), bool)
     for index, grasp in enumerate(grasps):

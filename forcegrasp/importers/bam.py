@@ -10,7 +10,7 @@ import numpy as np
 
 from forcegrasp.errors import MeasurementError
 from forcegrasp.files.bounded import read_bytes
-from forcegrasp.importers.recording import Recording, files_below
+from forcegrasp.importers.recording import OtherFileError, Recording, files_below
 
 MECHANISM = "xl330_pendulum"
 _MAX_BYTES = 200_000_000
@@ -34,7 +34,7 @@ def read(file: Path) -> Recording:
         entries: list[dict[str, Any]] = log["entries"]
         there = set(entries[0])
     except (OSError, ValueError, KeyError, IndexError, TypeError, RecursionError) as error:
-        raise MeasurementError(f"{file}: is no log of BAM: a JSON object with a list `entries` is needed") from error
+        raise OtherFileError(f"{file}: is no log of BAM: a JSON object with a list `entries` is needed") from error
     if missing := [name for name in _NEEDED if name not in there]:
         raise MeasurementError(f"{file}: entries lack {', '.join(missing)}; they have {', '.join(sorted(there))}")
     columns = {name: _column(file, entries, name) for name in (*_NEEDED, "load", "torque_enable") if name in there}

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
-
 from forcegrasp.errors import MeasurementError
 from forcegrasp.importers.recording import Recording
 from forcegrasp.importers.tables import read_columns
@@ -26,14 +24,13 @@ def read(folder: Path) -> Recording:
       MeasurementError: if a column is missing, or a number can't be read.
     """
     file = folder / "data_measured.csv"
-    columns = read_columns(file)
+    table = read_columns(file)
+    columns = table.numbers
     if missing := [name for name in _NEEDED if name not in columns]:
         raise MeasurementError(f"{file}: no column {', '.join(missing)}; it has {', '.join(columns)}")
-    time_s = columns["time"] - columns["time"][0]
-    keep = np.r_[True, np.diff(time_s) > 0]
     skipped = sorted(set(columns) - set(_NEEDED))
-    notes = [f"skipped: {', '.join(skipped)}"] if skipped else []
+    notes = [*table.notes, *([f"skipped: {', '.join(skipped)}"] if skipped else [])]
     return Recording(
-        folder.name, ("joint",), time_s[keep], columns["torque"][keep][:, None], columns["position"][keep][:, None],
+        folder.name, ("joint",), columns["time"], columns["torque"][:, None], columns["position"][:, None],
         command_unit="N·m", notes=tuple(notes),
     )  # fmt: skip

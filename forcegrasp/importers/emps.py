@@ -9,7 +9,7 @@ import numpy as np
 
 from forcegrasp.errors import MeasurementError
 from forcegrasp.files.bounded import read_bytes
-from forcegrasp.importers.recording import Recording, files_below
+from forcegrasp.importers.recording import OtherFileError, Recording, files_below
 
 MECHANISM = "emps"
 _MAX_BYTES = 200_000_000
@@ -35,7 +35,8 @@ def read(file: Path) -> Recording:
         raise MeasurementError(f"{file}: is no MATLAB file that can be read (version 7 or older)") from error
     if missing := [name for name in _NEEDED if name not in content]:
         there = ", ".join(sorted(name for name in content if not name.startswith("__")))
-        raise MeasurementError(f"{file}: lacks {', '.join(missing)}; it has {there}")
+        kind = OtherFileError if len(missing) == len(_NEEDED) else MeasurementError
+        raise kind(f"{file}: lacks {', '.join(missing)}; it has {there}")
     one = {name: np.asarray(content[name], float).ravel() for name in _NEEDED}
     settings = {name: float(one[name][0]) for name in ("gtau", "kp", "kv")}
     load, notes = None, ()
@@ -44,6 +45,7 @@ def read(file: Path) -> Recording:
         load = settings["gtau"] * np.asarray(content["pulses_N"], float).ravel()
         force = force - load
         notes = ("pulses_N: taken as volts that were added at the drive, gtau newtons each",)
+    force = np.r_[force[:1], force[:-1]]  # what a row holds follows from its position, and acts until the next
     return Recording(
         file.stem, ("carriage",), one["t"] - one["t"][0], one["qg"][:, None], one["qm"][:, None],
         effort=force[:, None], effort_unit="N", load=load, settings=settings,

@@ -9,6 +9,7 @@ import numpy as np
 
 from forcegrasp.effects.for_gripper import effect_of
 from forcegrasp.measure.schema import MeasuredGrasp, MeasurementSet, columns_of, fingerprint_of_set
+from forcegrasp.physics.gripper import SKEW
 from forcegrasp.physics.gripper_file import load_gripper
 from forcegrasp.replay.replay import EffectOn, Replay
 
@@ -36,7 +37,7 @@ def example_set() -> MeasurementSet:
     hidden = EffectOn(friction, "", np.full((len(rows), 1), FRICTION_NM), rows)
     base = {name: np.full(len(rows), p.nominal) for name, p in mechanism.parameters.items()}
     motion = replay.simulate(rows, base, [hidden])
-    read = replay.read(motion, rows, np.ones(len(rows))).position
+    read = replay.read(motion, rows, np.ones(len(rows)), skew_s=base[SKEW]).position
     noisy = read + 0.3 * COUNT_RAD * rng.standard_normal(read.shape)
     found = tuple(
         dataclasses.replace(one, position_m=np.round(noisy[i] / COUNT_RAD) * COUNT_RAD, start=None)

@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 from forcegrasp.errors import ConfigError, MeasurementError, closest
 from forcegrasp.importers import bam, dfki, emps, lerobot, mapped, pace, sage
-from forcegrasp.importers.recording import Recording, steady_rate
+from forcegrasp.importers.column_map import Map, read_map
+from forcegrasp.importers.recording import OtherFileError, Recording, tidy
+from forcegrasp.measure.check_commands import refuse_swapped
 
 #: Format → its module, which has ``find``, ``read`` or ``read_all``, and the mechanism that it is of by default.
 FORMATS: dict[str, Any] = {"sage": sage, "bam": bam, "emps": emps, "dfki": dfki, "pace": pace, "lerobot": lerobot}
 
 
 def read_source(sources: Sequence[Path], format_name: str, map_file: str, joints: Sequence[str]) -> list[Recording]:
-    """Reads files, or folders of recordings.
+    """Reads files, or folders of recordings; in a folder, files of other kinds are left out, and noted.
 
     Args:
       sources: files or folders.
@@ -33,25 +36,49 @@ def read_source(sources: Sequence[Path], format_name: str, map_file: str, joints
     if format_name and format_name not in FORMATS:
         raise ConfigError(f"format={format_name}: no such format{closest(format_name, FORMATS)}")
     module = FORMATS[format_name] if format_name else mapped
-    how = mapped.Map(Path(map_file)) if map_file else None
-    found: list[Recording] = []
+    how = read_map(Path(map_file)) if map_file else None
+    found: list[tuple[Path, Recording]] = []
     for source in sources:
         if not source.exists():
             raise MeasurementError(f"{source}: no such file or folder")
         places = module.find(source)
         if not places:
             raise MeasurementError(f"{source}: holds no recording{' of format ' + format_name if format_name else ''}")
-        for place in places:
-            found += _recordings(module, place, how)
-    for one in found:
-        steady_rate(one.name, one.time_s)
-    return [one.of_joints(joints) for one in found] if joints else found
+        found += _read_places(module, places, how)
+    for _, one in found:
+        if not one.command_unit:
+            refuse_swapped(one.name, one.joints, one.command, one.position)
+    return [one.of_joints(joints) if joints else one for one in _with_own_names(found)]
 
 
-def _recordings(module: Any, place: Path, how: mapped.Map | None) -> Iterator[Recording]:
+def _read_places(module: Any, places: Sequence[Path], how: Map | None) -> list[tuple[Path, Recording]]:
+    """The recordings of files; of several, such as are no recordings at all are left out."""
+    found, others = [], []
+    for place in places:
+        try:
+            found += [(place, tidy(one)) for one in _recordings(module, place, how)]
+        except OtherFileError as error:
+            others.append(error)
+    if not found:
+        raise others[0]
+    if others:
+        names = ", ".join(str(error).partition(": ")[0].rpartition("/")[2] for error in others)
+        first, one = found[0]
+        found[0] = first, dataclasses.replace(one, notes=(f"left out, for it is no recording: {names}", *one.notes))
+    return found
+
+
+def _recordings(module: Any, place: Path, how: Map | None) -> Iterator[Recording]:
     if how is not None:
         yield from mapped.read_all(place, how)
     elif hasattr(module, "read_all"):
         yield from module.read_all(place)
     else:
         yield module.read(place)
+
+
+def _with_own_names(found: Sequence[tuple[Path, Recording]]) -> list[Recording]:
+    """The recordings; such as have the same name are told apart by their folders."""
+    names = [one.name for _, one in found]
+    own = [f"{place.parent.name}_{one.name}" if names.count(one.name) > 1 else one.name for place, one in found]
+    return [dataclasses.replace(one, name=name) for (_, one), name in zip(found, own, strict=True)]

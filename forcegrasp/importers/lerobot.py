@@ -11,7 +11,7 @@ import numpy as np
 
 from forcegrasp.errors import MeasurementError
 from forcegrasp.files.bounded import read_bytes
-from forcegrasp.importers.recording import Recording
+from forcegrasp.importers.recording import OtherFileError, Recording
 from forcegrasp.importers.tables import read_parquet
 
 MECHANISM = "so101_jaw"
@@ -23,7 +23,9 @@ _SPAN_RAD = 7.0
 
 def find(source: Path) -> list[Path]:
     """Parquet files of frames at or below a dataset's folder, or the file itself."""
-    return [source] if source.is_file() else sorted((source / "data").glob("**/*.parquet"))
+    if source.is_file():
+        return [source]
+    return sorted(file for file in source.glob("**/*.parquet") if "meta" not in file.relative_to(source).parts)
 
 
 def read_all(file: Path) -> Iterator[Recording]:
@@ -34,7 +36,8 @@ def read_all(file: Path) -> Iterator[Recording]:
     """
     table = read_parquet(file)
     if missing := [name for name in _NEEDED if name not in table.columns]:
-        raise MeasurementError(f"{file}: no column {', '.join(missing)}; it has {', '.join(table.columns)}")
+        kind = OtherFileError if len(missing) == len(_NEEDED) else MeasurementError
+        raise kind(f"{file}: no column {', '.join(missing)}; it has {', '.join(table.columns)}")
     names = _names(file)
     for (episode,), rows in table.group_by(["episode_index"], maintain_order=True):
         command, position = (np.array(rows[name].to_list(), float) for name in ("action", "observation.state"))

@@ -1,4 +1,4 @@
-"""Any CSV or Parquet file of a servo's log, as a map of a few lines says.
+"""Any CSV or Parquet file of a servo's log, or any ROS bag, as a map of a few lines says.
 
 ```yaml
 time: {column: timestamp, unit: ms}            # s, ms, us or ns; default s
@@ -11,155 +11,100 @@ load: external_n                               # a force or torque from outside
 recording: run                                 # one recording for each value of this column; default: one per file
 ```
 
-A value in SI units is ``sign · scale · unit · value + offset``.
+Of a bag each has a topic, and its column is a field: ``{topic: /joint_states, column: "position[name={joint}]"}``. A
+sample is taken at each message of the first joint's position, with the newest of all others; its time is the bag's.
 """
 
 from __future__ import annotations
 
-import dataclasses
-import math
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import polars as pl
 
-from forcegrasp.errors import MeasurementError, closest
-from forcegrasp.importers.recording import Recording
-from forcegrasp.importers.tables import read_columns, read_parquet
-from forcegrasp.measure.yaml_file import load_yaml
+from forcegrasp.errors import MeasurementError
+from forcegrasp.importers.column_map import FORCES, Map, Quantity
+from forcegrasp.importers.recording import OtherFileError, Recording
+from forcegrasp.importers.tables import Table, parquet_columns, read_columns
+from forcegrasp.measure.rosbag import Signal, read_bag
 
-TIMES = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
-POSITIONS = {
-    "rad": 1.0, "deg": math.pi / 180, "turns": 2 * math.pi, "counts": math.nan, "m": 1.0, "mm": 1e-3, "um": 1e-6,
-}  # fmt: skip
-FORCES = ("N", "N·m", "V", "A", "1")
-_KEYS = ("time", "joints", "command", "position", "effort", "enabled", "load", "recording")
-_NEEDED = ("time", "joints", "command", "position")
-_COLUMN_KEYS = ("column", "unit", "per_turn", "scale", "sign", "offset", "signed")
-
-
-@dataclasses.dataclass(frozen=True)
-class _Source:
-    """Where a quantity comes from, and what one of its unit is in SI units."""
-
-    column: str
-    unit: str
-    factor: float
-    offset: float
-    signed: bool
-
-    def of(self, columns: Mapping[str, np.ndarray], joint: str) -> np.ndarray:
-        return columns[self.name(joint)] * self.factor + self.offset
-
-    def name(self, joint: str) -> str:
-        return self.column.replace("{joint}", joint)
-
-
-class Map:
-    """A map that was read.
-
-    Raises:
-      MeasurementError: key and what it must be.
-    """
-
-    def __init__(self, path: Path) -> None:
-        content = load_yaml(path)
-        if wrong := [key for key in content if key not in _KEYS]:
-            raise MeasurementError(f"{path}: {wrong[0]}: no such key{closest(wrong[0], _KEYS)}")
-        if missing := [key for key in _NEEDED if key not in content]:
-            raise MeasurementError(f"{path}: lacks {', '.join(missing)}; as in `time: {{column: t, unit: s}}`")
-        joints = content["joints"]
-        self.joints = tuple(joints if isinstance(joints, list) else [joints])
-        self.time = _source(path, "time", content["time"], TIMES)
-        self.command = _source(path, "command", content["command"], POSITIONS)
-        self.position = _source(path, "position", content["position"], POSITIONS)
-        self.effort = _source(path, "effort", content["effort"], {}) if "effort" in content else None
-        self.enabled, self.load, self.recording = (content.get(key, "") for key in ("enabled", "load", "recording"))
-
-    def columns(self) -> list[str]:
-        """Names of all columns that it asks for."""
-        sources = [self.command, self.position, *([self.effort] if self.effort else [])]
-        named = [source.name(joint) for source in sources for joint in self.joints]
-        return [self.time.column, *named, *(name for name in (self.enabled, self.load, self.recording) if name)]
-
-
-def _source(path: Path, key: str, given: Any, units: Mapping[str, float]) -> _Source:
-    entry: dict[str, Any] = {"column": given} if isinstance(given, str) else given
-    if not isinstance(entry, dict) or "column" not in entry:
-        raise MeasurementError(f"{path}: {key}: must name a column, as in `{key}: {{column: name}}`")
-    if wrong := [name for name in entry if name not in _COLUMN_KEYS]:
-        raise MeasurementError(f"{path}: {key}: {wrong[0]}: no such key{closest(wrong[0], _COLUMN_KEYS)}")
-    unit = str(entry.get("unit", next(iter(units), "1")))
-    if unit not in units and unit not in FORCES:
-        raise MeasurementError(f"{path}: {key}: unit: {unit} is none of {', '.join([*units, *FORCES])}")
-    numbers = {name: _number(path, f"{key}: {name}", entry.get(name, 1 if name != "offset" else 0)) for name in
-               ("scale", "sign", "offset")}  # fmt: skip
-    if unit == "counts":
-        if "per_turn" not in entry:
-            raise MeasurementError(f"{path}: {key}: counts need `per_turn: 4096` or the like")
-        one = 2 * math.pi / _number(path, f"{key}: per_turn", entry["per_turn"])
-    else:
-        one = units.get(unit, 1.0)
-    signed = str(entry.get("signed", "true")).lower() != "false"
-    return _Source(str(entry["column"]), unit, one * numbers["scale"] * numbers["sign"], numbers["offset"], signed)
-
-
-def _number(path: Path, key: str, value: Any) -> float:
-    try:
-        number = float(value)
-    except (TypeError, ValueError):
-        number = math.nan
-    if not math.isfinite(number) or (number == 0 and not key.endswith("offset")):
-        raise MeasurementError(f"{path}: {key}: {value!r}: must be a number, and not 0")
-    return number
+#: Name of the bag's own time stamps among the columns of a table.
+_STAMP = ""
+_BAGS = (".bag", ".mcap", ".db3")
 
 
 def find(source: Path) -> list[Path]:
-    """CSV and Parquet files at or below a folder, or the file itself."""
-    if source.is_file():
+    """Tables and bags at or below a folder, or the file itself."""
+    if source.is_file() or (source / "metadata.yaml").is_file():  # a bag of ROS 2 is a folder
         return [source]
-    return sorted(f for f in source.glob("**/*") if f.suffix in (".csv", ".parquet"))
+    below = sorted(f for f in source.glob("**/*") if f.suffix in (".csv", ".parquet", *_BAGS))
+    found = [f.parent if (f.parent / "metadata.yaml").is_file() else f for f in below]
+    return list(dict.fromkeys(found))
 
 
-def read_all(file: Path, columns_of: Map) -> Iterator[Recording]:
+def read_all(place: Path, how: Map) -> Iterator[Recording]:
     """The recordings of a file.
 
     Raises:
-      MeasurementError: if columns are missing; all are named.
+      OtherFileError: if it has none of the columns.
+      MeasurementError: if columns are missing, or hold text; all are named.
     """
-    table = _table(file)
-    wanted = columns_of.columns()
-    if missing := [name for name in wanted if name not in table]:
-        near = closest(missing[0], table)
-        raise MeasurementError(
-            f"{file}: no column of numbers called {', '.join(missing)}{near}; it has {', '.join(table)}"
-        )
-    runs = table[columns_of.recording] if columns_of.recording else np.zeros(len(next(iter(table.values()))))
-    skipped = sorted(set(table) - set(wanted))
-    notes = (f"skipped: {', '.join(skipped)}",) if skipped else ()
-    for run in dict.fromkeys(runs.tolist()):
-        rows = {name: values[runs == run] for name, values in table.items()}
-        name = f"{file.stem}_{run:g}" if columns_of.recording else file.stem
-        yield _recording(name, rows, columns_of, notes)
+    is_bag = place.is_dir() or place.suffix in _BAGS
+    if is_bag != how.is_of_bag:
+        needs = "each column needs a topic in the map" if is_bag else "the map is of a bag"
+        raise OtherFileError(f"{place}: is a {'bag' if is_bag else 'table'}: {needs}")
+    read = parquet_columns if place.suffix == ".parquet" else read_columns
+    table = _bag(place, how) if is_bag else read(place)
+    wanted = how.places()
+    _check_columns(place, table, list(wanted))
+    skipped = sorted(set(table.numbers) | set(table.texts)) if not how.is_of_bag else []
+    skipped = [name for name in skipped if name not in wanted]
+    notes = (*table.notes, *([f"skipped: {', '.join(skipped)}"] if skipped else []))
+    columns = {name: table.numbers[name] for name in (*wanted, *([_STAMP] if is_bag else []))}
+    runs = columns[how.recording.key()] if how.recording else np.zeros(table.rows)
+    for run in dict.fromkeys(runs[np.isfinite(runs)].tolist()):
+        name = f"{place.stem}_{run:g}" if how.recording else place.stem
+        yield _recording(name, {name: values[runs == run] for name, values in columns.items()}, how, notes)
 
 
-def _recording(name: str, rows: Mapping[str, np.ndarray], m: Map, notes: tuple[str, ...]) -> Recording:
-    time_s = m.time.of(rows, "")
-    command, position = (np.stack([s.of(rows, j) for j in m.joints], axis=1) for s in (m.command, m.position))
-    effort = None if m.effort is None else np.stack([m.effort.of(rows, j) for j in m.joints], axis=1)
+def _check_columns(place: Path, table: Table, wanted: list[str]) -> None:
+    missing = [name for name in wanted if name not in table.numbers and name not in table.texts]
+    there = ", ".join([*table.numbers, *table.texts]) or "none"
+    if len(missing) == len(wanted):
+        raise OtherFileError(f"{place}: no column called {', '.join(missing)}; it has {there}")
+    if missing:
+        raise MeasurementError(f"{place}: no column called {', '.join(missing)}; it has {there}")
+    texts = [f"{name} ({table.texts[name]})" for name in wanted if name in table.texts]
+    if texts:
+        raise MeasurementError(f"{place}: no numbers in column {', '.join(texts)}")
+
+
+def _recording(name: str, rows: Mapping[str, np.ndarray], how: Map, notes: tuple[str, ...]) -> Recording:
+    def values(source: Quantity, unit: str) -> np.ndarray:
+        return np.stack([source.si(rows[source.key(joint)], unit) for joint in how.joints], axis=1)
+
+    command, position, effort = how.command, how.position, how.effort
     return Recording(
-        name, m.joints, time_s - time_s[0], command, position,
-        command_unit=m.command.unit if m.command.unit in FORCES else "",
-        effort=effort, effort_unit=m.effort.unit if m.effort else "", effort_signed=not m.effort or m.effort.signed,
-        enabled=rows[m.enabled] > 0.5 if m.enabled else None, load=rows[m.load] if m.load else None, notes=notes,
+        name, tuple(how.joints), rows[how.time.key()] * how.time.factor if how.time else rows[_STAMP],
+        values(command, command.unit), values(position, position.unit),
+        command_unit=FORCES.get(command.unit, ""),
+        effort=values(effort, effort.unit) if effort else None, effort_unit=FORCES[effort.unit] if effort else "",
+        effort_signed=not effort or effort.signed == "true",
+        enabled=rows[how.enabled.key()] if how.enabled else None,
+        load=rows[how.load.key()] if how.load else None, notes=notes,
     )  # fmt: skip
 
 
-def _table(file: Path) -> dict[str, np.ndarray]:
-    if file.suffix != ".parquet":
-        return read_columns(file)
-    table = read_parquet(file)
-    kept = [name for name, kind in table.schema.items() if kind.is_numeric() or kind == pl.Boolean]
-    return {name: table[name].cast(pl.Float64).to_numpy() for name in kept}
+def _bag(place: Path, how: Map) -> Table:
+    """What the topics of a bag say at each message of the first joint's position."""
+    places = how.places()
+    signals = {
+        key: Signal(topic=place_of.topic or "", field=place_of.name(joint)) for key, (place_of, joint) in places.items()
+    }
+    readings = read_bag(place, signals)
+    stamps = readings[how.position.key(how.joints[0])][:, 0]
+    stamps = stamps[stamps >= max(values[0, 0] for values in readings.values())]
+    columns = {_STAMP: stamps}
+    for key, values in readings.items():
+        columns[key] = values[np.searchsorted(values[:, 0], stamps, side="right") - 1, 1]
+    return Table(columns)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -52,24 +53,53 @@ class Recording(ShortRepr):
         )  # fmt: skip
 
 
+class OtherFileError(MeasurementError):
+    """A file that is no recording of the format at all; in a folder it is left out."""
+
+
 def files_below(source: Path, pattern: str) -> list[Path]:
     """The file itself, or the files of a folder, and of those below it, whose names are like the pattern."""
     return [source] if source.is_file() else sorted(source.glob(f"**/{pattern}"))
 
 
-def steady_rate(name: str, time_s: np.ndarray) -> None:
-    """Refuses times that do not ascend, and gaps or rates that show a wrong unit.
+def tidy(one: Recording) -> Recording:
+    """Without rows that lack a number, and without rows that repeat a time stamp; notes say how many.
 
     Raises:
-      MeasurementError: row and what to do.
+      MeasurementError: if less than two rows are left, or time runs back.
     """
-    step = np.diff(time_s)
-    if len(step) == 0 or not np.isfinite(time_s).all():
-        raise MeasurementError(f"{name}: needs at least two samples, with finite times")
-    if (step <= 0).any():
-        row = int(np.argmax(step <= 0)) + 1
-        raise MeasurementError(f"{name}: time does not ascend at sample {row} ({time_s[row]:g} s)")
-    middle = float(np.median(step))
-    if not 2e-5 <= middle <= 0.5:
-        unit = "seconds taken as milliseconds" if middle < 2e-5 else "milliseconds or microseconds taken as seconds"
-        raise MeasurementError(f"{name}: {middle:.3g} s from sample to sample: looks like {unit}; give the time's unit")
+    signals = [
+        one.time_s,
+        one.command,
+        one.position,
+        *(v for v in (one.effort, one.enabled, one.load) if v is not None),
+    ]
+    whole = np.all([np.isfinite(np.asarray(v, float)).reshape(len(v), -1).all(axis=1) for v in signals], axis=0)
+    times = one.time_s[whole]
+    new = np.r_[True, np.diff(times) != 0][: len(times)]
+    if (np.diff(times[new]) < 0).any():
+        row = int(np.argmax(np.diff(times[new]) < 0))
+        before, after = times[new][row : row + 2]
+        raise MeasurementError(
+            f"{one.name}: time runs back from {before:.6g} to {after:.6g} s; sort the rows, or if these are several"
+            " recordings name the column that tells them apart: `recording: run`"
+        )
+    notes = [
+        f"{one.name}: left out {counted(count, 'row')} {what}"
+        for count, what in (
+            (int((~whole).sum()), "without a number"),
+            (int((~new).sum()), "with a time stamp that was there"),
+        )
+        if count
+    ]
+    keep = np.flatnonzero(whole)[new]
+    if len(keep) < 2:
+        raise MeasurementError(f"{one.name}: needs at least two rows with a number in every column that is asked for")
+    cut = {
+        name: None if values is None else values[keep]
+        for name in ("time_s", "command", "position", "effort", "enabled", "load")
+        for values in (getattr(one, name),)
+    }
+    enabled = None if cut["enabled"] is None else cut["enabled"] > 0.5
+    since = one.time_s[keep] - one.time_s[keep[0]]
+    return dataclasses.replace(one, **(cut | {"time_s": since, "enabled": enabled}), notes=(*one.notes, *notes))

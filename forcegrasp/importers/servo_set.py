@@ -11,21 +11,22 @@ from forcegrasp.errors import ConfigError, MeasurementError
 from forcegrasp.importers.recording import Recording
 from forcegrasp.measure.schema import MeasuredGrasp, MeasurementSet, columns_of, fingerprint_of_set
 from forcegrasp.measure.servo_set import settings_of
-from forcegrasp.physics.gripper import Gripper
+from forcegrasp.physics.gripper import EFFORT_SCALE, Gripper
+from forcegrasp.short_repr import counted
 
 
 def as_set(recordings: Sequence[Recording], mechanism: Gripper, source: str, license: str) -> MeasurementSet:
-    """The set that recordings of one joint make.
+    """The set that recordings make.
 
     Args:
-      recordings: each of one joint.
+      recordings: each of as many joints as the mechanism has motors: of the same names, or in their order.
       mechanism: that they are of.
       source: where they come from.
       license: on what terms they may be used.
 
     Raises:
       ConfigError: if the mechanism has fingers.
-      MeasurementError: if a recording has several joints, another command, or lacks a setting.
+      MeasurementError: if a recording has another number of joints, another command, or lacks a setting.
     """
     if not mechanism.is_servo:
         raise ConfigError(f"mechanism={mechanism.name}: has fingers; write its measurements as a set of grasps")
@@ -41,13 +42,22 @@ def as_set(recordings: Sequence[Recording], mechanism: Gripper, source: str, lic
 
 
 def _recording(one: Recording, mechanism: Gripper) -> MeasuredGrasp:
-    if len(one.joints) != 1:
-        named = ", ".join(one.joints)
-        raise MeasurementError(f"{one.name}: has several joints, {named}; choose one: 'joints=[{one.joints[-1]}]'")
-    if (one.command_unit != "") != (mechanism.command == "effort"):
-        holds = one.command_unit or "positions"
+    joints = [motor.joint for motor in mechanism.motors]
+    if len(one.joints) != len(joints):
+        choice = ",".join(one.joints[-len(joints) :])
         raise MeasurementError(
-            f"{one.name}: commands are {holds}; {mechanism.name} takes {mechanism.command}s: choose another mechanism"
+            f"{one.name}: has {counted(len(one.joints), 'joint')}, {', '.join(one.joints)}, and {mechanism.name}"
+            f" {counted(len(joints), 'motor')}; choose with 'joints=[{choice}]'"
+        )
+    if set(one.joints) == set(joints):
+        one = one.of_joints(joints)
+    if one.load is not None and len(joints) > 1:
+        raise MeasurementError(f"{one.name}: a load from outside is of a single joint; leave it out of the map")
+    if one.command_unit != {"position": "", "effort": mechanism.effort_unit, "voltage": "V"}[mechanism.command]:
+        holds = f"in {one.command_unit}" if one.command_unit else "positions"
+        raise MeasurementError(
+            f"{one.name}: commands are {holds}; {mechanism.name} takes {mechanism.commands[0].unit}: choose another"
+            " mechanism"
         )
     settings = settings_of(mechanism)
     if missing := [name for name in settings if name not in one.settings]:
@@ -56,13 +66,17 @@ def _recording(one: Recording, mechanism: Gripper) -> MeasuredGrasp:
     if mechanism.forces:
         if one.effort is None:
             raise MeasurementError(f"{one.name}: has no effort, which {mechanism.name} reads; say `effort: none` there")
-        if not one.effort_signed or one.effort_unit != mechanism.effort_unit:
-            what = f"in {one.effort_unit}" if one.effort_signed else "without a sign"
+        if not one.effort_signed and not mechanism.unsigned:
             raise MeasurementError(
-                f"{one.name}: its efforts are {what}; {mechanism.name} reads {mechanism.effort_unit} with a sign:"
-                " say `effort: none` there"
+                f"{one.name}: its efforts are without a sign; {mechanism.name} reads them with one: say"
+                " `effort: unsigned` or `none` there"
             )
-        effort = one.effort
+        if one.effort_unit != mechanism.effort_unit and EFFORT_SCALE not in mechanism.parameters:
+            raise MeasurementError(
+                f"{one.name}: its efforts are in {one.effort_unit}; {mechanism.name} reads {mechanism.effort_unit}: say"
+                f" `effort: none` there, or give it the parameter {EFFORT_SCALE}"
+            )
+        effort = np.abs(one.effort) if mechanism.unsigned else one.effort
     return MeasuredGrasp(
         name=one.name, object="", session=one.name, radius_m=None, offset_m=None, split=None, time_s=one.time_s,
         command_m=one.command, position_m=one.position, force_n=effort, object_m=None, columns=columns_of(mechanism),

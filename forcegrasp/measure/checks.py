@@ -36,8 +36,9 @@ def check_set(
       open_m: position of a motor that is fully open, m or rad.
       closed_m: position of a motor that is fully closed.
       half_opening_m: half of what fits between the pads; left out, a sliding motor's reach; of one that turns, any.
-      pads_at: from positions of the motors to where the pads stand, see :meth:`Gripper.pads_at`; left out, positions of
-        two sliding motors are those of the pads, and of others what depends on it is not checked.
+      pads_at: from positions of the motors to where the pads stand, see
+        :meth:`~forcegrasp.physics.gripper.Gripper.pads_at`; left out, positions of two sliding motors are those of the
+        pads, and of others what depends on it is not checked.
 
     Returns:
       Warnings, one line each.

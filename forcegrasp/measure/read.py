@@ -49,7 +49,7 @@ _GRASPS = FileColumns(
     optional=("object_offset_m", "split"),
     blank=("object_radius_m", "object_offset_m", "split"),
 )
-_FINAL = FileColumns(text=("object",), numbers=("delta_q_m", "final_force_n"))
+_FINAL = FileColumns(text=("object", "session"), numbers=("delta_q_m", "final_force_n"), optional=("session",))
 
 
 def read_set(path: str | Path) -> MeasurementSet | FinalForceTable:
@@ -85,8 +85,9 @@ def _read_table(folder: Path, meta: Meta, facts: dict[str, Any]) -> FinalForceTa
     rows = read_csv(find_file(folder, "table.csv"), _FINAL)
     objects = tuple(rows.frame["object"].to_list())
     delta, force = (np.array(rows.frame[name].to_numpy()) for name in _FINAL.numbers)
-    fingerprint = fingerprint_of_table(meta.gripper, meta.force_std_n, objects, delta, force)
-    readings = {"objects": objects, "delta_q_m": delta, "final_force_n": force}
+    sessions = tuple(rows.frame["session"].to_list()) if "session" in rows.frame.columns else ()
+    fingerprint = fingerprint_of_table(meta.gripper, meta.force_std_n, objects, delta, force, sessions)
+    readings = {"objects": objects, "delta_q_m": delta, "final_force_n": force, "sessions": sessions}
     return FinalForceTable(**facts, **readings, fingerprint=fingerprint, notes=rows.notes())
 
 

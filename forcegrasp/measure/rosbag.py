@@ -59,7 +59,7 @@ def _steps(field: str) -> list[tuple[Any, ...]]:
     return [match.groups() for match in found if match]
 
 
-class _Signal(TextRecord):
+class Signal(TextRecord):
     """Where a signal comes from."""
 
     topic: _LongText
@@ -112,7 +112,7 @@ class _Mapping(TextRecord):
     position_std_m: Positive | None = None
     force_std_n: Positive | None = None
     clock: Name
-    signals: dict[str, _Signal]
+    signals: dict[str, Signal]
     grasps: Annotated[tuple[_Cut, ...], counted(1, MAX_ROWS, "a list with one entry per grasp")]
 
 
@@ -135,7 +135,7 @@ def convert_bag(mapping_file: str | Path) -> MeasurementSet:
     if mapping.clock not in signals:
         hint = closest(mapping.clock, signals)
         raise refusal(place, "clock", f"{show(mapping.clock)} is no signal{hint}", MeasurementError)
-    readings = _read_bag(path.parent / mapping.bag, signals)
+    readings = read_bag(path.parent / mapping.bag, signals)
     grasps = tuple(
         _cut(entry, f"{place}: grasps[{index}]", mapping.clock, readings, columns)
         for index, entry in enumerate(mapping.grasps)
@@ -150,8 +150,12 @@ def convert_bag(mapping_file: str | Path) -> MeasurementSet:
     return MeasurementSet(path, path.stem, *about, *noise, grasps, fingerprint)
 
 
-def _read_bag(path: Path, signals: dict[str, _Signal]) -> dict[str, np.ndarray]:
-    """Returns for each signal its times, in seconds since the bag's first message, and values, ``(n, 2)``."""
+def read_bag(path: Path, signals: dict[str, Signal]) -> dict[str, np.ndarray]:
+    """Returns for each signal its times, in seconds since the bag's first message, and values, ``(n, 2)``.
+
+    Raises:
+      MeasurementError: if the extra ``rosbag`` is not installed, the bag can't be read, or a signal is not in it.
+    """
     try:
         from rosbags.highlevel import AnyReader
         from rosbags.typesys import Stores, get_typestore
@@ -188,7 +192,7 @@ def _read_bag(path: Path, signals: dict[str, _Signal]) -> dict[str, np.ndarray]:
     return {name: np.array(values) for name, values in readings.items()}
 
 
-def _value(path: Path, name: str, signal: _Signal, message: Any, kind: str) -> float | None:
+def _value(path: Path, name: str, signal: Signal, message: Any, kind: str) -> float | None:
     try:
         return signal.value(message)
     except (AttributeError, IndexError, TypeError, ValueError) as error:

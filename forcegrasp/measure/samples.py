@@ -21,7 +21,7 @@ def samples_file(path: Path) -> str:
 
 def place(path: Path, grasp: MeasuredGrasp, index: int | None = None, column: str = "") -> str:
     """Where a sample of a grasp stands, for messages: the file, row and column, or the grasp and time if in no file."""
-    where = [f"{samples_file(path)}: grasp {show(grasp.name)}"]
+    where = [f"{samples_file(path)}: {'grasp' if grasp.object else 'recording'} {show(grasp.name)}"]
     if index is not None:
         where.append(f"row {grasp.rows[index]}" if grasp.rows is not None else f"t_s={grasp.time_s[index]:.9g}")
     return ", ".join([*where, f"column {column}"] if column else where)

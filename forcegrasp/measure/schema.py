@@ -151,6 +151,7 @@ class FinalForceTable(ShortRepr):
     final_force_n: np.ndarray  #: ``(n,)``
     fingerprint: str  #: sha256 of all that a result can depend on
     notes: tuple[str, ...] = field(default=(), compare=False)  #: what was odd when it was read, one line each
+    sessions: tuple[str, ...] = ()  #: session of each row; empty if the table does not say
 
     def summary(self) -> str:
         objects = counted(len(set(self.objects)), "object")
@@ -175,11 +176,17 @@ def fingerprint_of_set(
 
 
 def fingerprint_of_table(
-    gripper: str, force_std_n: float | None, objects: Sequence[str], delta_q_m: np.ndarray, final_force_n: np.ndarray
+    gripper: str,
+    force_std_n: float | None,
+    objects: Sequence[str],
+    delta_q_m: np.ndarray,
+    final_force_n: np.ndarray,
+    sessions: Sequence[str] = (),
 ) -> str:
     """Returns a sha256 in hex of the content of a table of final forces, whatever the order of its rows."""
     digest = _Digest("final_force", gripper, force_std_n)
-    for row in sorted(zip(objects, delta_q_m.tolist(), final_force_n.tolist(), strict=True)):
+    columns = [objects, delta_q_m.tolist(), final_force_n.tolist(), *([sessions] if sessions else [])]
+    for row in sorted(zip(*columns, strict=True)):
         digest.facts(*row)
     return digest.hex()
 

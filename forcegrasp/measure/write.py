@@ -10,6 +10,7 @@ import polars as pl
 import yaml
 
 from forcegrasp.errors import MeasurementError
+from forcegrasp.files.neighbour import seen_from
 from forcegrasp.measure.folder import show
 from forcegrasp.measure.samples import check_samples
 from forcegrasp.measure.schema import ENABLED, FORMAT, LOAD, FinalForceTable, MeasurementSet
@@ -76,9 +77,13 @@ def write_table(table: FinalForceTable, folder: str | Path) -> Path:
       MeasurementError: if the folder is not empty or not writable.
     """
     columns = {"object": table.objects, "delta_q_m": table.delta_q_m, "final_force_n": table.final_force_n}
+    if table.sessions:
+        columns["session"] = table.sessions
     return _write(folder, _meta(table, "final_force"), {"table.csv": pl.DataFrame(columns).write_csv})
 
 
+#: Which lines of meta.yaml name a description.
+_GRIPPERS = ("gripper", "mechanism")
 #: What stands where a recording does not say.
 _UNDISTURBED = {ENABLED: 1.0, LOAD: 0.0}
 
@@ -96,6 +101,7 @@ def _meta(measured: MeasurementSet | FinalForceTable, kind: str) -> dict[str, st
 def _write(folder: str | Path, meta: dict[str, str | float | None], files: dict[str, Callable[[Path], object]]) -> Path:
     folder = Path(folder)
     given = {key: float(value) if isinstance(value, float) else value for key, value in meta.items()}
+    given |= {key: seen_from(folder, str(given[key]), folder.resolve().parent) for key in _GRIPPERS if key in given}
     text = yaml.safe_dump({k: v for k, v in given.items() if v is not None}, sort_keys=False, allow_unicode=True)
     try:
         folder.mkdir(parents=True, exist_ok=True)

@@ -20,6 +20,7 @@ from forcegrasp.effects.for_gripper import effect_of
 from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.errors import ConfigError, closest
 from forcegrasp.files import plain_yaml
+from forcegrasp.files.neighbour import seen_from
 from forcegrasp.files.validate import Record, must, refusal, validate, wrong
 from forcegrasp.files.whole_file import write_whole
 from forcegrasp.physics.gripper import Gripper
@@ -96,7 +97,7 @@ def write_model(model: Model, path: str | Path) -> None:
     path = Path(path)
     content: dict[str, Any] = {
         "format": FORMAT,
-        "gripper": model.gripper.name_or_path,
+        "gripper": seen_from(path.parent, model.gripper.name_or_path, path.parent),
         "mujoco": mujoco.__version__,
         "data": dict(model.data),
         "base": {name: _dump(v) for name, v in model.base.items()},
@@ -219,7 +220,8 @@ def _found(path: Path, name: str, entry: _Effect, gripper: Gripper) -> FoundEffe
         known = " or ".join(filter(None, effect.variants)) or "left out"
         raise refusal(path, f"{where}.variant", f"must be {known}")
     known = {p.name: p for p in effect.parameters}
-    return FoundEffect(effect, variant, _fitted(path, where, entry.__pydantic_extra__, known, required=True))
+    before = {p.name: _Interval(value=p.if_missing) for p in effect.parameters if p.if_missing is not None}
+    return FoundEffect(effect, variant, _fitted(path, where, before | entry.__pydantic_extra__, known, required=True))
 
 
 def _fitted(

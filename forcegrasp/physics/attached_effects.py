@@ -21,8 +21,9 @@ class AttachedEffects:
 
     def __init__(self, effects: Sequence[PlantEffect]) -> None:
         self._effects = tuple(effects)
-        self._command, self._act, self._interaction = (
-            [effect for effect in effects if hook in effect.hooks()] for hook in ("command", "act", "interaction")
+        self._command, self._range, self._act, self._interaction = (
+            [effect for effect in effects if hook in effect.hooks()]
+            for hook in ("command", "motor_range", "act", "interaction")
         )
         self.readings = ReadingEffects(effects)
         #: Whether any acts in every step, and not only on the model when a grasp starts.
@@ -64,6 +65,18 @@ class AttachedEffects:
         for effect in self._command:
             command[effect.rows] = effect.command(command[effect.rows], fresh[effect.rows])
         return command
+
+    @property
+    def limit_motors(self) -> bool:
+        """Whether any limits what the motors can give from step to step."""
+        return bool(self._range)
+
+    def motor_range(self, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Least and largest force of the motors in this step, ``(n, motors)``; positive opens."""
+        low, high = low.copy(), high.copy()
+        for effect in self._range:
+            low[effect.rows], high[effect.rows] = effect.motor_range(low[effect.rows], high[effect.rows])
+        return low, high
 
     def contribute(self, totals: Sequence[np.ndarray]) -> bool:
         """Sums up what they contribute to a step; returns whether any may.

@@ -6,6 +6,7 @@ engine's time. The step is up to four times as large, and what a larger step doe
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 
 import mujoco
@@ -19,7 +20,7 @@ SPHERE = "{}_pads"
 _PADS, _GROUND = 1, 2
 # The step is doubled while (step · servo's frequency)² stays below this, and contacts keep their stiffness, for which
 # MuJoCo wants two steps within their time constant.
-_LARGEST_PHASE = 0.05
+_LARGEST_PHASE = 0.1
 # An object has come to rest if it is slower than this after so long. m/s and seconds.
 _AT_REST, _SETTLING_S = 1e-3, 0.5
 
@@ -45,13 +46,37 @@ def compile_fast(
     drives = [model.actuator(motor.actuator).id for motor in motors]
     dofs = [model.joint(motor.joint).dofadr[0] for motor in motors]
     stiffness = model.actuator_gainprm[drives, 0]
-    factor = _step_factor(model, object_geom, stiffness / reference.dof_M0[dofs], largest)
+    factor = _step_factor(model, object_geom, stiffness / _moved_inertia(reference, dofs), largest)
     larger = (factor - 1) * model.opt.timestep
     model.opt.timestep *= factor
     # A step applies a command to all of it, on average half a step early. What the servo gains by that, stiffness
     # times half a step, is its damping's to lose.
     model.dof_damping[dofs] += stiffness * larger / 2
     return model
+
+
+def _moved_inertia(model: mujoco.MjModel, dofs: Sequence[int]) -> np.ndarray:
+    """Inertia that each motor moves, that of joints coupled to it included, kg or kg·m².
+
+    It is what a unit force divides by to accelerate, at the first keyframe, where nothing else acts.
+    """
+    model = copy.copy(model)
+    model.opt.gravity[:] = 0
+    bits = mujoco.mjtDisableBit
+    for other in bits.mjDSBL_CONTACT, bits.mjDSBL_LIMIT, bits.mjDSBL_FRICTIONLOSS, bits.mjDSBL_ACTUATION:
+        model.opt.disableflags |= other
+    data = mujoco.MjData(model)
+    if model.nkey:
+        mujoco.mj_resetDataKeyframe(model, data, 0)
+    mujoco.mj_forward(model, data)
+    at_rest = data.qacc.copy()  # springs may act
+    inertia = np.empty(len(dofs))
+    for index, dof in enumerate(dofs):
+        data.qfrc_applied[:] = 0
+        data.qfrc_applied[dof] = 1
+        mujoco.mj_forward(model, data)
+        inertia[index] = 1 / (data.qacc[dof] - at_rest[dof])
+    return inertia
 
 
 def _step_factor(model: mujoco.MjModel, object_geom: str, frequency_squared: np.ndarray, largest: int) -> int:

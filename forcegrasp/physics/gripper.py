@@ -23,6 +23,12 @@ from forcegrasp.short_repr import ShortRepr, counted, cut
 TIERS = {"reference": 1, "fitting": 2, "fast": 4}
 #: Parameters that the simulator itself understands; they need no `writes`.
 SPECIAL = ("force_scale", "radius_m", "offset_m")
+#: Parameter of a mechanism: how much later than a row's command its readings were taken, s. It needs no `writes`.
+SKEW = "readout_skew_s"
+#: Parameter of a mechanism: what an effort reads for one N or N·m of the motor, such as a current. Nor does it.
+EFFORT_SCALE = "effort_scale"
+#: Parameters that change what is read, and nothing that happens.
+OF_READINGS = ("force_scale", EFFORT_SCALE, SKEW)
 SIDES = ("left", "right")
 # A motor that moves by less than this share of the largest command step stands against something.
 _STALL = 0.1
@@ -35,7 +41,7 @@ NO_FORCES = (
 
 @dataclass(frozen=True, repr=False)
 class Gripper(ShortRepr):
-    """A gripper with one or two motors and two sides that press on an object between them, as a MuJoCo scene."""
+    """A gripper of one or two motors, with two sides that press on an object, or a mechanism of any; a MuJoCo scene."""
 
     name: str
     path: Path  #: of the description
@@ -54,7 +60,8 @@ class Gripper(ShortRepr):
     #: Sizes of effects in the catalogue are for a stroke and a motor force of 1; these are the gripper's.
     position_scale: float
     force_scale: float
-    command: str = "position"  #: what is commanded: "position" or "effort"
+    command: str = "position"  #: what is commanded: "position", "effort" or "voltage"
+    unsigned: bool = False  #: whether the motors' efforts are read as sizes without a sign
 
     def summary(self) -> str:
         return f"{cut(self.name)}, {counted(len(self.parameters), 'parameter')}"
@@ -72,16 +79,17 @@ class Gripper(ShortRepr):
     @property
     def positions(self) -> tuple[Channel, ...]:
         """What the encoders read, one per motor."""
-        return tuple(Channel(f"position{s}", f"q{s}_{self.unit}", self.unit) for s in self._suffixes(len(self.motors)))
+        return tuple(Channel(f"position{s}", f"q{s}_{self.unit}", self.unit) for s in self._motor_suffixes)
 
     @property
     def commands(self) -> tuple[Channel, ...]:
         """What is commanded, one per motor."""
         if self.command == "effort":
-            return (Channel("command", "taudes_nm" if self.unit == "rad" else "fdes_n", self.effort_unit),)
-        return tuple(
-            Channel(f"command{s}", f"qdes{s}_{self.unit}", self.unit) for s in self._suffixes(len(self.motors))
-        )
+            what, unit = ("taudes", "nm") if self.unit == "rad" else ("fdes", "n")
+            return tuple(Channel(f"command{s}", f"{what}{s}_{unit}", self.effort_unit) for s in self._motor_suffixes)
+        if self.command == "voltage":
+            return tuple(Channel(f"command{s}", f"udes{s}_v", "V") for s in self._motor_suffixes)
+        return tuple(Channel(f"command{s}", f"qdes{s}_{self.unit}", self.unit) for s in self._motor_suffixes)
 
     @property
     def is_servo(self) -> bool:
@@ -94,6 +102,11 @@ class Gripper(ShortRepr):
         return [] if self.is_servo else list(zip(SIDES, self.fingers, strict=True))
 
     @property
+    def latest_reading_s(self) -> float:
+        """How much later than its command a sample may have been read, seconds."""
+        return max(0.0, self.parameters[SKEW].high) if SKEW in self.parameters else 0.0
+
+    @property
     def effort_unit(self) -> str:
         """Unit of a motor's effort: "N" or "N·m"."""
         return "N·m" if self.unit == "rad" else "N"
@@ -102,17 +115,21 @@ class Gripper(ShortRepr):
     def forces(self) -> tuple[Channel, ...]:
         """What is read of the forces: one per finger with a sensor, or per motor whose effort is read, or none."""
         if self.is_servo:
-            column = "tau_nm" if self.unit == "rad" else "f_n"
-            return (Channel("effort", column, self.effort_unit),) if self.force == "motor" else ()
+            what, unit = ("tau", "nm") if self.unit == "rad" else ("f", "n")
+            suffixes = self._motor_suffixes if self.force == "motor" else []
+            return tuple(Channel(f"effort{s}", f"{what}{s}_{unit}", self.effort_unit) for s in suffixes)
         if self.force == "motor":
-            suffixes = self._suffixes(len(self.motors))
+            suffixes = self._motor_suffixes
         else:
             suffixes = [f"_{side[0]}" for side, f in self.sides if f.force_sensor]
         return tuple(Channel(f"force{s}", f"f{s}_n", "N") for s in suffixes)
 
-    @staticmethod
-    def _suffixes(count: int) -> list[str]:
-        return ["_l", "_r"] if count == 2 else [""]
+    @property
+    def _motor_suffixes(self) -> list[str]:
+        """What tells motors apart in names: left and right of a gripper's, joints of a mechanism's, nothing of one."""
+        if len(self.motors) == 1:
+            return [""]
+        return [f"_{motor.joint}" for motor in self.motors] if self.is_servo else ["_l", "_r"]
 
     @property
     def is_symmetric(self) -> bool:
@@ -177,7 +194,9 @@ class Gripper(ShortRepr):
 
     @property
     def shape(self) -> str:
-        """What the scene's object is: "cylinder", "sphere" or "box"."""
+        """What the scene's object is: "cylinder", "sphere" or "box"; empty of a mechanism that grasps nothing."""
+        if self.is_servo:
+            return ""
         geom = self.compile().geom(self.object_geom)
         return mujoco.mjtGeom(geom.type[0]).name.removeprefix("mjGEOM_").lower()
 

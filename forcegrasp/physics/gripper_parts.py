@@ -25,6 +25,7 @@ class FieldWrite:
     field: str
     column: int | None
     sign: float
+    joint: str = ""  #: of a mechanism: the one joint, or the motor on it, whose field follows; empty for all
 
 
 @dataclass(frozen=True)

@@ -11,20 +11,20 @@ from pydantic import AfterValidator, Field, PlainValidator, PositiveFloat, model
 
 from forcegrasp.errors import closest
 from forcegrasp.files.validate import Record, counted, must, text, wrong
-from forcegrasp.physics.gripper import SIDES, SPECIAL
+from forcegrasp.physics.gripper import EFFORT_SCALE, SIDES, SKEW, SPECIAL
 from forcegrasp.physics.gripper_parts import BaseParameter, FieldWrite
 
 FORMAT, FIRST_FORMAT = "forcegrasp-gripper/2", "forcegrasp-gripper/1"
 MECHANISM_FORMAT = "forcegrasp-mechanism/1"
-_WRITE = re.compile(r"(-?)((?:actuator|dof|geom)_\w+)(?: (\d+))?")
+_WRITE = re.compile(r"(-?)((?:actuator|dof|geom)_\w+)(?:@([^ @]+))?(?: (\d+))?")
 
 
 def _field_write(written: object) -> FieldWrite:
     match = _WRITE.fullmatch(str(written))
     if not match:
         raise wrong(f"{str(written)[:40]!r} must look like `actuator_gainprm 0` or `-dof_damping`")
-    sign, field, column = match.groups()
-    return FieldWrite(field, None if column is None else int(column), -1.0 if sign else 1.0)
+    sign, field, joint, column = match.groups()
+    return FieldWrite(field, None if column is None else int(column), -1.0 if sign else 1.0, joint or "")
 
 
 Name = Annotated[str, text(200)]
@@ -236,17 +236,28 @@ class ServoParameter(ParameterEntry):
         return dataclasses.replace(super().named(name), times=self.times or "")
 
 
+def _writes_or_is_read(parameters: dict[str, ServoParameter]) -> dict[str, ServoParameter]:
+    for name, parameter in parameters.items():
+        if not parameter.writes and name not in (SKEW, EFFORT_SCALE):
+            raise wrong("must name a field of the model, such as `dof_damping`", name, "writes")
+        if parameter.writes and name in (SKEW, EFFORT_SCALE):
+            raise wrong(f"must be []; the simulator knows what {name} is", name, "writes")
+    return parameters
+
+
 class MechanismDescription(Record):
     """A servo without fingers and object, whose recordings are compared with the model."""
 
     format: str = Field(description=MECHANISM_FORMAT)
     name: Name = Field(description="for titles and messages, and so that models know theirs")
     model: Name = Field(description="the MJCF, beside the description", examples=["my_servo.xml"])
-    motors: Annotated[Sequence[ServoEntry], counted(1, 1, "a list of one motor")] = Field(
+    motors: Annotated[Sequence[ServoEntry], counted(1, 12, "a list of motors, 12 at most")] = Field(
         examples=["[{joint: j, actuator: a, span: 1}]"]
     )
-    command: Literal["position", "effort"] = Field(default="position", description="what is commanded")
-    effort: Literal["motor", "none"] = Field(default="none", description="whether the motor's effort is read")
+    command: Literal["position", "effort", "voltage"] = Field(default="position", description="what is commanded")
+    effort: Literal["motor", "unsigned", "none"] = Field(default="none", description="how the motor's effort is read")
     period_s: PositiveFloat = Field(default=0.02, description="time between two commands, s")
     scale: ScaleEntry | None = None
-    parameters: dict[str, ServoParameter] = Field(description="the base model")
+    parameters: Annotated[dict[str, ServoParameter], AfterValidator(_writes_or_is_read)] = Field(
+        description="the base model"
+    )

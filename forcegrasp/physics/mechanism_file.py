@@ -8,7 +8,7 @@ from typing import Any
 
 import mujoco
 
-from forcegrasp.errors import closest
+from forcegrasp.errors import ConfigError, closest
 from forcegrasp.files.validate import refusal, validate
 from forcegrasp.physics.gripper import Gripper
 from forcegrasp.physics.gripper_checks import check_write, compile_scene
@@ -26,42 +26,56 @@ def load_mechanism(path: Path, raw: dict[str, Any]) -> Gripper:
       ConfigError: if it can't be right; names the file and the line's key.
     """
     said = validate(MechanismDescription, raw, path)
-    (entry,), scale = said.motors, said.scale or ScaleEntry()
-    motor = Motor(entry.actuator, entry.joint, 0.0, entry.span, "m")
+    scale, span = said.scale or ScaleEntry(), sum(entry.span for entry in said.motors) / len(said.motors)
     mechanism = Gripper(
         name=said.name,
         path=path,
         model=path.parent / said.model,
         fast="none",
-        motors=(motor,),
+        motors=tuple(Motor(entry.actuator, entry.joint, 0.0, entry.span, "m") for entry in said.motors),
         fingers=(),
-        force="motor" if said.effort == "motor" else "none",
+        force="none" if said.effort == "none" else "motor",
         object_joint="",
         object_geom="",
         axis=0,
         period_s=said.period_s,
-        max_step=entry.span * STEP_SHARE,
+        max_step=span * STEP_SHARE,
         parameters={name: p.named(name) for name, p in said.parameters.items()},
         training=NO_TRAINING,
-        position_scale=scale.position or entry.span / TYPICAL_STROKE,
+        position_scale=scale.position or span / TYPICAL_STROKE,
         force_scale=scale.force,
         command=said.command,
+        unsigned=said.effort == "unsigned",
     )
     return _in_scene(mechanism)
 
 
 def _in_scene(mechanism: Gripper) -> Gripper:
-    """Checks names and fields against the scene, and takes the unit of the motor from it."""
+    """Checks names and fields against the scene, and takes the unit of the motors from it."""
     model = compile_scene(mechanism.model)
-    (motor,) = mechanism.motors
-    for key, name, known in (
-        ("motors.joint", motor.joint, [model.joint(i).name for i in range(model.njnt)]),
-        ("motors.actuator", motor.actuator, [model.actuator(i).name for i in range(model.nu)]),
-    ):
-        if name not in known:
-            raise refusal(mechanism.path, key, f"{mechanism.model.name} has no {name!r}{closest(name, known)}")
+    names = {
+        "joint": [model.joint(i).name for i in range(model.njnt)],
+        "actuator": [model.actuator(i).name for i in range(model.nu)],
+    }
+    for index, motor in enumerate(mechanism.motors):
+        for key, known in names.items():
+            name = getattr(motor, key)
+            if name not in known:
+                problem = f"{mechanism.model.name} has no {name!r}{closest(name, known)}"
+                raise refusal(mechanism.path, f"motors[{index}].{key}", problem)
+            if name in [getattr(other, key) for other in mechanism.motors[:index]]:
+                raise refusal(mechanism.path, f"motors[{index}].{key}", f"{name} is there twice")
+    joints = [motor.joint for motor in mechanism.motors]
     for parameter in mechanism.parameters.values():
         for write in parameter.writes:
-            check_write(f"{mechanism.path}: parameters.{parameter.name}.writes: {write.field}", model, write)
-    turns = model.joint(motor.joint).type[0] == mujoco.mjtJoint.mjJNT_HINGE
-    return dataclasses.replace(mechanism, motors=(dataclasses.replace(motor, unit="rad" if turns else "m"),))
+            where = f"{mechanism.path}: parameters.{parameter.name}.writes: {write.field}"
+            check_write(where, model, write)
+            if write.joint and write.joint not in joints:
+                raise ConfigError(f"{where}@{write.joint}: is no motor's joint{closest(write.joint, joints)}")
+    turns = {model.joint(joint).type[0] == mujoco.mjtJoint.mjJNT_HINGE for joint in joints}
+    if len(turns) > 1:
+        raise refusal(mechanism.path, "motors", "some of their joints turn and some slide; describe them apart")
+    unit = "rad" if turns.pop() else "m"
+    return dataclasses.replace(
+        mechanism, motors=tuple(dataclasses.replace(motor, unit=unit) for motor in mechanism.motors)
+    )

@@ -13,7 +13,7 @@ from mujoco.batch import Batch
 from forcegrasp.physics import guard
 from forcegrasp.physics.attached_effects import AttachedEffects
 from forcegrasp.physics.fast import SPHERE
-from forcegrasp.physics.gripper import Gripper
+from forcegrasp.physics.gripper import OF_READINGS, Gripper
 from forcegrasp.physics.gripper_parts import BaseParameter
 from forcegrasp.physics.inertia import inertia_of_radius
 from forcegrasp.physics.protocols import PlantEffect
@@ -22,6 +22,9 @@ from forcegrasp.physics.scene_layout import SceneLayout
 # Constraint that holds a finger against dry friction: as stiff as the step allows, lest it creeps under load.
 _STIFF_SOLREF = (0.004, 1.0)
 _STIFF_SOLIMP = (0.99, 0.9999, 0.001, 0.5, 2.0)
+
+# What motor_force and outside_force are made of.
+_FORCES = ("qfrc_actuator", "qfrc_spring", "qfrc_bias")
 
 
 class Plant(SceneLayout):
@@ -62,19 +65,21 @@ class Plant(SceneLayout):
         self._prepare(model)
         self.batch = batch = Batch(model, n, threads)
         self._qpos, self._ctrl, self._sensors = (batch.bind(name) for name in ("qpos", "ctrl", "sensordata"))
-        self._motor_velocity = batch.bind("qvel")[:, self._motor_v]
+        self._qvel = batch.bind("qvel")
         self._fields: dict[str, np.ndarray] = {}
         self._base: dict[str, np.ndarray] = {}
-        self._load = np.zeros(n)
-        self._force_range: np.ndarray | None = None  # of the motors, where some are switched off
+        self._load, self._enabled = np.zeros(n), np.ones(n, bool)
+        self._at_start = np.ones(n, bool)  # which rows made no step since they were reset
+        self._force_range: np.ndarray | None = None  # of the motors, before it was changed while they move
         self._friction_active: np.ndarray | None = None  # which motors' friction was stiffened, ``(n, motors)``
         self.effects = AttachedEffects(())
         self.force_scale = np.ones(n)  #: f_α, factor from the force sensors to the reading, ``(n,)``
         #: What effects contribute to a step, all together: see :class:`~forcegrasp.physics.protocols.Contribution`.
-        self.friction = np.zeros((n, self.motors))
+        self.friction, self.damping, self.motor_push = np.zeros((3, n, self.motors))
         self.pad_shift_m, self.finger_push_n = np.zeros((2, n, 2))
         self.object_push_n = np.zeros(n)
-        self._contributed = (self.friction, self.pad_shift_m, self.finger_push_n, self.object_push_n)
+        pushes = self.finger_push_n, self.object_push_n, self.damping, self.motor_push
+        self._contributed = (self.friction, self.pad_shift_m, *pushes)
         self.position = np.zeros((n, self.motors))  #: of the motors (left, right, or the one), m or rad; 0 is closed
         #: Sum of each finger's contact forces at the last physics step, before f_α, newtons, ``(n, 2)``.
         self.pad_force = np.zeros((n, 2))
@@ -117,7 +122,27 @@ class Plant(SceneLayout):
     @property
     def velocity(self) -> np.ndarray:
         """Velocities of the motors, m/s or rad/s, ``(n, motors)``; positive opens."""
-        return self._motor_velocity * self._signs
+        return self._qvel[:, self._motor_v] * self._signs
+
+    @property
+    def inertia(self) -> np.ndarray:
+        """Inertia that each motor moves where the scene puts it, kg or kg·m², ``(n, motors)``."""
+        return self.batch.expand("dof_M0")[:, self._motor_v]
+
+    @property
+    def motor_force(self) -> np.ndarray:
+        """What the motors gave in the last physics step, N or N·m, ``(n, motors)``; 0 before the first one."""
+        given = self.batch.bind("qfrc_actuator")[:, self._motor_v] * self._signs
+        return np.where(self._at_start[:, None], 0.0, given)
+
+    @property
+    def outside_force(self) -> np.ndarray:
+        """What acts on the motors' joints from outside, N or N·m, ``(n, motors)``; positive opens.
+
+        Gravity, springs, a load and what presses against the pads; not friction, and not what effects push.
+        """
+        weight = self.batch.bind("qfrc_spring") - self.batch.bind("qfrc_bias")
+        return weight[:, self._motor_v] * self._signs + self._to_motors(self.pad_force) + self._load[:, None]
 
     @property
     def pad_position(self) -> np.ndarray:
@@ -161,8 +186,15 @@ class Plant(SceneLayout):
     def write(self, parameter: BaseParameter, ids: np.ndarray, values: np.ndarray) -> None:
         """Writes a base parameter of these rows into the fields that follow it. ``values``: ``(len(ids),)``."""
         rows = {"actuator": self.actuators, "dof": self.gripper_dofs, "geom": self.object_geoms}
+        joints = [motor.joint for motor in self.gripper.motors]
         for write in parameter.writes:
-            for row in rows[write.field.split("_")[0]]:
+            kind = write.field.split("_")[0]
+            own = (
+                [(self.actuators if kind == "actuator" else self.motor_dofs)[joints.index(write.joint)]]
+                if write.joint
+                else []
+            )
+            for row in own or rows[kind]:
                 column = () if write.column is None else (write.column,)
                 more = self._more_damping[row] if write.field == "dof_damping" else 0.0
                 self._write_base(write.field, (ids, row, *column), write.sign * values + more)
@@ -185,21 +217,43 @@ class Plant(SceneLayout):
         An object that is more than the one geom, or has an inertia of its own in the scene, keeps its inertia.
         Bounding boxes, radii and inverse weights follow from these: :meth:`reset` has MuJoCo do it.
         """
-        model, geom = self.model, self.model.geom(self.gripper.object_geom)
-        column = self.gripper.axis if geom.type[0] == mujoco.mjtGeom.mjGEOM_BOX else 0
-        self._write_base("geom_size", (ids, geom.id, column), radius_m)
+        for field, where, values in self._radius_fields(ids, radius_m):
+            self._write_base(field, where, values)
+
+    def change_radius(self, ids: np.ndarray, change_m: np.ndarray) -> None:
+        """Makes objects larger than base parameters say, until the next reset; a tenth of the radius is left at least.
+
+        For an effect's ``change_model``. ``change_m``: ``(len(ids),)``.
+        """
+        geom = self.model.geom(self.gripper.object_geom)
+        radius = self.base("geom_size")[ids, geom.id, self._radius_column]
+        for field, where, values in self._radius_fields(ids, np.maximum(radius + change_m, radius / 10)):
+            self.field(field)[where] = values
+
+    @property
+    def _radius_column(self) -> int:
+        is_box = self.model.geom(self.gripper.object_geom).type[0] == mujoco.mjtGeom.mjGEOM_BOX
+        return self.gripper.axis if is_box else 0
+
+    def _radius_fields(self, ids: np.ndarray, radius_m: np.ndarray) -> list[tuple[str, tuple[Any, ...], np.ndarray]]:
+        """Fields that follow an object's radius: name, where, and what they become."""
+        model, geom, column = self.model, self.model.geom(self.gripper.object_geom), self._radius_column
+        fields: list[tuple[str, tuple[Any, ...], np.ndarray]] = [("geom_size", (ids, geom.id, column), radius_m)]
         sphere = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, SPHERE.format(geom.name))
         if sphere >= 0:
-            self._write_base("geom_size", (ids, sphere, 0), radius_m)
+            fields.append(("geom_size", (ids, sphere, 0), radius_m))
         as_in_scene = inertia_of_radius(model, self.gripper, geom.size[column : column + 1])
         if np.allclose(as_in_scene, model.body_inertia[self._object_body], rtol=1e-9):
             inertia = inertia_of_radius(model, self.gripper, radius_m)
-            self._write_base("body_inertia", (ids, self._object_body), inertia)
+            fields.append(("body_inertia", (ids, self._object_body), inertia))
+        return fields
 
     def attach(self, effects: Sequence[tuple[PlantEffect, np.ndarray]]) -> None:
         """Puts effects into the plant, each on its own rows, in the order of their stages; replaces earlier ones."""
         ranked = sorted(effects, key=lambda pair: pair[0].rank)
         self.effects = AttachedEffects([effect.attach(self, rows) for effect, rows in ranked])
+        for name in _FORCES if self.effects.act_in_steps else ():
+            self.batch.bind(name)  # the engine copies it from its next call on
 
     def reset(
         self,
@@ -228,10 +282,12 @@ class Plant(SceneLayout):
         if position is not None:
             self._place(ids, position)
         if velocity is not None:
-            self._motor_velocity[ids] = velocity * self._signs
+            self._qvel[ids[:, None], self.motor_dofs] = velocity * self._signs
         if not self.gripper.is_servo:
             self._qpos[ids, self._object_qpos] = self._object_origin + offset_m
-        self._force_range = None
+        if self._force_range is not None:
+            self._force_range[ids] = self.field("actuator_forcerange")[ids][:, self.actuators]
+        self._enabled[ids] = self._at_start[ids] = True
         self.batch.forward(ids)
         self.position = self._motors_of(self._qpos)
         self.pad_shift_m[ids] = 0
@@ -254,7 +310,7 @@ class Plant(SceneLayout):
             address = self.model.jnt_qposadr[self.model.dof_jntid[dof]]
             mover = self._mover[1] if dof in self._dofs_of_right else self._mover[0]
             self._qpos[ids, address] = np.interp(position[:, mover], law.position, law.qpos[:, address])
-        self._qpos[ids, self._motor_q] = position * self._signs + self._origins
+        self._qpos[ids[:, None], self._motor_qpos] = position * self._signs + self._origins
 
     # --- time ----------------------------------------------------------------------------------------------------
 
@@ -276,6 +332,7 @@ class Plant(SceneLayout):
             self._send(self.effects.command(command, fresh))
             self._apply_actions()
             self.batch.step(nstep=1)
+            self._at_start[:] = False
             self._read()
             fresh = np.zeros(self.n, bool)
 
@@ -288,10 +345,8 @@ class Plant(SceneLayout):
         """
         self._load = load
         self.batch.bind("qfrc_applied")[:, self._motor_v] = load[:, None] * self._signs
-        ranges = self.field("actuator_forcerange")
-        if self._force_range is None:
-            self._force_range = ranges[:, self.actuators].copy()
-        ranges[:, self.actuators] = np.where(enabled[:, None, None], self._force_range, 0.0)
+        self._enabled = np.array(enabled, bool)
+        self._write_force_range()
 
     def play(self, commands: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Holds each command for one physics step, as :meth:`advance` does, in one call of the engine.
@@ -329,13 +384,31 @@ class Plant(SceneLayout):
     def _send(self, command: np.ndarray) -> None:
         self._ctrl[:, self._drives] = command * self._command_scale + self._command_zero
 
+    def _write_force_range(self) -> None:
+        """Limits the motors as effects say, and holds still those that are switched off."""
+        ranges = self.field("actuator_forcerange")
+        if self._force_range is None:
+            self._force_range = ranges[:, self.actuators].copy()
+        allowed = self._force_range
+        if self.effects.limit_motors:
+            turned = self._drive_signs < 0  # those whose force closes where it is positive
+            low, high = allowed[..., 0], allowed[..., 1]
+            low, high = np.where(turned, -high, low), np.where(turned, -low, high)
+            low, high = self.effects.motor_range(low, high)
+            allowed = np.stack([np.where(turned, -high, low), np.where(turned, -low, high)], axis=-1)
+        ranges[:, self.actuators] = np.where(self._enabled[:, None, None], allowed, 0.0)
+
     def _apply_actions(self) -> None:
+        if self.effects.limit_motors:
+            self._write_force_range()
         if not self.effects.contribute(self._contributed):
             return
         self._write_friction()
+        self._write_damping()
         self._write_pad_shift()
         push = self.batch.bind("qfrc_applied")
-        push[:, self._motor_v] = (self._to_motors(self.finger_push_n) + self._load[:, None]) * self._signs
+        on_motors = self._to_motors(self.finger_push_n) + self.motor_push + self._load[:, None]
+        push[:, self._motor_v] = on_motors * self._signs
         if not self.gripper.is_servo:
             push[:, self.object_dof] = self.object_push_n
 
@@ -355,6 +428,10 @@ class Plant(SceneLayout):
         more = (self.field("dof_frictionloss") > self.base("dof_frictionloss"))[rows, dof, None]
         for name, stiff in (("dof_solref", _STIFF_SOLREF), ("dof_solimp", _STIFF_SOLIMP)):
             self.field(name)[rows, dof] = np.where(more, stiff, self.base(name)[rows, dof])
+
+    def _write_damping(self) -> None:
+        if self.damping.any() or "dof_damping" in self._fields:
+            self.field("dof_damping")[:, self._motor_v] = self.base("dof_damping")[:, self._motor_v] + self.damping
 
     def _write_pad_shift(self) -> None:
         if not self.pad_shift_m.any() and "geom_pos" not in self._fields:
@@ -403,6 +480,6 @@ def write_base(plant: Plant, ids: np.ndarray, values: Mapping[str, np.ndarray]) 
             plant.force_scale[ids] = value
         elif name == "radius_m":
             plant.write_radius(ids, value)
-        elif name != "offset_m":
+        elif name not in ("offset_m", *OF_READINGS):
             plant.write(plant.gripper.parameters[name], ids, value)
     return values.get("offset_m", np.zeros(len(ids)))

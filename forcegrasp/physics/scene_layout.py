@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import mujoco
@@ -30,14 +31,18 @@ class SceneLayout:
         self._find_object(gripper, model)
         self.actuators = [model.actuator(motor.actuator).id for motor in gripper.motors]
         # where motors stand in the engine's arrays: slices, for they are read and written in every step
-        self._motor_q = _slice(*(joint.qposadr[0] for joint in joints))
-        self._motor_v, self._drives = _slice(*self.motor_dofs), _slice(*self.actuators)
+        self._motor_qpos = [int(joint.qposadr[0]) for joint in joints]
+        self._motor_q = _places(self._motor_qpos)
+        self._motor_v, self._drives = _places(self.motor_dofs), _places(self.actuators)
         self._pads = [_Pads.find(model, finger.body) for finger in gripper.fingers]
         self._signs = np.array([motor.sign for motor in gripper.motors])
         self._origins = np.array([motor.closed for motor in gripper.motors])
         self._command_scale, self._command_zero = np.ones(self.motors), np.zeros(self.motors)
+        #: 1 for a motor whose actuator opens with a positive force, else −1
+        self._drive_signs = np.array([m.sign * np.sign(model.actuator(m.actuator).gear[0]) for m in gripper.motors])
         if gripper.command == "position":
             self._command_scale, self._command_zero = command_law(gripper.motors, model)
+            self._drive_signs = np.sign(self._command_scale)
         movers = [finger.motor for finger in gripper.fingers] or [-1, -1]
         #: Which motor moves each side, and how far its pads go per unit of it; 0 for a side that stands still.
         self._mover = np.array([max(motor, 0) for motor in movers])
@@ -151,10 +156,11 @@ def _reading(model: mujoco.MjModel, side: str, finger: Finger) -> slice:
     return slice(sensor.adr[0], sensor.adr[0] + sensor.dim[0], 1 if finger.force_sensor else 3)
 
 
-def _slice(one: int, other: int | None = None) -> slice:
-    """The slice that holds these indices, in this order."""
-    if other is None:
-        return slice(int(one), int(one) + 1)
-    step = int(other - one)
-    end = int(other) + (1 if step > 0 else -1)
-    return slice(int(one), None if end < 0 else end, step)
+def _places(indices: Sequence[int]) -> slice | np.ndarray:
+    """These indices, in this order: as a slice if they are evenly spaced, which is faster."""
+    steps = set(np.diff(indices).tolist())
+    if len(steps) > 1 or 0 in steps:
+        return np.array(indices, int)
+    step = int(next(iter(steps), 1))
+    end = int(indices[-1]) + (1 if step > 0 else -1)
+    return slice(int(indices[0]), None if end < 0 else end, step)

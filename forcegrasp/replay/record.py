@@ -97,7 +97,7 @@ def record(
     position = with_noise(readings.position, position_std_m, rng.standard_normal(readings.position.shape), steps[0])
     force = with_noise(readings.force, force_std_n, rng.standard_normal(readings.force.shape), steps[1])
     full = tuple(dataclasses.replace(g, position_m=position[i], force_n=force[i]) for i, g in enumerate(bare))
-    name = gripper.path.stem if gripper.is_shipped else str(gripper.path.resolve())
+    name = gripper.name_or_path
     noise = (position_std_m or None, force_std_n or None)  # a set without noise does not give any
     fingerprint = fingerprint_of_set(name, *noise, full)
     source = f"simulated by forcegrasp record, plan {plan}, seed {seed}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -56,7 +57,8 @@ class Replay:
     """Replays grasps of one gripper.
 
     A command acts from the physics step at its time stamp until the next command's; a reading is the state at its time
-    stamp, before that command acts. Nothing is interpolated.
+    stamp, before that command acts. Of grasps it is that of the nearest physics step; of a servo, which may be sampled
+    faster than that and read later than commanded, it lies between two.
 
     Args:
       gripper: what is simulated.
@@ -84,6 +86,11 @@ class Replay:
         samples = max(len(start) for start in starts)
         #: physics step at which each sample is taken, ``(grasps, samples)``
         self.sample_steps = np.stack([np.pad(start, (0, samples - len(start)), "edge") for start in starts])
+        self._instants = None  # when each sample is taken, in steps, if that is no whole number
+        if gripper.is_servo:
+            self._steps += 1 + math.ceil(gripper.latest_reading_s / self.dt)
+            real = [(g.time_s - g.time_s[0]) / self.dt for g in self.grasps]
+            self._instants = np.stack([np.pad(r, (0, samples - len(r)), "edge") for r in real])
         #: which samples there are, ``(grasps, samples)``
         self.mask = np.stack([np.arange(samples) < len(start) for start in starts])
         self._command = np.stack(
@@ -128,7 +135,7 @@ class Replay:
 
         Args:
           grasp: which grasp each row replays, ``(n,)``.
-          base: base parameters by name, each ``(n,)``; `force_scale` has no place here.
+          base: base parameters by name, each ``(n,)``, but those of readings.
           effects: those that change what happens.
 
         Raises:
@@ -172,7 +179,12 @@ class Replay:
         return Motion(grasp, position, force, objects)
 
     def read(
-        self, motion: Motion, rows: np.ndarray, force_scale: np.ndarray, effects: Sequence[EffectOn] = ()
+        self,
+        motion: Motion,
+        rows: np.ndarray,
+        force_scale: np.ndarray,
+        effects: Sequence[EffectOn] = (),
+        skew_s: np.ndarray | None = None,
     ) -> Readings:
         """Reads rows of a motion through sensors.
 
@@ -181,27 +193,58 @@ class Replay:
           rows: which row of the motion each reading is of, ``(n,)``; the same row may be read in several ways.
           force_scale: f_α, ``(n,)``.
           effects: those that change what is read; their rows count readings.
+          skew_s: how much later than its command each row's samples were read, ``(n,)``; at its time stamp by default.
         """
-        steps, grasp = self.sample_steps[motion.grasp[rows]], motion.grasp[rows]
-        each = np.asarray(rows)[:, None]
-        position, objects = motion.position[each, steps], motion.object_position[each, steps]
+        at = self._when(motion.grasp[rows], skew_s)
+        position, objects = at.of(motion.position, rows), at.of(motion.object_position, rows)
+        scale = force_scale[:, None, None]
         if not effects:
-            return Readings(position, motion.force[each, steps] * force_scale[:, None, None], objects)
-        force = motion.force[rows] * force_scale[:, None, None]
+            return Readings(position, self._transduced(at.of(motion.force, rows) * scale), objects)
+        force = self._transduced(motion.force[rows] * scale)
         live = ReadingEffects([self._on_readings(effect) for effect in effects])
         true_position = motion.position[rows] if live.change_position else motion.position[:0]
         for step in range(self._steps):
             live.apply(true_position[:, step], force[:, step])
-        count = np.arange(len(grasp))[:, None]
+        count = np.arange(len(rows))
         if live.change_position:
-            position = true_position[count, steps]
-        return Readings(position, force[count, steps], objects)
+            position = at.of(true_position, count)
+        return Readings(position, at.of(force, count), objects)
+
+    def _when(self, grasp: np.ndarray, skew_s: np.ndarray | None) -> _Instants:
+        """When the samples of these grasps are read."""
+        if self._instants is None:
+            return _Instants(self.sample_steps[grasp])
+        later = np.zeros(len(grasp)) if skew_s is None else skew_s / self.dt
+        instants = np.clip(self._instants[grasp] + later[:, None], 0, self._steps - 1)
+        before = np.minimum(instants.astype(int), self._steps - 2)
+        return _Instants(before, instants - before)
+
+    def _transduced(self, force: np.ndarray) -> np.ndarray:
+        """What goes into force readings: all of it, or its size."""
+        return np.abs(force) if self.gripper.unsigned else force
 
     def _on_readings(self, one: EffectOn) -> Effect:
         """An effect that changes what is read, on its readings, without a plant."""
         effect = one.effect(one.values, self.dt, one.variant)
         effect.rows = np.asarray(one.rows)
         return effect
+
+
+@dataclass(frozen=True)
+class _Instants:
+    """When samples are read: at physics steps, or between two of them."""
+
+    before: np.ndarray  #: the last physics step until then, ``(n, samples)``
+    share: np.ndarray | None = None  #: of the step after it that has passed; None for none
+
+    def of(self, values: np.ndarray, rows: np.ndarray) -> np.ndarray:
+        """What is read of these rows of values ``(m, steps, ...)``: ``(n, samples, ...)``."""
+        each = np.asarray(rows)[:, None]
+        before = values[each, self.before]
+        if self.share is None:
+            return before
+        share = self.share.reshape(*self.share.shape, *(1,) * (before.ndim - 2))
+        return before + share * (values[each, self.before + 1] - before)
 
 
 def join(motions: Sequence[Motion]) -> Motion:

@@ -24,6 +24,13 @@ _MARKED = 2.0
 # What the residual is drawn against.
 _DRAWN = ("time_since_contact_s", "velocity_m_s", "direction", "force_n", "command_m")
 _WORST = 3
+#: What the phases of grasps, and those of a servo, are.
+PHASE_WORDS = {
+    "grasp": "Free: no finger touches; first contact: one finger, or both for less than 0.2 s; both: both press;"
+    " hold: both press and the command rests; release: opening, until 0.2 s after.",
+    "window": "Moving: the command moves; reversing: it turned round less than 0.2 s ago; holding: it rests for 0.3 s;"
+    " released: the motor is switched off.",
+}
 # Share of the error below which what it goes with is no news.
 _WORTH_TELLING = 0.05
 
@@ -81,6 +88,7 @@ def compare_json(comparison: Comparison, name: str, model: str, notes: list[str]
         "heldout": held,
         "noise_given": target.sigma_known,
         "grasps": {g.name: float(e) for g, e in zip(target.grasps, comparison.by_grasp(), strict=True)},
+        "recordings": comparison.by_recording(),
         "explained_by": [
             {"covariate": covariate, "signal": kind, "share": share}
             for covariate, kind, share in comparison.explanations()
@@ -124,9 +132,9 @@ def answer(comparison: Comparison) -> str:
     if comparison.heldout is comparison.residual:
         where = "on this set, to which the model was not fitted,"
     elif np.isfinite(comparison.heldout).any():
-        where = "on held-out grasps"
+        where = f"on held-out {comparison.target.part}s"
     else:
-        where = "on the grasps that it was fitted to (too few to hold any out)"
+        where = f"on the {comparison.target.part}s that it was fitted to (too few to hold any out)"
     error = f"The model's error {where} is {value:.2f} × the sensor noise"
     if at_floor(value, floor) and not at_floor(value, _MOST_NOISE):
         return (
@@ -172,7 +180,7 @@ def details(comparison: Comparison) -> list[str]:
     """Lines below the table: worst grasps, what the error goes with, and the noise."""
     errors, target = comparison.by_grasp(), comparison.target
     worst = [f"{target.grasps[i].label} ({errors[i]:.1f} ×)" for i in worst_grasps(comparison)]
-    lines = [f"worst grasps: {', '.join(worst)}"]
+    lines = [*_recording_lines(comparison), f"worst {target.part}s: {', '.join(worst)}"]
     name, kind, share = comparison.explanations()[0]
     if share >= _WORTH_TELLING and not at_floor(comparison.floor_ratio(), comparison.floor):
         lines.append(f"{share:.0%} of the {kind} error goes with {covariate_words(name)}")
@@ -191,27 +199,39 @@ def worst_grasps(comparison: Comparison) -> list[int]:
 
 def sections(comparison: Comparison, notes: list[str]) -> list[Section]:
     """What the answer rests on."""
-    target = comparison.target
+    row = "recording" if comparison.target.recordings else "grasp"
     found = [
         _by_signal_and_phase(comparison),
-        Section(
-            "Error by grasp and phase",
-            [
-                Picture(
-                    figures.heat_map(
-                        comparison.by_grasp_and_phase(), [f"{g.label}" for g in target.grasps], comparison.target.phases
-                    ),
-                    "Error ÷ sensor noise of each grasp (rows) in each phase, all signals together. 1 is the noise."
-                    + (" The worst forty are shown." if len(target.grasps) > 40 else ""),
-                )
-            ],
-        ),
+        Section(f"Error by {row} and phase", [grid_picture(comparison)]),
         _worst(comparison),
         dependence_section(comparison),
     ]
     if notes:
         found.append(Section("To bear in mind", [Text(note) for note in notes]))
     return found
+
+
+def grid_picture(comparison: Comparison, model: str = "the model") -> Picture:
+    """The error of each grasp, or of each of a servo's recordings, in each phase."""
+    grid, rows = comparison.by_grasp_and_phase()
+    row = "recording" if comparison.target.recordings else "grasp"
+    return Picture(
+        figures.heat_map(grid, rows, comparison.target.phases),
+        f"Error of {model} ÷ sensor noise, of each {row} (rows) in each phase, all signals together. 1 is the noise."
+        + (" The worst forty are shown." if len(rows) > 40 else ""),
+    )
+
+
+def _recording_lines(comparison: Comparison) -> list[str]:
+    """The error of each of a servo's recordings, where there are several; their loads may differ."""
+    found, target = comparison.by_recording(), comparison.target
+    if len(found) < 2:
+        return []
+    rows = []
+    for recording, ratios in sorted(found.items(), key=lambda item: -max(item[1].values())):
+        signals = zip(ratios.values(), target.sigma.tolist(), target.axis.units, strict=True)
+        rows.append(f"{recording} {', '.join(f'{amount(r * sigma, unit)} {r:.1f}×' for r, sigma, unit in signals)}")
+    return [f"by recording, each held out: {'; '.join(rows)}"]
 
 
 def _by_signal_and_phase(comparison: Comparison) -> Section:
@@ -238,8 +258,7 @@ def _by_signal_and_phase(comparison: Comparison) -> Section:
         [
             Picture(
                 figures.heat_map(grid[shown], phases, [words(s) for s in names]),
-                "Error ÷ sensor noise. Free: no finger touches; first contact: one finger, or both for less than 0.2 s;"
-                " both: both press; hold: both press and the command rests; release: opening, until 0.2 s after.",
+                f"Error ÷ sensor noise. {PHASE_WORDS[comparison.target.part]}",
             ),
             Table(head, rows, frozenset(i for i, cell in enumerate(cells) if cell.ratio > _MARKED)),
             Text(f"S{noise_sentence(comparison.target)[1:]}."),
@@ -259,11 +278,11 @@ def _worst(comparison: Comparison) -> Section:
         blocks.append(
             Picture(
                 figures.overlay(target, index, comparison.predicted[index]),
-                f"Grasp {grasp.label}: error {errors[index]:.2f} × noise. Dots are measured, lines are"
-                " the model's; below, measured − model ÷ noise, with a band of ± 2.",
+                f"{target.part.capitalize()} {grasp.label}: error {errors[index]:.2f} × noise. Dots are measured, lines"
+                " are the model's; below, measured − model ÷ noise, with a band of ± 2.",
             )
         )
-    return Section("The worst grasps", blocks)
+    return Section(f"The worst {target.part}s", blocks)
 
 
 def dependence_section(comparison: Comparison, title: str = "What the error goes with") -> Section:
@@ -274,7 +293,7 @@ def dependence_section(comparison: Comparison, title: str = "What the error goes
     blocks: list = [
         Picture(
             figures.dependence(values, comparison.residual, comparison.target),
-            "Measured − model ÷ noise, of both fingers: single samples (grey), and the median and the middle 80 % of"
+            "Measured − model ÷ noise, of all motors: single samples (grey), and the median and the middle 80 % of"
             " equally filled bins (green). Grey band: ± 1. A model that lacks nothing lies flat on 0.",
         )
     ]

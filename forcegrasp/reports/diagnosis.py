@@ -19,8 +19,15 @@ from forcegrasp.identify.fit import Fit
 from forcegrasp.identify.intervals import listed, reached_bound
 from forcegrasp.identify.verdict import Verdict
 from forcegrasp.reports import figures
-from forcegrasp.reports.comparison import dependence_section, noise_sentence, value_text, words, worst_cell
-from forcegrasp.reports.diagnosis_words import lacks, left_sentence, noise_words, preference
+from forcegrasp.reports.comparison import (
+    dependence_section,
+    grid_picture,
+    noise_sentence,
+    value_text,
+    words,
+    worst_cell,
+)
+from forcegrasp.reports.diagnosis_words import lacks, left_sentence, noise_words, odd_words, preference, shares_sentence
 from forcegrasp.reports.findings import (
     candidate_json,
     candidate_parameters,
@@ -47,6 +54,8 @@ def diagnosis_json(diagnosis: Diagnosis, advice: Advice | None, tried: Sequence[
         "effects": list(diagnosis.effects),
         "preferred": list(diagnosis.preferred),
         "explained_share": diagnosis.explained,
+        "shares": diagnosis.shares(),
+        "odd_grasps": [dataclasses.asdict(grasp) for grasp in diagnosis.odd],
         "steps": [_step_json(step, diagnosis) for step in diagnosis.steps],
         "ranking": ranking(diagnosis),
         "no_trace": no_trace(diagnosis, tried),
@@ -88,12 +97,16 @@ def answer(diagnosis: Diagnosis) -> str:
     d, cell, noise = diagnosis, worst_cell(remaining(diagnosis).cells()), noise_words(diagnosis)
     found = listed(d.preferred) if d.preferred else ""
     place = f"{words(cell.signal)}, {words(cell.phase)} ({cell.ratio:.1f} × noise)"
+    if d.verdict is Verdict.DATA and not d.steps:
+        return lacks(d)
     if d.verdict.names_effects:
-        fall = f"With {found} the error on held-out grasps falls from {d.error_before:.2f} to {d.error_after:.2f} ×"
+        change = f"from {d.error_before:.2f} to {d.error_after:.2f} ×"
+        with_found = f"{found} put right" if d.verdict is Verdict.DATA else found
+        fall = f"With {with_found} the error on held-out {d.target.part}s falls {change}"
         rest = f"What is left is largest in {place}." if d.left else noise
         return f"{lacks(d)} {fall} the sensor noise; up to {d.floor:.2f} is noise. {rest}".rstrip()
     if d.verdict is Verdict.EXPLAINED:
-        of_noise = f"the error on held-out grasps is {d.error_before:.2f} × the sensor noise"
+        of_noise = f"the error on held-out {d.target.part}s is {d.error_before:.2f} × the sensor noise"
         if noise:
             return f"The model explains these data: they show no missing effect; {of_noise}. {noise}"
         return (
@@ -103,7 +116,7 @@ def answer(diagnosis: Diagnosis) -> str:
     if d.verdict is Verdict.UNKNOWN:
         best = f"{found} would only take it down to {d.error_after:.2f} ×" if found else "no effect explains it"
         return (
-            f"Something is missing, and it is none of the effects I know: the error on held-out grasps is"
+            f"Something is missing, and it is none of the effects I know: the error on held-out {d.target.part}s is"
             f" {d.error_before:.2f} × the sensor noise, and {best}. Look at {place}."
         )
     return f"No diagnosis, for the base model is not fitted: {d.base.reason}. To do: {ADVICE}."
@@ -153,6 +166,10 @@ def lines(diagnosis: Diagnosis, advice: Advice | None) -> list[str]:
         text.append(f"{effect.name}: {effect.symptom}")
         text += [f"  {line}" for line in _final_texts(diagnosis, effect)]
         text += [f"  it could also be: {listed(step.effects[1:], 'or')}"] if len(step.effects) > 1 else []
+    if diagnosis.odd and diagnosis.steps:
+        text.append(f"look at these first: {odd_words(diagnosis)}")
+    if diagnosis.shares():
+        text.append(shares_sentence(diagnosis))
     if diagnosis.verdict is Verdict.UNKNOWN or diagnosis.verdict.names_effects:
         text.append(left_sentence(diagnosis))
     if advice is not None:
@@ -247,13 +264,18 @@ def _tried_section(diagnosis: Diagnosis, tried: Sequence[type[Effect]]) -> Secti
     blocks: list = [
         Table(("effect", "acts on", "held-out gain", "p (family-wise)", "error ÷ noise with it"), rows),
         Text(
-            "Of the first step, best first. The gain is the change of the log-likelihood of grasps held out of the fit;"
-            " p is the probability that the best of all effects does as well on sensor noise alone. Effects whose"
+            "Of the first step, best first. The gain is the change of the log-likelihood of what was held out of the"
+            " fit; p is the probability that the best of all effects does as well on sensor noise alone. Effects whose"
             " signature explains much less than the best one's are not refitted."
         ),
     ]
     if silent:
-        blocks.append(Text(f"Leave no trace in these grasps, so nothing can be said about them: {', '.join(silent)}."))
+        blocks.append(
+            Text(
+                f"Leave no trace in these {diagnosis.target.part}s, so nothing can be said about them:"
+                f" {', '.join(silent)}."
+            )
+        )
     return Section("All effects that were tried", blocks)
 
 
@@ -265,13 +287,10 @@ def _left_sections(diagnosis: Diagnosis) -> list[Section]:
     sentence = left_sentence(diagnosis)
     blocks: list = [
         Text(f"{sentence[0].upper()}{sentence[1:]}."),
-        Picture(
-            figures.heat_map(left.by_grasp_and_phase(), [f"{g.label}" for g in target.grasps], target.phases),
-            f"Error of {model} ÷ sensor noise, of each grasp in each phase. 1 is the noise.",
-        ),
+        grid_picture(left, model),
         Picture(
             figures.overlay(target, worst, left.predicted[worst]),
-            f"Grasp {grasp.label}, the worst under {model}: error {left.by_grasp()[worst]:.2f} ×"
+            f"{target.part.capitalize()} {grasp.label}, the worst under {model}: error {left.by_grasp()[worst]:.2f} ×"
             " noise. Dots are measured, lines are the model's.",
         ),
         Text(f"S{noise_sentence(target)[1:]}."),

@@ -2,21 +2,51 @@
 
 from __future__ import annotations
 
-from forcegrasp.diagnosis.result import Diagnosis, Step
+from forcegrasp.diagnosis.result import Diagnosis, Step, kept_steps
 from forcegrasp.diagnosis.verdict import EXPLAINED_FAR, MUCH
+from forcegrasp.effects.for_gripper import effect_of
 from forcegrasp.identify.intervals import listed
+from forcegrasp.identify.verdict import Verdict
 from forcegrasp.reports.comparison import covariate_words, words
-from forcegrasp.reports.findings import found_steps, where
+from forcegrasp.reports.findings import where
 
 
 def lacks(diagnosis: Diagnosis) -> str:
     """The effects that were found, what else they could be, and how much they leave, in one sentence."""
-    steps = [step for step, _ in found_steps(diagnosis)]
+    steps = kept_steps(diagnosis.steps)
+    if diagnosis.verdict is Verdict.DATA and not steps:
+        seems = f"Not the model but the set seems to be wrong: {odd_words(diagnosis)}"
+        return f"{seems}. Put their labels right, or leave them out."
+    if diagnosis.verdict is Verdict.DATA:
+        return f"Not the model but the set seems to be wrong: {listed([_fault(step, diagnosis) for step in steps])}."
     if len(steps) == 1 and len(steps[0].effects) > 1:
         names = f"{listed(steps[0].effects, 'or')}: {_undecided(steps[0])}"
     else:
         names = listed([_with_rivals(step) for step in steps])
     return f"The model lacks {names}{_but(diagnosis)}."
+
+
+def odd_words(diagnosis: Diagnosis) -> str:
+    """Grasps that a fit of all others misses by far, in words; empty if there are none."""
+    if not diagnosis.odd:
+        return ""
+    named = listed([str(grasp) for grasp in diagnosis.odd])
+    as_other = " fit as grasps of another object" if all(g.like for g in diagnosis.odd) else " fit no object of the set"
+    return f"{named}{as_other}, judged by a fit of all others"
+
+
+def _fault(step: Step, diagnosis: Diagnosis) -> str:
+    effect = effect_of(step.effects[0], diagnosis.target.gripper)
+    return f"{effect.name} ({effect.symptom}; to check: {effect.separates})"
+
+
+def shares_sentence(diagnosis: Diagnosis) -> str:
+    """How much of the error each effect explains, and how much is left."""
+    shares = diagnosis.shares()
+    parts = [f"{name} explains {share:.0%}" for name, share in shares.items()]
+    return (
+        f"of the mean square error beyond the noise {listed(parts)}; {max(0.0, 1 - sum(shares.values())):.0%} is left"
+    )
 
 
 def _with_rivals(step: Step) -> str:
@@ -45,7 +75,7 @@ def _but(diagnosis: Diagnosis) -> str:
     if not d.left or (d.error_after <= MUCH * d.floor and d.explained >= EXPLAINED_FAR):
         return ""
     return (
-        f"; but that is not all, for {d.error_after:.2f} × the sensor noise is left on held-out grasps where"
+        f"; but that is not all, for {d.error_after:.2f} × the sensor noise is left on held-out {d.target.part}s where"
         f" {d.floor:.2f} would be noise ({d.explained:.0%} of the mean square beyond it is explained)"
     )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 
 import numpy as np
@@ -14,6 +15,7 @@ from forcegrasp.identify.target import Target
 #: Okabe and Ito's colours, told apart by the colour-blind.
 LEFT, RIGHT, WITHOUT, WITH, MEASURED = "#0072b2", "#d55e00", "#d55e00", "#0072b2", "#444444"
 SECOND = "#009e73"
+_COLOURS = (LEFT, RIGHT, SECOND, "#cc79a7", "#e69f00", "#56b4e9")
 #: Shown unit of a signal's unit, and its factor.
 SHOWN = {"m": ("mm", 1e3), "rad": ("mrad", 1e3), "N": ("N", 1.0)}
 NAMES = {
@@ -22,12 +24,12 @@ NAMES = {
 #: Covariate → its axis' words and the factor from SI, where motors slide; where they turn, mm are mrad.
 AXES = {
     "time_since_contact_s": ("time since contact [s]", 1.0),
-    "velocity_m_s": ("finger velocity [mm/s]", 1e3),
+    "velocity_m_s": ("velocity [mm/s]", 1e3),
     "direction": ("direction of motion", 1.0),
     "force_n": ("force [N]", 1.0),
     "command_m": ("command [mm]", 1e3),
     "position_m": ("position [mm]", 1e3),
-    "time_s": ("time in grasp [s]", 1.0),
+    "time_s": ("time since its start [s]", 1.0),
 }
 _POINTS = 1200  # more would only make the file large
 _DOTS = 250
@@ -79,8 +81,8 @@ def overlay(target: Target, index: int, predicted: np.ndarray) -> Figure:
     for column, (kind, part) in enumerate(target.axis.kinds.items()):
         unit, factor = SHOWN[target.axis.units[part.start]]
         above, below = grid[:, column]
-        for signal, colour in zip(range(part.start, part.stop), (LEFT, RIGHT), strict=False):
-            if kind == "position":
+        for signal, colour in zip(range(part.start, part.stop), itertools.cycle(_COLOURS), strict=False):
+            if kind == "position" and target.gripper.command == "position":
                 command = factor * grasp.command_m[keep, signal]
                 above.step(time[keep], command, where="post", color=colour, lw=0.6, ls=":")
             above.plot(time[keep], factor * measured[:, signal], ".", color=colour, ms=3, alpha=0.55)
@@ -88,7 +90,7 @@ def overlay(target: Target, index: int, predicted: np.ndarray) -> Figure:
             above.plot(time[keep], factor * predicted[keep, signal], color=colour, lw=1.2, label=name)
             below.plot(time[keep], residual[:, signal], color=colour, lw=0.9)
         _finish(above, f"{kind} [{unit}]")
-        _residual_axes(below)
+        _residual_axes(below, target.part)
     above = grid[0, 0]
     above.plot([], [], ".", color=MEASURED, ms=4, label="measured")
     above.plot([], [], color=MEASURED, lw=1.2, label="model")
@@ -116,7 +118,12 @@ def dependence(values: dict[str, np.ndarray], residual: np.ndarray, target: Targ
             chosen = mask[..., None] & np.isfinite(against) & np.isfinite(errors)
             x, y = factor * against[chosen], errors[chosen]
             if name == "direction":
-                _by_direction(axes, x, y)
+                _by_direction(
+                    axes,
+                    x,
+                    y,
+                    ("falling", "still", "rising") if target.gripper.is_servo else ("closing", "still", "opening"),
+                )
             else:
                 _binned(axes, x, y)
                 if name == "velocity_m_s":  # most samples are nearly at rest
@@ -153,7 +160,7 @@ def symptom(target: Target, index: int, signal: int, without: np.ndarray, having
     figure = Figure(figsize=(8.5, 4.8), layout="constrained")
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2.2, 1))
     moves = signal < target.axis.positions.stop
-    if moves:
+    if moves and target.gripper.command == "position":
         command = factor * grasp.command_m[keep, signal]
         above.step(time[keep], command, where="post", color="0.6", lw=0.8, ls=":", label="command")
     above.plot(time[keep], factor * measured, ".", color=MEASURED, ms=4, alpha=0.7, label="measured")
@@ -163,7 +170,7 @@ def symptom(target: Target, index: int, signal: int, without: np.ndarray, having
         below.plot(time[keep], residual, style, color=colour, lw=1)
     _finish(above, _axis(target, signal))
     above.legend(frameon=False, fontsize=9)
-    _residual_axes(below)
+    _residual_axes(below, target.part)
     if moves:  # against the whole way of a finger nothing would be seen
         _zoom(above, time, factor * without[: len(time), signal], factor * having[: len(time), signal])
     return figure
@@ -196,7 +203,7 @@ def rivals(
             above.plot(time_s, factor * signals[:, signal], style, color=colour, lw=1.4, label=f"if {name}")
         below.plot(time_s, apart[:, signal], color=SECOND, lw=1)
         _finish(above, _axis(target, signal))
-        _residual_axes(below, "difference ÷ noise")
+        _residual_axes(below, target.part, "difference ÷ noise")
     grid[0, 0].legend(frameon=False, fontsize=8)
     return figure
 
@@ -215,7 +222,7 @@ def steps(target: Target, index: int, signal: int) -> Figure:
     for multiple in np.linspace(first, last, min(60, int(last - first) + 1)).round():
         axes.axhline(factor * quantum * multiple, color="0.88", lw=0.7, zorder=0)
     axes.plot(time[shown], factor * part, ".", color=MEASURED, ms=5)
-    axes.set_xlabel("time in grasp [s]")
+    axes.set_xlabel(f"time in {target.part} [s]")
     _finish(axes, _axis(target, signal))
     return figure
 
@@ -265,7 +272,7 @@ def _axis(target: Target, signal: int) -> str:
 
 
 def _thin(count: int) -> slice:
-    return slice(None, None, max(1, -(-count // _POINTS)))
+    return slice(0, count, max(1, -(-count // _POINTS)))
 
 
 def _finish(axes: Axes, ylabel: str) -> None:
@@ -273,10 +280,10 @@ def _finish(axes: Axes, ylabel: str) -> None:
     axes.spines[["top", "right"]].set_visible(False)
 
 
-def _residual_axes(axes: Axes, ylabel: str = "residual ÷ noise") -> None:
+def _residual_axes(axes: Axes, part: str, ylabel: str = "residual ÷ noise") -> None:
     axes.axhspan(-2, 2, color="0.92", zorder=0)
     axes.axhline(0, color="0.5", lw=0.6)
-    axes.set_xlabel("time in grasp [s]")
+    axes.set_xlabel(f"time in {part} [s]")
     _finish(axes, ylabel)
 
 
@@ -307,7 +314,7 @@ def _binned(axes: Axes, x: np.ndarray, y: np.ndarray) -> None:
     axes.plot(centre, middle, color=SECOND, lw=1.6)
 
 
-def _by_direction(axes: Axes, x: np.ndarray, y: np.ndarray) -> None:
+def _by_direction(axes: Axes, x: np.ndarray, y: np.ndarray, words: Sequence[str]) -> None:
     for place in (-1, 0, 1):
         inside = y[x == place]
         if len(inside):
@@ -315,4 +322,4 @@ def _by_direction(axes: Axes, x: np.ndarray, y: np.ndarray) -> None:
             axes.plot([place, place], [low, high], color=SECOND, alpha=0.25, lw=9, solid_capstyle="butt")
             axes.plot(place, middle, "o", color=SECOND, ms=5)
     axes.set_xlim(-1.6, 1.6)
-    axes.set_xticks([-1, 0, 1], ["closing", "still", "opening"], fontsize=8)
+    axes.set_xticks([-1, 0, 1], words, fontsize=8)

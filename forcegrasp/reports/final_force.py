@@ -14,8 +14,10 @@ from forcegrasp.final_force.shapes import Candidate, rms
 from forcegrasp.identify.verdict import Verdict
 from forcegrasp.reports.figures import plain
 from forcegrasp.reports.html import Picture, Section, Table, Text
+from forcegrasp.short_repr import counted
 
 _LAW = "force = kp f_α Δq, through 0, one f_α per object"
+_MARKS = ("o", "s", "^", "v", "D", "P", "X", "*")  # of sessions
 _COLOURS = ("#2c6fbb", "#c7622b", "#3a8f5c", "#8a5bb0", "#777777")
 
 
@@ -53,7 +55,16 @@ def diagnosis_json(analysis: TableAnalysis) -> dict:
         "floor_ratio": after,
         "next_grasp": {"grasp": grasps[0], "tells_apart": list(analysis.effects)} if grasps else None,
         "where": _where(analysis) if analysis.verdict is Verdict.UNKNOWN else None,
+    } | ({"sessions": _sessions_json(analysis)} if analysis.table.sessions else {})
+
+
+def _sessions_json(analysis: TableAnalysis) -> dict[str, Any]:
+    repeats = analysis.repeats
+    shifts = {
+        s.session: {"shift_n": number(s.value), "low": number(s.low), "high": number(s.high), "squeezes": s.squeezes}
+        for s in repeats.shifts
     }
+    return {"p": number(repeats.p), "taken_out": repeats.shifted, "shifts": shifts, "untold": list(repeats.untold)}
 
 
 def next_grasps(analysis: TableAnalysis) -> tuple[str, ...]:
@@ -182,7 +193,7 @@ def _with_intervals(analysis: TableAnalysis, name: str) -> list[str]:
 
 def facts(analysis: TableAnalysis) -> list[str]:
     """What the table tells beyond its fits, one sentence each."""
-    text = []
+    text = _of_sessions(analysis)
     if analysis.slope_ratio is not None and analysis.slopes_differ_p is not None:
         value, low, high = analysis.slope_ratio
         sure = analysis.slopes_differ_p < 0.05
@@ -212,6 +223,22 @@ def facts(analysis: TableAnalysis) -> list[str]:
             f"one onset for all objects: as a travel rms {travel:.4f} N, as a force on the reading {force:.4f} N,"
             f" {judged}; an object of a very different slope would"
         )
+    return text
+
+
+def _of_sessions(analysis: TableAnalysis) -> list[str]:
+    """Whether sessions read alike, a sentence for each that could differ from the first."""
+    repeats, text = analysis.repeats, []
+    for shift in repeats.shifts:
+        text.append(
+            f"session {shift.session} reads {shift.value:+.3f} N [{shift.low:+.3f}, {shift.high:+.3f}] beside the first"
+            f" at the same object and delta ({counted(shift.squeezes, 'squeeze')} in common)"
+        )
+    if repeats.p is not None:
+        judged = "taken out before shapes are fitted" if repeats.shifted else "within chance: nothing is taken out"
+        text.append(f"shift between sessions (p = {repeats.p:.2g}): {judged}")
+    if repeats.untold:
+        text.append(f"{', '.join(repeats.untold)}: too few squeezes in common to tell whether this session reads alike")
     return text
 
 
@@ -282,18 +309,24 @@ def draw(analysis: TableAnalysis) -> Figure:
         colour, base, fit = _COLOURS[k % len(_COLOURS)], law.fits[name], best.fits[name]
         x = np.linspace(0.0, rows.delta_m.max(), 301)
         label = plain(name, len(name))
-        above.plot(1e3 * rows.delta_m, rows.force_n, "o", color=colour, label=label)
+        sessions = np.array(rows.sessions or ("",) * len(rows.force_n))
+        for number_of, session in enumerate(dict.fromkeys(analysis.table.sessions or ("",))):
+            own, mark = sessions == session, _MARKS[number_of % len(_MARKS)]
+            if own.any():
+                named = f"{label} {plain(session, len(session))}".rstrip()
+                above.plot(1e3 * rows.delta_m[own], rows.force_n[own], mark, color=colour, label=named)
         above.plot(1e3 * x, base.predict(x), "--", color=colour, lw=1)
-        below.plot(1e3 * rows.delta_m, base.residual, "x--", color=colour, lw=0.7, ms=5)
+        order = np.argsort(rows.delta_m, kind="stable")
+        below.plot(1e3 * rows.delta_m[order], base.residual[order], "x--", color=colour, lw=0.7, ms=5)
         if analysis.found:
             above.plot(1e3 * x, fit.predict(x), color=colour, lw=1.6)
-            below.plot(1e3 * rows.delta_m, fit.residual, "o-", color=colour, lw=0.9, ms=4)
+            below.plot(1e3 * rows.delta_m[order], fit.residual[order], "o-", color=colour, lw=0.9, ms=4)
     below.axhspan(-analysis.noise_n, analysis.noise_n, color="0.92", zorder=0)
     below.axhline(0, color="0.5", lw=0.6)
     above.plot([], [], "--", color="0.4", label="base law")
     if analysis.found:
         above.plot([], [], "-", color="0.4", label=best.shape.name.replace("_", " "))
-    above.set_ylabel("final force [N]")
+    above.set_ylabel("final force, shifts taken out [N]" if analysis.repeats.shifted else "final force [N]")
     below.set_ylabel("residual [N]")
     below.set_xlabel("commanded Δq [mm]")
     above.legend(frameon=False)

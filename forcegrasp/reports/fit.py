@@ -138,7 +138,9 @@ def fit_json(base: BaseFit, target: Target, model: Model, name: str, path: Path)
 def fit_answer(base: BaseFit, target: Target) -> str:
     """Whether the fit converged, and how good it is."""
     error, held = rms_error(base.fit, target), rms(held_out(base.fit, target), target)
-    errors = f"error {error:.2f} × noise" + (f", on held-out grasps {held:.2f} × noise" if np.isfinite(held) else "")
+    errors = f"error {error:.2f} × noise" + (
+        f", on held-out {target.part}s {held:.2f} × noise" if np.isfinite(held) else ""
+    )
     if base.converged:
         return f"The base model is fitted: {errors}."
     return f"The base model is NOT fitted: {base.reason}. What was reached: {errors}. To do: {ADVICE}."
@@ -161,9 +163,10 @@ def fit_sections(base: BaseFit, target: Target, model: Model) -> list[Section]:
     grasp = target.grasps[worst]
     picture = Picture(
         figures.overlay(target, worst, base.fit.predicted[worst]),
-        f"Grasp {grasp.label}, the worst: error {errors[worst]:.2f} × noise. Dots are measured, lines are the model's.",
+        f"{target.part.capitalize()} {grasp.label}, the worst: error {errors[worst]:.2f} × noise. Dots are measured,"
+        " lines are the model's.",
     )
-    return [parameters_section(model), Section("Starts", gate), Section("The worst grasp", [picture])]
+    return [parameters_section(model), Section("Starts", gate), Section(f"The worst {target.part}", [picture])]
 
 
 # --- add ---------------------------------------------------------------------------------------------------------
@@ -199,7 +202,7 @@ def add_answer(added: Added, effect: type[Effect]) -> str:
     """The fall in one sentence."""
     share = 1 - added.error_after / added.error_before
     return (
-        f"With {effect.name} the error on held-out grasps falls from {added.error_before:.2f} to"
+        f"With {effect.name} the error on held-out {added.target.part}s falls from {added.error_before:.2f} to"
         f" {added.error_after:.2f} × noise ({share:.0%} less)."
     )
 
@@ -238,7 +241,7 @@ def symptom_picture(target: Target, before: Fit, after: Fit, effect: type[Effect
     errors = [np.sqrt(np.sum(fit.residual[index, :, signal] ** 2) / count) for fit in (before, after)]
     return Picture(
         figures.symptom(target, index, signal, before.predicted[index], after.predicted[index], effect.name),
-        f"Where {effect.name} helps most: {words(target.axis.names[signal])} of grasp {grasp.label};"
+        f"Where {effect.name} helps most: {words(target.axis.names[signal])} of {target.part} {grasp.label};"
         f" error {errors[0]:.2f} × noise without it, {errors[1]:.2f} × with it. Below: measured − model ÷ noise, band"
         " ± 2.",
     )
@@ -253,6 +256,6 @@ def steps_picture(target: Target) -> Picture:
     grasp = target.grasps[index]
     return Picture(
         figures.steps(target, index, signal),
-        f"Readings of {words(target.axis.names[signal])} in grasp {grasp.name}, where they change fastest: they are"
-        f" multiples of {amount(float(target.quantum[signal]), target.axis.units[signal])} (grey lines).",
+        f"Readings of {words(target.axis.names[signal])} in {target.part} {grasp.name}, where they change fastest: they"
+        f" are multiples of {amount(float(target.quantum[signal]), target.axis.units[signal])} (grey lines).",
     )

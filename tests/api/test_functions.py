@@ -18,9 +18,11 @@ import forcegrasp as fg
 from forcegrasp.api import CompareResult, TableResult
 from forcegrasp.cli.main import main
 from forcegrasp.diagnosis import add_effect
-from forcegrasp.effects import catalogue, get_effect
+from forcegrasp.effects import get_effect
+from forcegrasp.effects.for_gripper import effects_of
 from forcegrasp.errors import ConfigError, MeasurementError
 from forcegrasp.models.model_file import Model, read_model, write_model
+from forcegrasp.physics.gripper_file import load_gripper
 
 #: Verb → how the same is had in Python, with a model that lies in model.yaml.
 CALLS = {
@@ -97,7 +99,8 @@ def test_seed_is_passed_on_and_checked(kind, call, work):
 
 
 def test_effects_may_be_one_name_some_or_all(work):
-    for given, names in (("backlash", ["backlash"]), (["force_lag"], ["force_lag"]), ((), list(catalogue()))):
+    everything = list(effects_of(load_gripper("tiago")))
+    for given, names in (("backlash", ["backlash"]), (["force_lag"], ["force_lag"]), ((), everything)):
         found = fg.diagnose("my_set", effects=given)
         assert work.calls["diagnose_set"][2] == names
         assert [effect.name for effect in found.tried] == names

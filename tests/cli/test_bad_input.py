@@ -24,7 +24,7 @@ MISTAKES = [
     (["--version=1"], "no verb"),
     (["effect"], "did you mean effects"),
     (["effects", "backlsh"], "did you mean backlash"),
-    (["effects", "friction"], "coulomb_friction"),
+    (["effects", "friction"], "load_friction"),
     (["effects", ""], "known: "),
     (["effects", "backlash", "adhesion"], "one name at a time"),
     # presets

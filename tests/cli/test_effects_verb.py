@@ -11,7 +11,7 @@ import pytest
 from forcegrasp.assets import DEFAULT_GRIPPER
 from forcegrasp.cli.main import main
 from forcegrasp.effects import STAGES, catalogue, get_effect
-from forcegrasp.effects.for_gripper import effects_of
+from forcegrasp.effects.for_gripper import effects_of, why_left_out
 from forcegrasp.physics import load_gripper, shipped_grippers
 
 
@@ -34,7 +34,7 @@ def test_the_list_has_every_effect_under_its_stage(capsys):
     assert heads == list(STAGES)
     for effect in catalogue().values():
         part = out.partition(f"\n  {effect.name}\n")[2].partition("\n\n")[0]
-        assert words(effect.symptom) in words(part)
+        assert f"{effect.family}: {words(effect.symptom)}" in words(part)
         above = out.partition(f"\n  {effect.name}\n")[0].splitlines()
         assert [line for line in above if line in STAGES][-1] == effect.stage
         for p in effect.parameters:
@@ -47,9 +47,9 @@ def test_the_list_has_every_effect_under_its_stage(capsys):
 def test_one_in_full(capsys, name):
     effect, out = get_effect(name), words(printed(capsys, name))
     assert out.startswith(f"{name}: {effect.__doc__.splitlines()[0]} ")
-    for text in (effect.stage, effect.symptom, effect.formula, effect.source, effect.separates):
+    for text in (effect.stage, effect.family, effect.symptom, effect.formula, effect.source, effect.separates):
         assert words(text) in out
-    assert all(word in out for word in (*effect.variants, *effect.look_alikes))
+    assert all(word in out for word in (*effect.variants, *effect.look_alikes, *(n.effect for n in effect.contains)))
     for p in effect.parameters:
         assert f"{p.name} {p.doc}: {p.low:g} to {p.high:g}" in out
 
@@ -66,14 +66,18 @@ def test_as_a_gripper_has_them(name, capsys):
         for p in effect.parameters:
             unit = "" if p.unit == "1" else f" {p.unit}"
             assert f"{p.name} {p.doc}: {p.low:g} to {p.high:g}{unit}, typical {p.typical:g}" in part
-    left_out = [effect for effect in catalogue() if effect not in known]
-    told = f"Left out, as they need more force readings than {name} has ({len(gripper.forces)}): {', '.join(left_out)}."
-    assert (told in words(out)) == bool(left_out)
-    assert bool(left_out) == (len(gripper.forces) < 2)
+    told = words(out).partition(" Left out: ")[2]
+    for effect in catalogue().values():
+        why = why_left_out(effect, gripper)
+        assert bool(why) == (effect.name not in known) == (effect.name in told)
+        assert why in told
+    assert ("force readings" in told) == (len(gripper.forces) < 2)
 
 
 def test_of_the_default_gripper_they_are_the_catalogue(capsys):
-    assert printed(capsys, f"gripper={DEFAULT_GRIPPER}") == printed(capsys)
+    listed = printed(capsys, f"gripper={DEFAULT_GRIPPER}").partition("Left out")[0]
+    everything = printed(capsys)
+    assert all(line in everything for line in listed.splitlines())
 
 
 def test_one_as_a_gripper_has_it(capsys):
@@ -89,6 +93,12 @@ def test_one_as_a_gripper_has_it(capsys):
         (["backlash", "griper=tiago"], "no option 'griper'; did you mean gripper?"),
         (["gripper=tiago", "gripper=so101_gripper"], "effects: one gripper at a time, not 'tiago so101_gripper'"),
         (["gripper=so101_gripper", "force_crosstalk"], "effect force_crosstalk: needs 2 force readings"),
+        (["gripper=so101_jaw", "adhesion"], "effect adhesion: is one of grasped objects; so101_jaw grasps nothing"),
+        (["gripper=tiago", "elastic_transmission"], "is one of servos alone; tiago has fingers"),
+        (
+            ["gripper=dfki_pendulum", "back_emf"],
+            "needs positions that are commanded; of dfki_pendulum it is the effort",
+        ),
         (["gripper=so101_gripper", "backlsh"], "effect backlsh: no such effect"),
     ],
 )

@@ -93,8 +93,8 @@ def test_spoilt_sets_do_not_pass(lagging, spoil):
         assert "\n" not in refusal
         return
     diagnosis = diagnosed(loaded)
-    assert diagnosis.verdict in ("unknown", "not_fitted")
-    assert diagnosis.effects == ()
+    assert diagnosis.verdict in ("unknown", "not_fitted", "data")
+    assert diagnosis.verdict == "data" or diagnosis.effects == ()
 
 
 def test_the_wrong_effect_does_not_lower_the_error(lagging):

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from forcegrasp.diagnosis import search
+from forcegrasp.diagnosis.evidence import indistinguishable, is_significant
 from forcegrasp.diagnosis.result import Diagnosis, Step
-from forcegrasp.diagnosis.search import indistinguishable, is_significant
 from forcegrasp.diagnosis.verdict import conclude, explained_share
 from forcegrasp.effects import get_effect
 from forcegrasp.effects.setting import EffectSetting
@@ -61,6 +61,17 @@ def test_a_lead_within_its_standard_error_decides_nothing(made_up, ahead, equal)
     winner = candidate(made_up, gains=100 + lead, signature=np.array([1.0, 0.0]))
     other = candidate(made_up, gains=np.full(4, 100.0), signature=np.array([0.0, 1.0]))
     assert indistinguishable(winner, other) == equal
+
+
+@pytest.mark.parametrize(("lead", "equal"), [(9.0, True), (11.0, False)])
+def test_between_a_fault_of_the_set_and_an_effect_a_small_lead_decides_nothing(made_up, lead, equal):
+    def one(name: str, gain: float, signature: list[float]):
+        setting = EffectSetting.typical(get_effect(name))
+        return candidate(made_up, setting=setting, gains=np.full(4, gain), signature=np.array(signature))
+
+    winner, other = one("backlash", 100 + lead / 4, [1.0, 0.0]), one("object_size", 100.0, [0.0, 1.0])
+    assert indistinguishable(winner, other) == equal
+    assert not indistinguishable(winner, one("encoder_bias", 100.0, [0.0, 1.0]))
 
 
 # --- all steps -----------------------------------------------------------------------------------------------------

@@ -21,6 +21,7 @@ SIZES = [
     for v in e.variants
     for p in e.parameters
 ]
+NESTED = [(e, nested) for e in catalogue().values() for nested in e.contains]
 EFFECTS = [pytest.param(e, id=e.name) for e in catalogue().values()]
 TIERS = ("fast", "reference")
 
@@ -41,12 +42,12 @@ def full() -> Trace:
 
 
 def grown(effect: type[Effect], name: str, factor: float) -> np.ndarray:
-    """Typical values, one of them so many times as far from its null value; an infinite one is divided."""
+    """Typical values, one so many times as far from its null value, within bounds; an infinite one is divided."""
     values = effect.typical_values()
     index = [p.name for p in effect.parameters].index(name)
     p = effect.parameters[index]
     values[index] = p.typical / factor if np.isinf(p.null) else p.null + factor * (p.typical - p.null)
-    assert p.low <= values[index] <= p.high
+    values[index] = min(values[index], p.high)
     return values
 
 
@@ -101,8 +102,10 @@ def test_more_of_it_changes_more(effect, variant, parameter):
     others = np.array([p.null if p != parameter and p.typical != p.null else p.typical for p in effect.parameters])
     index = effect.parameters.index(parameter)
     distances = []
-    for factor in (1, 2, 4):
-        others[index] = grown(effect, parameter.name, factor)[index]
+    for size in dict.fromkeys(
+        grown(effect, parameter.name, factor)[index] for factor in (1, 2, 4)
+    ):  # within its bounds
+        others[index] = size
         distances.append(rollout(3, [(effect, others, variant, range(3))]).distance(bare("fast")))
     assert distances[0] > 0
     assert np.all(np.diff(distances) > 0), distances
@@ -123,6 +126,32 @@ def test_variants_differ():
         traces = [rollout(1, [(effect, effect.typical_values(), v, [0])]) for v in effect.variants]
         rows = [trace.row(0) for trace in traces]
         assert all(rows[i] != rows[j] for i in range(len(rows)) for j in range(i)), effect.name
+
+
+# --- simpler effects inside ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("effect", "nested"), [pytest.param(e, n, id=f"{e.name}-{n.effect}") for e, n in NESTED])
+def test_an_effect_is_the_simpler_one_that_it_contains(effect, nested):
+    """To the last bit, in both tiers; and it is not where a parameter has another value."""
+    simpler = get_effect(nested.effect)
+    assert {p.name for p in simpler.parameters} == set(nested.same.values())
+    assert {p.name for p in effect.parameters} >= set(nested.at) | set(nested.same)
+    assert not set(nested.at) & set(nested.same)
+    richer = {p.name: p.typical for p in effect.parameters}
+    values = np.array([richer[next(r for r, s in nested.same.items() if s == p.name)] for p in simpler.parameters])
+    inside = np.array([(richer | dict(nested.at))[p.name] for p in effect.parameters])
+    for tier in TIERS:
+        theirs = rollout(1, [(simpler, values, "", [0])], tier)
+        assert rollout(1, [(effect, inside, "", [0])], tier).row(0) == theirs.row(0)
+        assert rollout(1, [(effect, effect.typical_values(), "", [0])], tier).row(0) != theirs.row(0)
+
+
+@pytest.mark.parametrize(("effect", "nested"), [pytest.param(e, n, id=f"{e.name}-{n.effect}") for e, n in NESTED])
+def test_where_an_effect_is_a_simpler_one_is_alike_for_all_grippers(effect, nested):
+    """Values of parameters that are scaled from gripper to gripper would not be."""
+    follows = {p.name: p.follows for p in effect.parameters}
+    assert all(value in (0, np.inf) or not follows[name] for name, value in nested.at.items())
 
 
 # --- rows and resets -----------------------------------------------------------------------------------------------
@@ -184,6 +213,7 @@ def test_metadata(effect):
         assert text
     assert re.fullmatch(r"[a-z]+(_[a-z]+)*", effect.name)
     assert effect.stage in STAGES
+    assert effect.family not in ("", "other")
     assert effect.parameters
     assert effect.hooks()
     assert effect.name not in effect.look_alikes
@@ -198,7 +228,7 @@ def test_metadata(effect):
 def test_parameters(effect, variant, parameter):
     p = parameter
     assert p.unit
-    ending = p.unit.lower().replace("1/", "per/").replace("/", "_")
+    ending = p.unit.lower().replace("·", "").replace("1/", "per/").replace("/", "_")
     assert p.unit == "1" or p.name.endswith(f"_{ending}"), f"a name ends with its unit: …_{ending}"
     assert p.low < p.typical < p.high
     assert all(p.low <= size <= p.high for size in p.trials)

@@ -1,196 +1,16 @@
-"""Each effect against its own equation, written down a second time: on signals, and in the grasp as a user sees it."""
+"""Effects of transmission, contact and sensors, each against its equation once more: on signals, and in the grasp."""
 
 from __future__ import annotations
-
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy.signal import lfilter
 
 from forcegrasp.effects import Effect, catalogue, get_effect
-from forcegrasp.physics.gripper_file import load_gripper
-from forcegrasp.physics.plant import Plant, write_base
+from forcegrasp.physics.plant import write_base
 
-from .rollouts import FORCE_SCALE, START_M, make_plant, path, play, rollout, start
-
-DT = 0.002
-T = np.arange(1000) * DT
-GAIN = 100.0  # N/m, of the servo
-TOUCH_M = 0.025  # where a pad meets the nominal object
-
-
-def make(name: str, *values: float, variant: str = "") -> Effect:
-    return get_effect(name)(np.array([values]), DT, variant)
-
-
-def read(effect: Effect, left: np.ndarray, right: np.ndarray | None = None) -> np.ndarray:
-    """Force readings of a signal, ``(samples, 2)``."""
-    both = np.stack([left, left if right is None else right], axis=1)
-    return np.array([effect.read_force(f[None])[0] for f in both])
-
-
-def send(effect: Effect, command: np.ndarray, position: np.ndarray | float = 0.0, every: int = 1) -> np.ndarray:
-    """What the actuator gets of the commands, ``(samples,)``, a new one every so many steps."""
-    position = np.broadcast_to(position, command.shape)
-    out = []
-    for i, u in enumerate(command):
-        q = np.full((1, 2), position[i])
-        stub = SimpleNamespace(position=q, measured_position=q, recorded_position=None)
-        effect.attach(stub, np.array([0]))
-        out.append(effect.command(np.full((1, 2), u), np.array([i % every == 0]))[0, 0])
-    return np.array(out)
-
-
-def wave(f: float = 1.3) -> np.ndarray:
-    return np.sin(2 * np.pi * f * T) + 0.3 * np.sin(2 * np.pi * 3.1 * f * T)
-
-
-def settle(name: str, values: tuple[float, ...], *targets: float, variant: str = "", seconds: float = 1.6, **more):
-    """Steps from one target to the next on the reference tier; the plant as it rests at the last."""
-    plant = make_plant(1, [(get_effect(name), values, variant, [0])] if name else [], "reference")
-    start(plant, [0], np.zeros(1))
-    for target in targets:
-        plant.advance(np.full((1, 2), target), round(seconds / plant.dt))
-    return plant
-
-
-# --- command and actuator ------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("steps", [1, 3, 12.25, 30.5])
-def test_command_delay_shifts_by_exactly_d(steps):
-    sent = send(make("command_delay", steps * DT), wave(), position=7.0)
-    expected = np.interp(T - steps * DT, [-1.0, -DT, *T], [7.0, 7.0, *wave()])
-    assert sent == pytest.approx(expected, abs=1e-12)
-
-
-def test_command_delay_shifts_all_motion_alike():
-    commands = path((0.0222, 1.0, 0.4), (0.026, 0.05, 0.4))
-    late = rollout(1, [(get_effect("command_delay"), [0.08], "", [0])], commands=commands)
-    base = rollout(1, commands=commands)
-    assert late.position[2:] == pytest.approx(base.position[:-2], abs=1e-6)  # the object settles meanwhile
-    assert late.force[2:] == pytest.approx(base.force[:-2], abs=5e-3)
-
-
-def test_command_deadband_drops_small_changes():
-    ramp = np.linspace(0.0, 0.01, 101)
-    held = send(make("command_deadband", 0.00035, variant="held"), ramp)
-    expected = np.floor(np.arange(101) / 4) * 4e-4  # every fourth increment of 0.1 mm is more than 0.35 mm away
-    assert held == pytest.approx(expected, abs=1e-12)
-    near, dropped = send(make("command_deadband", 0.00035), ramp, position=0.005), np.abs(ramp - 0.005) <= 0.00035
-    assert np.array_equal(near[~dropped], ramp[~dropped])
-    assert near[dropped] == pytest.approx(0.0046)  # the last one before
-
-
-def test_command_deadband_goes_by_the_encoder():
-    effect, new = make("command_deadband", 0.001), np.array([True])
-    stub = SimpleNamespace(position=np.full((1, 2), 0.01), measured_position=np.full((1, 2), 0.0102))
-    for recorded, dropped in ((None, True), (np.full((1, 2), 0.0097), False)):
-        stub.recorded_position = recorded
-        sent = effect.attach(stub, np.array([0])).command(np.full((1, 2), 0.0111), new)
-        assert np.all((sent == 0.01) == dropped)
-
-
-def test_command_deadband_decides_on_new_commands_only():
-    """A command that was dropped is not passed on later because the finger moved meanwhile."""
-    sent = send(make("command_deadband", 0.001), np.full(20, 0.0105), np.linspace(0.01, 0.0, 20), every=100)
-    assert np.all(sent == 0.01)
-
-
-@pytest.mark.parametrize(("name", "value"), [("actuator_lag", 0.05), ("rate_limit", 0.01), ("command_delay", 0.02)])
-def test_what_slows_a_command_starts_from_where_the_finger_stands(name, value):
-    np.testing.assert_allclose(send(make(name, value), np.full(30, 0.03), position=0.03), 0.03, rtol=1e-12)
-
-
-def test_a_dropped_command_is_not_taken_up_while_it_is_held():
-    plant = Plant(load_gripper("tiago"), 1, threads=1)
-    plant.attach([(make("command_deadband", 0.0003), np.array([0]))])
-    plant.reset(np.arange(1), np.zeros(1), np.full((1, 2), 0.044))
-    plant.advance(np.full((1, 2), 0.03), 30)
-    assert (plant.position > 0.035).all()  # on the way
-    plant.advance(plant.position.copy(), 1000)
-    np.testing.assert_allclose(plant.position, 0.03, atol=1e-5)
-
-
-def test_command_deadband_comes_before_a_delay():
-    """Both together do as the dead band alone, later; behind the delay it would see a command's age as its own."""
-    uses = [(get_effect("command_delay"), [0.05], "", [0]), (get_effect("command_deadband"), [0.0003], "held", [0])]
-    plant = make_plant(1, uses)
-    start(plant, [0])
-    for command in (START_M, START_M - 0.001):
-        plant.advance(np.full((1, 2), command), round(0.04 / plant.dt))
-    assert plant.position[0, 0] == pytest.approx(START_M, abs=1e-7)
-    plant.advance(np.full((1, 2), START_M - 0.001), 200, fresh=False)
-    assert plant.position[0, 0] < START_M - 0.0009
-
-
-@pytest.mark.parametrize("height", [0.004, 0.016])
-def test_rate_limit_makes_ramps(height):
-    step = np.where(T < 0.1, 0.0, height)
-    sent = send(make("rate_limit", 0.02), step)
-    expected = np.clip(0.02 * (T - 0.1 + DT), 0, height)
-    assert sent == pytest.approx(expected, abs=1e-12)
-    assert send(make("rate_limit", 0.02), 0.019 * T) == pytest.approx(0.019 * T, abs=1e-12)
-
-
-def test_actuator_lag_is_an_exponential():
-    tau = 0.05
-    sent = send(make("actuator_lag", tau), np.where(T < 0.1, 0.0, 1.0))
-    assert sent == pytest.approx(np.where(T < 0.1, 0.0, 1 - np.exp(-(T - 0.1 + DT) / tau)), abs=1e-12)
-    keep = np.exp(-DT / tau)
-    assert send(make("actuator_lag", tau), wave()) == pytest.approx(lfilter([1 - keep], [1, -keep], wave()), abs=1e-12)
-
-
-@pytest.mark.parametrize("friction", [0.01, 0.03, 0.1])
-def test_coulomb_friction_stops_short_by_an_offset_that_flips(friction):
-    command, far = 0.030, 0.006
-    closing = settle("coulomb_friction", (friction,), command + far, command).position[0] - command
-    opening = settle("coulomb_friction", (friction,), command - 0.003, command).position[0] - command
-    assert closing == pytest.approx([friction / GAIN] * 2, rel=0.02)
-    assert opening == pytest.approx([-friction / GAIN] * 2, rel=0.02)
-
-
-def test_coulomb_friction_holds_up_to_its_size():
-    plant = settle("coulomb_friction", (0.05,), START_M)
-    plant.advance(np.full((1, 2), START_M + 0.95 * 0.05 / GAIN), 2000)
-    assert plant.position[0] == pytest.approx([START_M] * 2, abs=2e-5)  # in 4 s
-    plant.advance(np.full((1, 2), START_M + 1.5 * 0.05 / GAIN), 2000)
-    assert plant.position[0] == pytest.approx([START_M + 0.5 * 0.05 / GAIN] * 2, abs=2e-5)
-
-
-def test_stiction_follows_the_stribeck_curve():
-    effect = make("stiction", 0.05, 0.4)
-    for speed in (0.0, 0.001, 0.002, -0.002, 0.01, 1.0):
-        stub = SimpleNamespace(velocity=np.full((1, 2), speed))
-        friction = effect.attach(stub, np.array([0])).act().friction
-        assert friction == pytest.approx(0.02 + 0.03 * np.exp(-((speed / 0.002) ** 2)), abs=1e-12)
-
-
-def test_stiction_sticks_then_jumps():
-    """On a slow ramp the finger waits until the spring of the servo pulls with F_s, then slips at once."""
-    speed, breakaway = 0.0005, 0.15
-    plant = settle("stiction", (breakaway, 0.2), START_M)
-    ramp, seen = START_M + speed * np.arange(1, 2001) * plant.dt, []
-    for command in ramp:
-        plant.advance(np.full((1, 2), command))
-        seen.append((plant.position[0, 0], plant.velocity[0, 0]))
-    position, velocity = np.array(seen).T
-    first = np.argmax(position > START_M + 2e-5)
-    assert ramp[first] - START_M == pytest.approx(breakaway / GAIN, rel=0.1)
-    assert velocity[first:].max() > 5 * speed
-    assert velocity[first + np.argmax(velocity[first:]) :].min() < 0.1 * speed  # and sticks again
-
-
-@pytest.mark.parametrize("limit", [0.1, 0.25])
-def test_force_limit_is_a_plateau(limit):
-    for target in (0.012, 0.002):
-        force = settle("force_limit", (limit,), target).pad_force[0]
-        assert force.mean() == pytest.approx(limit, rel=0.01)
-        assert force == pytest.approx([limit] * 2, rel=0.03)  # readings have tangential parts in them
-    soft = settle("force_limit", (limit,), 0.0244)
-    assert soft.pad_force[0] == pytest.approx(settle("", (), 0.0244).pad_force[0], rel=1e-4)
-
+from .rollouts import FORCE_SCALE, make_plant, play, rollout, start
+from .signals import DT, GAIN, TOUCH_M, T, make, read, settle, wave
 
 # --- transmission and contact --------------------------------------------------------------------------------------
 
@@ -415,6 +235,28 @@ def test_adhesion_reads_negative_at_release(pull):
     assert np.all(last * GAIN > 0.9 * pull)
 
 
+@pytest.mark.parametrize("error_m", [0.001, -0.0005])
+def test_object_size_is_that_of_an_object_of_this_radius(error_m):
+    """The same readings, to the last bit, as with the radius that the set ought to have given."""
+
+    def squeezed(radius_m: float, error_m: float) -> np.ndarray:
+        plant = make_plant(1, [(get_effect("object_size"), [error_m], "", [0])], "reference")
+        plant.reset(np.arange(1), write_base(plant, np.arange(1), {"radius_m": np.array([radius_m])}))
+        plant.advance(np.full((1, 2), 0.023), 1000)
+        return np.concatenate([plant.measured_force, plant.measured_position])
+
+    assert np.array_equal(squeezed(0.024, error_m), squeezed(0.024 + error_m, 0.0))
+    assert not np.array_equal(squeezed(0.024, error_m), squeezed(0.024, 0.0))
+
+
+def test_swapped_forces_stand_in_each_others_column():
+    left, right = wave(), wave(2.1)
+    swapped = read(make("swapped_forces", 1.0), left, right)
+    assert swapped == pytest.approx(np.stack([right, left], axis=1), abs=1e-12)
+    half = read(make("swapped_forces", 0.5), left, right)
+    assert half == pytest.approx(np.repeat((left + right)[:, None] / 2, 2, axis=1), abs=1e-12)
+
+
 def test_object_friction_holds_an_off_centre_object():
     def pushed(friction: float) -> tuple[float, float]:
         """How far the object went, and the force on it at the end."""
@@ -514,6 +356,13 @@ def test_force_saturation():
     assert out.min() == -0.5
     inside = np.abs(wave()) < 0.5
     assert np.array_equal(out[inside], wave()[inside])
+
+
+@pytest.mark.parametrize("steps", [1, 7.75, 40])
+def test_readout_skew_shifts_by_exactly_d(steps):
+    effect = make("readout_skew", steps * DT)
+    read_late = np.array([effect.read_position(np.full((1, 2), q))[0, 0] for q in wave()])
+    assert read_late == pytest.approx(np.interp(T - steps * DT, T, wave()), abs=1e-12)
 
 
 def test_encoder_bias_moves_readings_and_nothing_else():

@@ -130,7 +130,7 @@ def test_gate_names_the_thresholds():
     found = analyse(noisy(force, 0.005, 4))
     assert found.found[0] == "gate"
     assert {"command_deadband", "force_deadzone"} <= set(found.effects)
-    assert set(CAUSES["gate"]) == {"command_deadband", "force_deadzone"}
+    assert set(CAUSES["gate"]) == {"command_deadband", "position_deadband", "force_deadzone"}
 
 
 def test_positive_offset_names_biases():
@@ -322,7 +322,7 @@ def simulated_onsets(again_and_again: bool) -> dict[str, float]:
 def test_causes_of_a_dead_zone_are_those_that_simulation_shows():
     again, once = simulated_onsets(True), simulated_onsets(False)
     late = {name for name, moved in again.items() if moved > 5e-5}
-    assert late == set(CAUSES["dead_zone"]) - {"adhesion"}
+    assert late == (set(CAUSES["dead_zone"]) | set(CAUSES["gate"])) - {"adhesion"}
     assert once["adhesion"] > 5e-5
     assert once["backlash"] > 5e-5
 

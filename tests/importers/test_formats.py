@@ -134,13 +134,21 @@ def test_what_does_not_fit_is_told_in_one_line(tmp_path):
     refused("is no log of BAM", [tmp_path / "log.csv"], "bam", "", [])
     refused("MATLAB", [tmp_path / "log.csv"], "emps", "", [])
     for text, match in (
-        ("tmie: t", "tmie: no such key.*time"),
-        ("time: t\njoints: a", "lacks command, position"),
-        ("time: {column: t, unit: h}\njoints: a\ncommand: goal\nposition: pos", "unit: h is none of s, ms"),
-        ("time: t\njoints: a\ncommand: gaol\nposition: p", "no column of numbers called gaol, p.*did you mean goal"),
-        ("time: t\njoints: a\ncommand: goal\nposition: pos", "looks like milliseconds"),
+        (
+            "tmie: t",
+            r"tmie: unknown; did you mean time\?; also joints: missing.*also command: missing.*position: missing",
+        ),
+        ("joints: a\ncommand: goal\nposition: pos", "time: missing, such as"),
+        (
+            "time: {column: t, unit: h}\njoints: a\ncommand: goal\nposition: pos",
+            "time.unit: must be s, ms, us or ns, not h",
+        ),
+        (
+            "time: t\njoints: a\ncommand: gaol\nposition: p",
+            "no column called gaol, p; it has t, goal, pos",
+        ),
         ("time: t\njoints: a\ncommand: goal\nposition: {column: pos, unit: counts}", "per_turn"),
-        ("time: t\njoints: a\ncommand: goal\nposition: {column: pos, scale: x}", "scale.*must be a number"),
+        ("time: t\njoints: a\ncommand: goal\nposition: {column: pos, scale: x}", "position.scale: 'x' is not a number"),
     ):
         (tmp_path / "map.yaml").write_text(text)
         refused(match, [tmp_path / "log.csv"], "", str(tmp_path / "map.yaml"), [])
@@ -171,3 +179,79 @@ def test_real_recordings_load(folder, name, recordings, samples):
     assert len(found) == recordings
     assert sum(len(one.time_s) for one in found) == samples
     assert all(np.isfinite(one.position).all() and np.isfinite(one.command).all() for one in found)
+
+
+def table(tmp_path: Path, time: list[float], more: str = "0.1") -> list:
+    rows = "".join(f"{t},{np.sin(i)},{np.cos(i) if i != 4 else more}\n" for i, t in enumerate(time))
+    (tmp_path / "log.csv").write_text("t,goal,pos\n" + rows)
+    (tmp_path / "map.yaml").write_text("time: t\njoints: a\ncommand: goal\nposition: pos")
+    return read_source([tmp_path / "log.csv"], "", str(tmp_path / "map.yaml"), [])
+
+
+def test_rows_without_a_number_or_a_time_of_their_own_are_left_out_and_counted(tmp_path):
+    (one,) = table(tmp_path, [5.0, 5.1, 5.2, 5.2, 5.3, 5.4], more="")
+    np.testing.assert_allclose(one.time_s, [0, 0.1, 0.2, 0.4])
+    np.testing.assert_allclose(one.command[:, 0], np.sin([0, 1, 2, 5]))
+    assert one.notes == (
+        "log: left out 1 row without a number",
+        "log: left out 1 row with a time stamp that was there",
+    )
+    with pytest.raises(MeasurementError, match=r"log: time runs back from 5.2 to 5 s; .*`recording: run`"):
+        table(tmp_path, [5.0, 5.1, 5.2, 5.0, 5.1, 5.2])
+    with pytest.raises(MeasurementError, match="needs at least two rows"):
+        table(tmp_path, [5.0, 5.0, 5.0])
+
+
+def test_a_folder_may_hold_other_files_and_recordings_of_the_same_name(tmp_path):
+    for run in ("monday", "tuesday"):
+        (tmp_path / "logs" / run).mkdir(parents=True)
+        rows = "".join(f"{t},{c},{p}\n" for t, c, p in zip(TIME, COMMAND, POSITION, strict=True))
+        (tmp_path / "logs" / run / "log.csv").write_text("t,goal,pos\n" + rows)
+        (tmp_path / "logs" / run / "events.csv").write_text("what,when\nstart,1\nend,2\n")
+    (tmp_path / "map.yaml").write_text("time: t\njoints: a\ncommand: goal\nposition: pos")
+    found = read_source([tmp_path / "logs"], "", str(tmp_path / "map.yaml"), [])
+    assert [one.name for one in found] == ["monday_log", "tuesday_log"]
+    assert found[0].notes == ("left out, for it is no recording: events.csv, events.csv",)
+    single = [tmp_path / "logs" / "monday" / "log.csv", tmp_path / "logs" / "tuesday"]
+    assert [one.name for one in read_source(single, "", str(tmp_path / "map.yaml"), [])] == [
+        "monday_log",
+        "tuesday_log",
+    ]
+    refused("no column called t, goal, pos; it has when, what", [tmp_path / "logs" / "monday" / "events.csv"], "",
+            str(tmp_path / "map.yaml"), [])  # fmt: skip
+    (tmp_path / "logs" / "monday" / "log.csv").write_text("t,goal\n0,1\n1,2\n")
+    refused(
+        "monday/log.csv: no column called pos; it has t, goal", [tmp_path / "logs"], "", str(tmp_path / "map.yaml"), []
+    )
+    bam(tmp_path / "logs")
+    (tmp_path / "logs" / "settings.json").write_text('{"kp": 3}')
+    (one,) = read_source([tmp_path / "logs"], "bam", "", [])
+    assert one.notes == ("left out, for it is no recording: settings.json", "skipped: temp")
+
+
+def test_a_table_as_a_spreadsheet_writes_it_and_one_that_was_cut_short(tmp_path):
+    lines = [f"{t:.2f};{c:.4f};{p:.4f};on" for t, c, p in zip(TIME, COMMAND, POSITION, strict=True)]
+    text = "# made by hand\nt;goal;pos;state\n" + "\n".join(lines).replace(".", ",") + "\n1,00;0,5"
+    (tmp_path / "log.csv").write_text(text)
+    (tmp_path / "map.yaml").write_text("time: t\njoints: a\ncommand: goal\nposition: pos")
+    (one,) = read_source([tmp_path / "log.csv"], "", str(tmp_path / "map.yaml"), [])
+    np.testing.assert_allclose(one.position[:, 0], POSITION, atol=1e-4)
+    assert one.notes == (
+        "log.csv: its cells are separated by semicolons", "log.csv: left out the last line, which was cut short",
+        "skipped: state",
+    )  # fmt: skip
+    (tmp_path / "map.yaml").write_text("time: t\njoints: a\ncommand: state\nposition: pos")
+    refused(
+        r"no numbers in column state \(row 2 has 'on'\)", [tmp_path / "log.csv"], "", str(tmp_path / "map.yaml"), []
+    )
+
+
+def test_all_that_is_wrong_of_a_map_is_told_at_once(tmp_path):
+    (tmp_path / "map.yaml").write_text(
+        "time: {column: t, unit: hours}\njoints: [a, b]\ncommand: {column: goal, unt: deg}\n"
+        "position: {column: pos, unit: counts}\neffort: {column: i, scale: 0}\n"
+    )
+    refused("command.unt: unknown; did you mean unit.*time.unit: must be.*per_turn: missing.*effort.scale: must not",
+            [tmp_path], "", str(tmp_path / "map.yaml"), [])  # fmt: skip
+    (tmp_path / "map.yaml").write_text("time: t\njoints: [a, b]\ncommand: goal\nposition: 'pos_{joint}'\n")
+    refused("command.column: goal: 2 joints need `{joint}` in it", [tmp_path], "", str(tmp_path / "map.yaml"), [])

@@ -10,15 +10,20 @@ import pytest
 from forcegrasp.diagnosis.diagnose_set import chosen_effects, diagnose_set
 from forcegrasp.errors import ConfigError, MeasurementError
 from forcegrasp.identify import loading, windows
+from forcegrasp.identify.comparison import compare
+from forcegrasp.identify.cross_validation import make_folds
 from forcegrasp.identify.progress import silent
 from forcegrasp.importers.example import FRICTION_NM, example_set
 from forcegrasp.importers.recording import Recording
 from forcegrasp.importers.servo_set import as_set
-from forcegrasp.measure import check_servo, write_servo_set
-from forcegrasp.measure.schema import MeasuredGrasp, MeasurementSet
+from forcegrasp.measure import write_servo_set
+from forcegrasp.measure.schema import MeasurementSet
 from forcegrasp.physics import load_gripper
+from forcegrasp.physics.gripper import SKEW
 from forcegrasp.physics.plant import Plant
 from forcegrasp.replay.replay import Replay
+from forcegrasp.reports.comparison import compare_json, details, sections
+from forcegrasp.reports.html import Picture
 
 
 @pytest.fixture(scope="module")
@@ -54,16 +59,38 @@ def test_a_set_is_read_as_it_was_written(example, tmp_path):
 def test_windows_start_where_the_servo_was(example):
     sine = next(one for one in example.grasps if one.name == "sine")
     exact = 0.5 + 0.2 * np.sin(np.pi * sine.time_s[:, None])
-    parts = windows.cut([dataclasses.replace(sine, position_m=exact)])
-    assert len(parts) == 12
+    parts = windows.cut([dataclasses.replace(sine, position_m=exact, rows=np.arange(len(exact)))])
+    assert len(parts) == 10
     for part in parts[1:]:
-        index = int(np.argmin(np.abs(exact - part.position_m[0])))
         assert part.start is not None
-        speed = 0.2 * np.pi * np.cos(np.pi * (part.time_s[0] + float(part.name.split()[1])))
-        assert part.start[0] == pytest.approx(exact[index], abs=2e-3)
-        assert part.start[1] == pytest.approx(speed, abs=0.12)  # names are rounded to 0.1 s
+        assert part.rows is not None
+        speed = 0.2 * np.pi * np.cos(np.pi * sine.time_s[part.rows[0]])
+        assert part.start[0] == pytest.approx(exact[part.rows[0]], abs=2e-3)
+        assert part.start[1] == pytest.approx(speed, abs=0.05)
         assert part.counts is not None
         assert not part.counts[:10].any()
+
+
+def test_a_start_lies_where_the_servo_is_at_rest_and_no_window_crosses_a_gap(example):
+    steps = next(one for one in example.grasps if one.name == "steps")
+    for part in windows.cut([steps])[1:]:
+        assert part.start is not None
+        assert np.abs(part.start[1]) < 0.1  # the steps are of 0.5 rad
+    keep = (steps.time_s < 3.0) | (steps.time_s > 4.5)
+    names = ("time_s", "command_m", "position_m", "force_n")
+    parts = windows.cut([dataclasses.replace(steps, **{name: getattr(steps, name)[keep] for name in names})])
+    assert max(np.diff(part.time_s).max() for part in parts) < 0.03
+    assert max(float(part.name.split()[1]) for part in parts) > 6
+
+
+def test_a_window_goes_on_for_as_long_as_its_last_samples_may_be_read_late(example):
+    sine, jaw = example.grasps[4], load_gripper("so101_jaw")
+    plain, late = windows.cut([sine])[1], windows.cut([sine], jaw.parameters[SKEW])[1]
+    assert plain.counts is not None
+    assert late.counts is not None
+    assert len(plain.time_s) < len(late.time_s) <= len(plain.time_s) + 2  # 30 ms
+    assert late.counts.sum() == plain.counts.sum()
+    assert not late.counts[len(plain.time_s) :].any()
 
 
 def test_a_load_pushes_and_a_motor_that_is_off_does_not():
@@ -85,27 +112,8 @@ def test_recordings_with_a_load_are_replayed_with_it(example):
     mechanism = load_gripper("so101_jaw")
     base = {name: np.full(2, p.nominal) for name, p in mechanism.parameters.items()}
     motion = Replay(mechanism, [plain, loaded]).simulate(np.arange(2), base)
-    assert (motion.position[1, -1] - motion.position[0, -1]) == pytest.approx(0.3 / 17.8, rel=0.05)
-
-
-def spoilt(example: MeasurementSet, **changes) -> MeasurementSet:
-    one: MeasuredGrasp = dataclasses.replace(example.grasps[0], **changes)
-    return dataclasses.replace(example, grasps=(one,))
-
-
-def test_what_no_effect_explains_is_refused(example):
-    one = example.grasps[4]
-    command, position = one.command_m, one.position_m
-    for changes, match in (
-        ({"position_m": np.zeros_like(position)}, "never changes"),
-        ({"position_m": 1000 * position}, "looks like counts or degrees"),
-        ({"command_m": np.roll(position, 1, axis=0), "position_m": position}, "is the position itself"),
-        ({"command_m": np.rad2deg(command), "position_m": position}, "degrees"),
-        ({"command_m": -command, "position_m": position}, "turned round"),
-    ):
-        with pytest.raises(MeasurementError, match=match) as caught:
-            check_servo(spoilt(example, **changes))
-        assert "\n" not in str(caught.value)
+    at = round(7.4 / 0.002)  # before the last step
+    assert (motion.position[1, at] - motion.position[0, at]) == pytest.approx(0.3 / 17.8, rel=0.05)
 
 
 def test_effects_of_grasped_objects_are_not_a_servos():
@@ -126,3 +134,29 @@ def test_efforts_that_the_mechanism_does_not_read_are_refused(changes, match):
     assert as_set([plain], load_gripper("emps"), "", "").grasps[0].force_n.shape == (20, 1)
     with pytest.raises(MeasurementError, match=match):
         as_set([dataclasses.replace(plain, **changes)], load_gripper("emps"), "", "")
+
+
+def test_errors_are_told_of_each_recording_and_whole_recordings_are_held_out(example, tmp_path):
+    three = dataclasses.replace(example, grasps=example.grasps[2:5])
+    loaded = loading.load(write_servo_set(three, tmp_path / "set"))
+    found, _, _ = compare(loaded, None, 0, silent)
+    assert "so101_jaw" in repr(found.target)
+    sessions = [grasp.session for grasp in found.target.grasps]
+    for fold, name in zip(make_folds(found.target.grasps), dict.fromkeys(sessions), strict=True):
+        assert fold.tolist() == [i for i, session in enumerate(sessions) if session == name]
+    told = compare_json(found, "set", "", [])["recordings"]
+    assert list(told) == [grasp.name for grasp in three.grasps]
+    for name, signals in told.items():
+        mine = np.array(sessions) == name
+        squares = found.heldout[mine][found.target.mask[mine]] ** 2
+        assert signals == {"position": pytest.approx(np.sqrt(squares.mean()))}
+    (line,) = [line for line in details(found) if line.startswith("by recording, each held out: ")]
+    assert all(name in line for name in told)
+    grid, rows = found.by_grasp_and_phase()
+    assert rows == list(told)
+    assert grid.shape == (3, 4)
+    words = " ".join(
+        block.caption for part in sections(found, []) for block in part.blocks if isinstance(block, Picture)
+    )
+    assert "Window" in words
+    assert "grasp" not in words.lower()

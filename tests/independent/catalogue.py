@@ -27,6 +27,13 @@ CLASSES: dict[str, type[Effect]] = {
     "force_limit": drive.ForceLimit,
     "coulomb_friction": drive.CoulombFriction,
     "stiction": drive.Stiction,
+    "load_friction": drive.LoadFriction,
+    "motor_offset": drive.MotorOffset,
+    "presliding": drive.Presliding,
+    "direction_friction": drive.DirectionFriction,
+    "position_deadband": drive.PositionDeadband,
+    "back_emf": drive.BackEmf,
+    "swinging_load": drive.SwingingLoad,
     "motor_cogging": outside.MotorCogging,
     "motor_fade": outside.MotorFade,
     "directional_gain": outside.DirectionalGain,
@@ -50,6 +57,7 @@ CLASSES: dict[str, type[Effect]] = {
     "force_delay": sensing.ForceDelay,
     "force_bias": sensing.ForceBias,
     "force_drift": sensing.ForceDrift,
+    "readout_skew": sensing.ReadoutSkew,
     "encoder_bias": sensing.EncoderBias,
     "eccentric_encoder": outside.EccentricEncoder,
     "stale_positions": outside.StalePositions,
@@ -62,6 +70,12 @@ CATALOGUE: dict[str, Sizes] = {
     "rate_limit": _sizes("speed", 0.4, 0.1, 0.025),
     "coulomb_friction": _sizes("level", 0.01, 0.03, 0.1),
     "stiction": _sizes("breakaway", 0.015, 0.045, 0.15, sliding=0.4),
+    "load_friction": _sizes("coefficient", 0.05, 0.15, 0.4),
+    "presliding": _sizes("level", 0.01, 0.03, 0.1),
+    "direction_friction": _sizes("excess", 2.0, 5.0, 15.0),
+    "position_deadband": _sizes("band", 1e-4, 4e-4, 1.5e-3),
+    "back_emf": _sizes("stall", 0.4, 0.2, 0.08),
+    "motor_offset": _sizes("left", 0.01, 0.03, 0.1, right=-0.6),
     "actuator_lag": _sizes("time_constant", 0.005, 0.02, 0.06),
     "force_limit": _sizes("limit", 0.7, 0.4, 0.15),
     "backlash": _sizes("gap", 5e-5, 1.5e-4, 5e-4),
@@ -80,6 +94,7 @@ CATALOGUE: dict[str, Sizes] = {
     "force_crosstalk": _sizes("share", 0.04, 0.12, 0.35),
     "force_gain_asymmetry": _sizes("right_excess", 0.04, 0.12, 0.4),
     "encoder_bias": _sizes("left", 1e-4, 3e-4, 1e-3, right=0.4),
+    "readout_skew": _sizes("age", 0.01, 0.03, 0.08),
     "quantisation": {
         "small": {"position_step": 5e-5, "force_step": 0.02},
         "medium": {"position_step": 1.5e-4, "force_step": 0.05},
@@ -98,6 +113,7 @@ VARIANT_OF = {
 }  # fmt: skip
 
 OUTSIDE: dict[str, Sizes] = {
+    "swinging_load": _sizes("share", 0.1, 0.3, 1.0),  # elastic_transmission, which is one of servos alone
     "motor_cogging": _sizes("amplitude", 0.01, 0.03, 0.1),
     "motor_fade": _sizes("loss", 0.05, 0.15, 0.4),
     "directional_gain": _sizes("closing_excess", 0.03, 0.1, 0.3),

@@ -91,6 +91,105 @@ class Stiction(Effect):
 
 
 @dataclass
+class LoadFriction(Effect):
+    """Gears rub by a share of what they carry: the motor's force on one side, the pad's on the other."""
+
+    coefficient: float = 0.0
+
+    def start(self, n, rng):
+        self._friction = DryFriction((n, 2), _MOVING_KG)
+
+    def motor(self, s):
+        return self._friction(s.v, self.coefficient * np.abs(s.motor_force() - s.load))
+
+
+@dataclass
+class Presliding(Effect):
+    """LuGre's bristles without a Stribeck curve: they bend by about ``slip`` before they slide."""
+
+    level: float = 0.0  # N
+    slip: float = 2e-4  # m
+    relaxation: float = 0.004  # s, of the bristles' own damping
+
+    def start(self, n, rng):
+        self._bend = np.zeros((n, 2))
+
+    def motor(self, s):
+        rate = s.v - np.abs(s.v) * self._bend / self.slip
+        force = self.level / self.slip * (self._bend + self.relaxation * rate)
+        self._bend = self._bend + STEP_S * rate
+        return -force
+
+
+@dataclass
+class DirectionFriction(Effect):
+    """Viscous drag that differs: ``excess`` more while opening; while closing, if it is negative."""
+
+    excess: float = 0.0  # N s/m
+
+    def motor(self, s):
+        return -abs(self.excess) * (np.maximum(s.v, 0.0) if self.excess > 0 else np.minimum(s.v, 0.0))
+
+
+@dataclass
+class PositionDeadband(Effect):
+    """The servo's loop rests within the band; its damping stays."""
+
+    band: float = 0.0  # m
+
+    def motor(self, s):
+        error = s.setpoint - s.q
+        without = s.servo.force(s.q, s.q, s.v)
+        return np.where(np.abs(error) <= self.band, without - s.motor_force(), 0.0)
+
+
+@dataclass
+class BackEmf(Effect):
+    """A supply that gives out: the force at its voltage limit falls with the speed in the force's direction."""
+
+    stall: float = np.inf  # N
+    no_load: float = 0.03  # m/s
+
+    def motor(self, s):
+        if np.isinf(self.stall):
+            return 0.0
+        force, voltage_drop = s.motor_force(), self.stall * s.v / self.no_load
+        return np.minimum(np.maximum(force, -self.stall - voltage_drop), self.stall - voltage_drop) - force
+
+
+@dataclass
+class SwingingLoad(Effect):
+    """A mass that hangs on the drive by a spring, behind the encoder."""
+
+    share: float = 0.0  # of the drive's own mass
+    frequency: float = 6.0  # Hz
+    damping_ratio: float = 0.1
+
+    def start(self, n, rng):
+        self._x = self._v = None
+
+    def motor(self, s):
+        if self._x is None:
+            self._x, self._v = s.q.copy(), s.v.copy()
+        omega = 2 * np.pi * self.frequency
+        pull = omega**2 * (self._x - s.q) + 2 * self.damping_ratio * omega * (self._v - s.v)
+        self._v = self._v - STEP_S * pull
+        self._x = self._x + STEP_S * self._v
+        return self.share * _MOVING_KG * pull
+
+
+@dataclass
+class MotorOffset(Effect):
+    """The amplifiers' zeros, each motor's own: a force that is always there."""
+
+    left: float = 0.0  # N
+    right: float = 0.0  # N
+
+    def motor(self, s):
+        return np.broadcast_to([self.left, self.right], s.q.shape)
+
+
+@dataclass
 class ActuatorLag(Effect):
     """The driver's set point filter, first order."""
 

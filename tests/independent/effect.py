@@ -22,6 +22,7 @@ class State:
     depth: np.ndarray  # how far a pad is inside the object's outline; negative: clear of it
     f: np.ndarray  # force on the pads before any sensor, N
     setpoint: np.ndarray
+    load: np.ndarray  # what pushes the pads open, N
     time: float = 0.0
 
     def motor_force(self) -> np.ndarray:

@@ -163,7 +163,7 @@ class _Hand:
         self._motor, self._press = hooks.total("motor", nothing), hooks.total("press", nothing)
         self._table = hooks.total("table", np.zeros(n))
         p = self.plant
-        self.state = State(servo, p.q, p.v, p.o, p.ov, nothing, nothing, setup.commands[:, 0])
+        self.state = State(servo, p.q, p.v, p.o, p.ov, nothing, nothing, setup.commands[:, 0], nothing)
         self._look()
 
     def step(self) -> None:
@@ -183,7 +183,7 @@ class _Hand:
 
     def _look(self) -> None:
         s, plant = self.state, self.plant
-        s.o, s.ov, s.f = plant.o, plant.ov, plant.touch * self._gain
+        s.o, s.ov, s.f, s.load = plant.o, plant.ov, plant.touch * self._gain, plant.load
         # The left finger meets the object's lower side along y, the right one its upper side.
         s.depth = self._radius - plant.q - PAD_FACE_M - s.o[:, None] * [1.0, -1.0]
 

@@ -36,6 +36,23 @@ class ForceDelay(Effect):
 
 
 @dataclass
+class ReadoutSkew(Effect):
+    """Positions wait in a buffer before they are stored with what is newer."""
+
+    age: float = 0.0  # s
+
+    def start(self, n, rng):
+        self._buffer, self._oldest = Delay(self.age), None
+
+    def force(self, f, s):  # once in each physics step
+        self._oldest = self._buffer(s.q.copy())
+        return f
+
+    def position(self, q, s):
+        return q if self._oldest is None else q + (self._oldest - s.q)
+
+
+@dataclass
 class ForceBias(Effect):
     """Badly tared sensors, each with its own zero."""
 

@@ -83,6 +83,28 @@ def test_symptoms_of_the_drive() -> None:
     assert np.all(friction.q[:, END - 1] < 0.03 - 1e-4)  # and of an opening one
     stiction = rig("stiction", breakaway=0.05, sliding=0.01)
     assert np.all(abs(stiction.q[:, NUDGE] - stiction.q[:, SQUEEZE]) < 3e-5)  # 0.2 mm · 100 N/m: it sticks
+    loaded = rig("load_friction", coefficient=0.2)
+    np.testing.assert_allclose(loaded.q[0, SQUEEZE] - plain.q[0, SQUEEZE], 0, atol=5e-5)  # nothing is carried there
+    assert np.all(plain.f[0, EASE] - plain.f[0, RELEASE] > 0.02)
+    np.testing.assert_allclose(loaded.f[0, EASE], loaded.f[0, RELEASE], atol=0.004)  # the load holds the gears
+    offset = rig("motor_offset", left=0.03, right=-0.02)
+    for rests in (NUDGE, END - 1):  # from above, and from below
+        np.testing.assert_allclose(offset.q[:, rests] - plain.q[:, rests], [[3e-4, -2e-4]] * 2, rtol=0.1)
+    bristles = rig("presliding", level=0.03, slip=1e-4)
+    np.testing.assert_allclose(bristles.q[:, NUDGE] - 0.03, 0.03 / GAIN, rtol=0.2)  # a long way: as dry friction
+    eased = [run.q[0, RELEASE] - run.q[0, EASE] for run in (friction, bristles, plain)]
+    assert np.all((eased[0] + 1e-5 < eased[1]) & (eased[1] < eased[2] - 1e-5))  # it gives way to a part
+    slower = rig("direction_friction", excess=10.0)
+    np.testing.assert_allclose(slower.q[:, NUDGE], plain.q[:, NUDGE], atol=1e-6)
+    assert np.all(slower.q[:, RELEASE + 3] < plain.q[:, RELEASE + 3] - 1e-4)
+    idle = rig("position_deadband", band=1e-3)
+    assert np.all(abs(idle.q[:, NUDGE] - idle.q[:, SQUEEZE]) < 3e-5)
+    assert np.all((idle.q[:, NUDGE] - 0.03 > 2e-4) & (idle.q[:, NUDGE] - 0.03 < 1e-3))
+    weak = rig("back_emf", stall=0.1, no_load=0.02)
+    highest = 0.1 / (1.0 + 0.1 / 0.02)  # where what is left of the motor moves the guide's damping
+    np.testing.assert_allclose(np.max(-np.diff(weak.q, axis=1)) / 0.04, highest, rtol=0.05)
+    ringing = rig("swinging_load", share=1.0, frequency=4.0)
+    np.testing.assert_allclose(ringing.q[0, NUDGE], plain.q[0, NUDGE], atol=2e-4)
     lagging = rig("actuator_lag", time_constant=0.05)
     assert np.all(lagging.q[:, NEAR + 1 : NEAR + 5] > plain.q[:, NEAR + 1 : NEAR + 5])
     np.testing.assert_allclose(lagging.q[0, settled], plain.q[0, settled], atol=2e-5)
@@ -136,6 +158,9 @@ def test_symptoms_of_the_sensors() -> None:
     np.testing.assert_allclose(rig("force_gain_asymmetry", right_excess=0.1).f, plain.f * [1.0, 1.1])
     bias = rig("encoder_bias", left=1e-4, right=0.0)
     np.testing.assert_allclose(bias.q - plain.q, np.full_like(plain.q, [1e-4, 0.0]))
+    skewed = rig("readout_skew", age=0.08)
+    np.testing.assert_allclose(skewed.q[:, 2:], plain.q[:, :-2], atol=1e-12)
+    np.testing.assert_array_equal(skewed.f, plain.f)
     few = rig("quantisation", "large")
     assert len(np.unique(few.f.round(9))) < 6
 

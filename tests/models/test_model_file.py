@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from forcegrasp.effects import catalogue, get_effect
-from forcegrasp.effects.for_gripper import effect_of
+from forcegrasp.effects.for_gripper import effect_of, effects_of
 from forcegrasp.errors import ConfigError
 from forcegrasp.models.model_file import Fitted, FoundEffect, Model, read_model, write_model
 from forcegrasp.physics.gripper_file import load_gripper
@@ -89,16 +89,21 @@ def test_round_trip(tmp_path):
 
 
 def test_round_trip_of_every_effect_and_variant(tmp_path):
-    tiago = load_gripper("tiago")
-    base = {n: Fitted(p.nominal, p.low, p.high, p.unit) for n, p in tiago.parameters.items() if p.scope == "gripper"}
-    for effect in catalogue().values():
-        for variant in effect.variants:
-            bounds = {p.name: Fitted(p.typical, p.low, p.high, p.unit) for p in effect.parameters}
-            absent = {p.name: Fitted(p.null, p.null, p.null, p.unit) for p in effect.parameters}  # even if infinite
-            for parameters in (bounds, absent):
-                model = Model(tiago, base, effects=(FoundEffect(effect, variant, parameters),))
-                write_model(model, tmp_path / "model.yaml")
-                assert read_model(tmp_path / "model.yaml") == model
+    seen = set()
+    for gripper in (load_gripper("tiago"), load_gripper("so101_jaw")):
+        parameters_of = gripper.parameters.items()
+        base = {n: Fitted(p.nominal, p.low, p.high, p.unit) for n, p in parameters_of if p.scope == "gripper"}
+        for effect in effects_of(gripper).values():
+            seen.add(effect.name)
+            for variant in effect.variants:
+                sizes = {p: [float(f"{x:.6g}") for x in (p.typical, p.low, p.high, p.null)] for p in effect.parameters}
+                bounds = {p.name: Fitted(*size[:3], p.unit) for p, size in sizes.items()}
+                absent = {p.name: Fitted(*size[3:] * 3, p.unit) for p, size in sizes.items()}  # even if infinite
+                for parameters in (bounds, absent):
+                    model = Model(gripper, base, effects=(FoundEffect(effect, variant, parameters),))
+                    write_model(model, tmp_path / "model.yaml")
+                    assert read_model(tmp_path / "model.yaml") == model
+    assert seen == set(catalogue())
 
 
 def test_round_trip_of_another_gripper_and_odd_names(tmp_path):
@@ -317,3 +322,21 @@ def test_effects_are_those_of_the_gripper(tmp_path):
     assert (found.effect, found.parameters) == (backlash, gap)
     refuse(put(tmp_path, text.replace("gap_rad", "gap_m")), "effects.backlash.gap_m", "did you mean gap_rad")
     refuse(put(tmp_path, text.replace("backlash:", "force_crosstalk:")), "force_crosstalk", "needs 2 force readings")
+
+
+@pytest.mark.parametrize(("name", "parameters", "speed"), [
+    ("tiago", ("breakaway_n", "kinetic_share", "stribeck_m_s"), 0.002),
+    ("so101_gripper", ("breakaway_nm", "kinetic_share", "stribeck_rad_s"), 0.002 * 16),
+])  # fmt: skip
+def test_files_from_before_the_stribeck_velocity_was_fitted(tmp_path, name, parameters, speed):
+    """It was 2 mm/s, times the gripper's scale of positions."""
+    gripper = load_gripper(name)
+    base = "".join(f"  {n}: {p.nominal}\n" for n, p in gripper.parameters.items() if p.scope == "gripper")
+    text = f"format: forcegrasp-model/1\ngripper: {name}\nbase:\n{base}effects:\n  stiction:\n"
+    old = text + f"    {parameters[0]}: 0.05\n    {parameters[1]}: 0.4\n"
+    (found,) = read_model(put(tmp_path, old)).effects
+    assert set(found.parameters) == set(parameters)
+    assert found.values == pytest.approx([0.05, 0.4, speed])
+    (said,) = read_model(put(tmp_path, f"{old}    {parameters[2]}: 0.01\n")).effects
+    assert said.parameters[parameters[2]].value == 0.01
+    refuse(put(tmp_path, text + f"    {parameters[1]}: 0.4\n"), f"effects.stiction.{parameters[0]}: missing")

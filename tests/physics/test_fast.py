@@ -81,3 +81,18 @@ def test_a_damping_that_is_written_keeps_what_the_step_needs():
     fingers = reference.motor_dofs
     difference = plant.field("dof_damping")[:, fingers] - reference.field("dof_damping")[:, fingers]
     assert difference == pytest.approx(np.broadcast_to(made_up[fingers], (2, 2)))
+
+
+@pytest.mark.parametrize(("name", "step"), [("franka_hand", 0.004), ("robotiq_2f85", 0.004), ("so101_gripper", 0.008)])
+def test_all_that_a_motor_moves_counts_in_its_step(name, step):
+    """A servo is slower by what is coupled to its joint; held forces and positions stay those of small steps."""
+    gripper, ends = load_gripper(name), []
+    for tier in ("reference", "fast"):
+        simulator = GraspSimulator(1, tier, threads=1, gripper=gripper)
+        for _ in range(60):
+            simulator.step(np.full((1, 1), -gripper.max_step / 4))
+        ends.append((simulator.joint_position, simulator.force))
+    assert simulator.model.opt.timestep == step
+    (slow, slow_force), (fast, fast_force) = ends
+    assert fast == pytest.approx(slow, abs=gripper.training.position_std)
+    assert fast_force == pytest.approx(slow_force, abs=gripper.training.force_std_n)

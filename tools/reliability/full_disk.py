@@ -50,6 +50,7 @@ def _train(path: Path, options: list[str], fill: Callable[[], None]) -> tuple[in
 
     def work() -> int:
         os.dup2(write, 2)
+        sys.stderr = os.fdopen(2, "w", 1, closefd=False)  # the one before may be of a file, which can seek
         fill()
         return main(["train", *options, f"hydra.run.dir={path}"])
 

@@ -1,0 +1,63 @@
+"""Whether held-out grasps show an effect, and whether they can tell it from another."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from forcegrasp.diagnosis.result import Candidate
+
+#: Family-wise probability of a false alarm that is accepted at each step.
+ALARM = 0.01
+#: An effect must explain this share of the mean square beyond the noise.
+LEAST_SHARE = 0.25
+# Effects whose signatures are that parallel can't be told apart, whatever the likelihood says.
+_PARALLEL = 0.995
+# An effect with fewer parameters that gains this share of what the best one gains can't be ruled out.
+_NEARLY = 0.95
+# Between an effect and a fault of the set a lead below this decides nothing: to take one for the other costs most.
+_LEAST_LEAD = 10.0
+
+
+def is_significant(candidate: Candidate, least_gain: float) -> bool:
+    """Whether noise would hardly do as well: ``least_gain`` is the share by which some signal's error must fall."""
+    return (
+        candidate.p_family <= ALARM
+        and _is_beyond_chance(candidate.gains, 5.0)
+        and candidate.largest_fall >= least_gain
+        and candidate.share >= LEAST_SHARE
+    )
+
+
+def indistinguishable(winner: Candidate, other: Candidate) -> bool:
+    """Whether these data can't tell another effect from the best one."""
+    parallel = abs(float(winner.signature @ other.signature))
+    simpler = len(other.effect.parameters) < len(winner.effect.parameters)
+    nearly = simpler and other.heldout_gain > _NEARLY * winner.heldout_gain
+    least = _LEAST_LEAD if winner.effect.of_set != other.effect.of_set else 0.0
+    return other.heldout_gain > 0 and (not _leads(winner, other, least) or parallel > _PARALLEL or nearly)
+
+
+def add_nothing(candidates: Sequence[Candidate]) -> set[str]:
+    """Names of effects that contain another one of which held-out grasps say that it is enough, or nearly so."""
+    found = {c.effect.name: c for c in candidates}
+    return {
+        c.effect.name
+        for c in candidates
+        for nested in c.effect.contains
+        if (simple := found.get(nested.effect)) is not None
+        and (not _leads(c, simple) or simple.heldout_gain > _NEARLY * c.heldout_gain)
+    }
+
+
+def _leads(winner: Candidate, other: Candidate, least: float = 0.0) -> bool:
+    """Whether the difference of what two effects gain is beyond its standard error, and beyond ``least``."""
+    return _is_beyond_chance(winner.gains - other.gains, least)
+
+
+def _is_beyond_chance(gains: np.ndarray, least: float) -> bool:
+    """Whether the sum of what grasps gain, ``(G,)``, is beyond its standard error, and beyond ``least``."""
+    gains = gains[np.isfinite(gains)]
+    error = gains.std(ddof=1) * np.sqrt(len(gains)) if len(gains) > 1 else np.inf
+    return bool(gains.sum() > max(error, least))

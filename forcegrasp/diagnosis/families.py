@@ -1,0 +1,110 @@
+"""Effects of which one contains another as a special case: the simplest that the data do not reject is the answer.
+
+An effect that ends where it *is* the simpler one falls back to it. One that fits worse than what it contains has
+stalled, and is fitted again from there. And a simple one that was found gives way to one that contains it where that
+explains more.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from forcegrasp.diagnosis.study import Study
+from forcegrasp.effects import Effect
+from forcegrasp.effects.base import Nested
+from forcegrasp.effects.for_gripper import effect_of
+from forcegrasp.effects.setting import EffectSetting
+from forcegrasp.identify.fit import Fit, fit_exactly
+from forcegrasp.identify.predict import predict
+from forcegrasp.identify.problem import Problem
+from forcegrasp.physics.gripper import Gripper
+
+# An effect is the simpler one if what it has beyond it is within so many standard errors of doing nothing.
+_STANDARD_ERRORS = 2.0
+# A fit has stalled if it is worse than one of what it contains by this share.
+_WORSE = 1e-3
+
+
+def contain(effect: type[Effect], other: type[Effect]) -> bool:
+    """Whether one of the two effects contains the other, so that a model needs one of them at most."""
+    return other.name in _contained(effect) or effect.name in _contained(other)
+
+
+def _contained(effect: type[Effect]) -> set[str]:
+    return {nested.effect for nested in effect.contains}
+
+
+def falls_back(fit: Fit, nested: Nested) -> bool:
+    """Whether the last effect of a fit can't be told from a simpler one that it contains."""
+    last = len(fit.problem.effects) - 1
+    effect = fit.problem.effects[last].effect
+    first = fit.problem.first_entry(last)
+    errors = np.sqrt(np.diag(fit.covariance())) * max(1.0, float(np.sqrt(np.mean(fit.residual**2))))
+    for name, value in nested.at.items():
+        index = first + effect.index(name)
+        entry = fit.problem.entries[index]
+        if abs(fit.vector[index] - entry.coordinate(value)) > max(_STANDARD_ERRORS * errors[index], 1e-3):
+            return False
+    return True
+
+
+def simpler(setting: EffectSetting, nested: Nested, gripper: Gripper) -> EffectSetting:
+    """The effect that a setting contains, with the values that they share."""
+    effect = effect_of(nested.effect, gripper)
+    values = effect.typical_values()
+    for own, its in nested.same.items():
+        values[effect.index(its)] = setting.values[setting.effect.index(own)]
+    return EffectSetting(effect, effect.variants[0], values)
+
+
+def richer(setting: EffectSetting, container: type[Effect]) -> list[EffectSetting]:
+    """Settings of an effect that contains this one: shared values carried over, its own at all sizes that are tried."""
+    nested = next(n for n in container.contains if n.effect == setting.effect.name)
+    found: dict[bytes, EffectSetting] = {}
+    for trial in [container.typical_values(), *container.trials()]:
+        values = np.array(trial, float)
+        for own, its in nested.same.items():
+            values[container.index(own)] = setting.values[setting.effect.index(its)]
+        found[values.tobytes()] = EffectSetting(container, container.variants[0], values)
+    return list(found.values())
+
+
+def refit_as(setting: EffectSetting, fit: Fit, without: str, study: Study) -> Fit:
+    """Fits a model in which this effect takes the place of another, from where the model stands."""
+    return _refit([setting], fit, without, study)
+
+
+def refit_as_richer(container: type[Effect], fit: Fit, without: str, study: Study) -> Fit:
+    """The same with an effect that contains the other, from the best of its sizes."""
+    known = next(one for one in fit.problem.case(fit.vector).effects if one.effect.name == without)
+    return _refit(richer(known, container), fit, without, study)
+
+
+def _refit(settings: Sequence[EffectSetting], fit: Fit, without: str, study: Study) -> Fit:
+    case = fit.problem.case(fit.vector)
+    kept = [one for one in case.effects if one.effect.name != without]
+    gone = [i for i, one in enumerate(case.effects) if one.effect.name == without]
+    base = [x for x, entry in zip(fit.vector, fit.problem.entries, strict=True) if entry.effect not in gone]
+    problems = [Problem(fit.problem.gripper, fit.problem.grasps, [*kept, setting]) for setting in settings]
+    starts = [np.r_[base, problem.start()[len(base) :]] for problem in problems]
+    if len(starts) > 1:
+        cases = [problem.case(start) for problem, start in zip(problems, starts, strict=True)]
+        errors = [float(np.sum(study.target.residual(one) ** 2)) for one in predict(study.simulators.cheap, cases)]
+        best = int(np.argmin(errors))
+        problems, starts = problems[best : best + 1], starts[best : best + 1]
+    return fit_exactly(study.target, problems[0], study.simulators, starts[0])
+
+
+def extensions(fit: Fit, effects: Sequence[type[Effect]]) -> Iterator[tuple[str, type[Effect]]]:
+    """Effects that could take the place of one in the model that they contain: its name, and the effect."""
+    for known in fit.problem.effects:
+        for effect in effects:
+            if known.effect.name in _contained(effect):
+                yield known.effect.name, effect
+
+
+def stalled(fit: Fit, member: Fit) -> bool:
+    """Whether a fit is worse than one of an effect that it contains."""
+    return fit.cost > (1 + _WORSE) * member.cost

@@ -1,0 +1,118 @@
+"""Grasps that hold most of the error, and whether they fit as grasps of another object than the set says."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from forcegrasp.identify.fit import Fit, Simulators, fit_once
+from forcegrasp.identify.predict import predict
+from forcegrasp.identify.problem import Problem
+from forcegrasp.identify.target import Target
+from forcegrasp.measure.schema import MeasuredGrasp
+from forcegrasp.replay.replay import Replay
+
+# A grasp is odd if, judged by a fit of the others, its error is so many times their median, and the noise.
+_ODD = 4.0
+# So many are odd at most, and this share of all; where more are, it is the model.
+_MOST, _SHARE = 4, 0.25
+# Rounds of leaving out and judging again.
+_ROUNDS = 4
+# An odd grasp fits as another object's if its error is at most so many times the others' median.
+_FITS = 2.0
+
+
+@dataclass(frozen=True)
+class OddGrasp:
+    """A grasp that the model of the others misses by far."""
+
+    name: str
+    object: str
+    error: float  #: rms residual ÷ noise under a fit of the other grasps
+    like: str = ""  #: object as which it fits; empty if it fits as none
+    error_like: float = np.nan  #: rms residual ÷ noise as that object
+
+    def __str__(self) -> str:
+        text = f"grasp {self.name} of {self.object} ({self.error:.1f} × noise"
+        return f"{text}; {self.error_like:.1f} as one of {self.like})" if self.like else f"{text})"
+
+
+def odd_grasps(target: Target, fit: Fit) -> tuple[OddGrasp, ...]:
+    """The few grasps that a fit of all others misses by far; none if there are none, or many.
+
+    Args:
+      target: the measurements, of grasps of objects.
+      fit: of all of them.
+    """
+    objects = target.objects
+    if target.gripper.is_servo or len(objects) < 2:
+        return ()
+    errors = _errors(fit.residual, target)
+    if errors.max() < _ODD:
+        return ()
+    labels = [grasp.object for grasp in target.grasps]
+    count, suspects, usual = max(1, min(_MOST, int(_SHARE * len(errors)))), np.array([], int), 1.0
+    problem, vector = fit.problem, fit.vector
+    for _ in range(_ROUNDS):  # those that the others miss most are left out, and judged again by the others
+        before, suspects = set(suspects), np.argsort(-errors)[:count]
+        if set(suspects) == before:
+            break
+        rest = np.setdiff1d(np.arange(len(errors)), suspects)
+        if {labels[i] for i in rest} != set(objects):  # of some object nothing else is known
+            return ()
+        problem, vector = _fit_of(target, fit, rest, known=(problem, vector))
+        errors = _errors_as(target, np.arange(len(errors)), target.grasps, problem, vector)
+        usual = max(1.0, float(np.median(errors[rest])))
+    alone = [target.grasps[i] for i in suspects]
+    as_said = errors[suspects]
+    odd = [k for k in range(len(suspects)) if as_said[k] > _ODD * usual]
+    if not odd:
+        return ()
+    best: dict[int, tuple[float, str]] = {}
+    for name in objects:
+        pattern = next(grasp for i, grasp in enumerate(target.grasps) if grasp.object == name and i not in suspects)
+        relabelled = [dataclasses.replace(g, object=name, radius_m=pattern.radius_m) for g in alone]
+        for k, error in enumerate(_errors_as(target, suspects, relabelled, problem, vector)):
+            if name != alone[k].object and error < best.get(k, (np.inf, ""))[0]:
+                best[k] = (float(error), name)
+    found = []
+    for k in odd:
+        error, like = best[k]
+        fits = error <= _FITS * usual
+        found.append(OddGrasp(alone[k].name, alone[k].object, float(as_said[k]), like if fits else "", error))
+    return tuple(found)
+
+
+def _errors(residual: np.ndarray, target: Target) -> np.ndarray:
+    """rms residual ÷ noise of each grasp, ``(G,)``."""
+    samples = np.maximum(target.mask.sum(axis=1), 1) * residual.shape[-1]
+    return np.sqrt(np.sum(residual**2, axis=(1, 2)) / samples)
+
+
+def _fit_of(
+    target: Target, fit: Fit, rest: np.ndarray, known: tuple[Problem, np.ndarray]
+) -> tuple[Problem, np.ndarray]:
+    """The problem of these grasps alone, and a fit's coordinates, from what is known."""
+    few = target.subset(rest)
+    problem = Problem(target.gripper, few.grasps, fit.problem.effects)
+    start = _coordinates(problem, known)
+    return problem, fit_once(few, problem, Simulators(problem), start).vector
+
+
+def _coordinates(problem: Problem, known: tuple[Problem, np.ndarray]) -> np.ndarray:
+    """A problem's coordinates, as far as another one has them by name."""
+    values = {entry.name: x for entry, x in zip(known[0].entries, known[1], strict=True)}
+    return np.array([values.get(entry.name, x) for entry, x in zip(problem.entries, problem.start(), strict=True)])
+
+
+def _errors_as(
+    target: Target, which: np.ndarray, grasps: Sequence[MeasuredGrasp], problem: Problem, vector: np.ndarray
+) -> np.ndarray:
+    """Errors of these grasps, with labels of their own, under parameters of the others."""
+    own = Problem(problem.gripper, grasps, problem.effects)
+    few = target.subset(which)
+    case = own.case(_coordinates(own, (problem, vector)))
+    return _errors(few.residual(predict(Replay(problem.gripper, grasps), [case])[0]), few)

@@ -1,0 +1,55 @@
+"""Where else a fit with one more effect may start: other sizes of it, and base parameters as they were given."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from forcegrasp.diagnosis.signatures import Background
+from forcegrasp.diagnosis.study import Study
+from forcegrasp.identify.fit import Fit
+from forcegrasp.identify.predict import predict
+
+# Sizes that are looked at, as multiples of the one at which the fit ended.
+_MULTIPLES = (0.1, 0.2, 0.35, 0.6, 0.8, 1.25, 1.6, 2.5, 4.0, 8.0)
+# So many of the promising ones are fitted.
+_MOST = 2
+# A size is promising if, all else fitted anew as far as slopes tell, at most this share is added to the cost.
+_PROMISING = 0.3
+
+
+def other_starts(fit: Fit, study: Study) -> list[np.ndarray]:
+    """Coordinates to start from, each ``(p,)``: the best sizes, twice the size, and nominal base parameters.
+
+    Base parameters that made up for the effect while it was missing may be stuck where they are. The first parameter
+    of the last effect is set to sizes all over its range, each of them simulated by the model itself. What the other
+    parameters would make up for, as far as their slopes tell, is taken out of the residuals.
+
+    Args:
+      fit: with an effect as its last one, that left more than noise.
+      study: the measurements.
+    """
+    problem = fit.problem
+    index = problem.first_entry(len(problem.effects) - 1)
+    entry, size = problem.entries[index], fit.values[index]
+    sizes = [s for s in np.unique(np.clip(size * np.array(_MULTIPLES), entry.low, entry.high)) if s != size]
+    starts = []
+    for value in sizes:
+        start = fit.vector.copy()
+        start[index] = entry.coordinate(value)
+        starts.append(start)
+    if not starts:
+        return []
+    signals = predict(study.simulators.exact, [problem.case(start) for start in starts])
+    others = Background(fit, (), without=index)
+    left = np.stack([study.target.residual(one).ravel() for one in signals], axis=1)
+    costs = np.sum(others.remove(left) ** 2, axis=0)
+    double = fit.vector.copy()
+    double[index] = entry.coordinate(2 * size)
+    base = [e.effect is None and e.parameter not in ("radius_m", "offset_m") for e in problem.entries]
+    nominal = np.where(base, problem.start(), fit.vector)
+    valleys = [
+        i for i, cost in enumerate(costs)
+        if cost <= min(costs[max(0, i - 1) : i + 2]) and cost < (1 + _PROMISING) * fit.cost
+    ]  # fmt: skip
+    ordered = sorted(valleys, key=lambda i: costs[i])[:_MOST]
+    return [*(starts[i] for i in ordered), double, nominal]

@@ -1,0 +1,197 @@
+"""One step of the search: refits with one more effect, judged on held-out grasps."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from forcegrasp.diagnosis import families
+from forcegrasp.diagnosis.evidence import ALARM, LEAST_SHARE, add_nothing, indistinguishable, is_significant
+from forcegrasp.diagnosis.other_starts import other_starts
+from forcegrasp.diagnosis.refine import refine
+from forcegrasp.diagnosis.result import Candidate, Step
+from forcegrasp.diagnosis.signatures import Background, Score, Signatures, null_gains
+from forcegrasp.diagnosis.study import Study
+from forcegrasp.diagnosis.verdict import explained_share
+from forcegrasp.effects import Effect
+from forcegrasp.identify.base_fit import rms_error
+from forcegrasp.identify.cross_validation import log_likelihood, rms
+from forcegrasp.identify.fit import Fit, fit_exactly
+from forcegrasp.identify.noise_floor import cells, excess
+
+#: An effect must lower the error of some signal in some phase by this share; by more where all is at the floor already.
+LEAST_GAIN, LEAST_GAIN_AT_FLOOR = 0.02, 0.1
+# Refitted per step: signatures only rank.
+_REFITTED = 5
+# Of these the best ones are fitted to the end.
+_REFINED = 3
+# A signature this much worse than the best is not refitted.
+_MIN_GAIN_RATIO = 0.2
+# A refit gains at most about twice what a signature promises.
+_MAX_GAIN_FACTOR = 0.5
+# A signature of an earlier round is simulated anew if it gains this share of what makes its effect worth a fit.
+_RESIMULATE_RATIO = 0.3
+# An error of so many times the noise leaves nothing to look for; beyond the other, no start will find it.
+_ALL_FITTED, _FAR = 1.05, 10.0
+
+
+def look_further(
+    study: Study,
+    fit: Fit,
+    signatures: Signatures,
+    effects: Sequence[type[Effect]],
+    rng: np.random.Generator,
+    richer: Sequence[tuple[str, type[Effect]]] = (),
+) -> Step:
+    """Looks for one more effect.
+
+    Args:
+      study: the measurements.
+      fit: with the effects that were found so far.
+      signatures: of all effects, as they were simulated last.
+      effects: those that are not in the model.
+      rng: for the null distribution.
+      richer: names of effects in the model, each with one that contains it and may take its place.
+    """
+    start = _Start(study, fit)
+    study.progress(f"trying {len(effects)} effects")
+    new = signatures.missing(effects)
+    signatures.simulate(fit, new)
+    groups = signatures.scores(fit, start.background, effects)
+    null = null_gains(groups, rng)
+    threshold = start.refit_threshold(groups, null)
+    stale = {g[0].setting.effect for g in groups if g[0].gain > _RESIMULATE_RATIO * threshold} - set(new)
+    if stale:
+        signatures.simulate(fit, stale)
+        groups = signatures.scores(fit, start.background, effects)
+        threshold = start.refit_threshold(groups, null)
+    ranked = sorted((group[0] for group in groups), key=lambda s: -s.gain)
+    candidates = start.refit([s for s in ranked if s.gain > threshold][:_REFITTED], null)
+    candidates += start.refit_richer(richer, null)
+    best: dict[str, Candidate] = {}
+    for candidate in sorted(candidates, key=lambda c: -c.heldout_gain):
+        best.setdefault(candidate.effect.name, candidate)  # of several variants the best one
+    ordered, redundant = start.refine_on_reference_tier(tuple(best.values()))
+    least_gain = LEAST_GAIN if excess(start.held, study.numerical, study.target) else LEAST_GAIN_AT_FLOOR
+    if not ordered or not is_significant(ordered[0], least_gain):
+        return Step((), ordered, tuple(ranked), start.error, start.error)
+    winner = ordered[0]
+    # of those that can't be told apart the simplest comes first
+    equal = sorted(
+        [winner, *(c for c in ordered[1:] if c.effect.name not in redundant and indistinguishable(winner, c))],
+        key=lambda c: len(c.effect.parameters),
+    )
+    ordered = (*equal, *(c for c in ordered if c not in equal))
+    names = tuple(c.effect.name for c in equal)
+    return Step(names, ordered, tuple(ranked), start.error, equal[0].error_after)
+
+
+class _Start:
+    """What a step starts from: a fit, and what it leaves.
+
+    Args:
+      study: the measurements.
+      fit: with the effects that were found so far.
+    """
+
+    def __init__(self, study: Study, fit: Fit) -> None:
+        self._study, self._fit = study, fit
+        self.background = Background(fit, study.numerical)
+        self.held = study.heldout(fit)  #: residuals of held-out grasps, ``(G, S, C)``
+        self.error = rms(self.held, study.target)
+
+    def refit_threshold(self, groups: Sequence[Sequence[Score]], null: np.ndarray) -> float:
+        """What a signature must gain for its effect to be worth a fit."""
+        if not groups:
+            return np.inf
+        beyond = float(np.sum(self._fit.residual**2) - self._study.target.readings)
+        best = max(group[0].gain for group in groups)
+        return max(float(np.quantile(null, 1 - ALARM)), _MIN_GAIN_RATIO * best, _MAX_GAIN_FACTOR * LEAST_SHARE * beyond)
+
+    def refit(self, scores: Sequence[Score], null: np.ndarray) -> list[Candidate]:
+        """Rough fits with one more effect, from where the best signatures put them."""
+        candidates = []
+        for one in refine(scores, self._study, self._fit, self.background):
+            p_family = (1 + int(np.sum(null >= one.score.gain))) / (1 + len(null))
+            candidates.append(self._judge(one.fit, p_family, one.score.signature))
+        return candidates
+
+    def refit_richer(self, richer: Sequence[tuple[str, type[Effect]]], null: np.ndarray) -> list[Candidate]:
+        """Fits with effects in the place of those in the model that they contain."""
+        candidates = []
+        for name, effect in richer if excess(self.held, self._study.numerical, self._study.target) else ():
+            self._study.progress(f"refitting with {effect.name} in place of {name}")
+            refit = families.refit_as_richer(effect, self._fit, name, self._study)
+            if not any(families.falls_back(refit, nested) for nested in effect.contains):
+                change = ((refit.predicted - self._fit.predicted) / self._study.target.sigma).ravel()
+                p_family = (1 + int(np.sum(null >= self._fit.cost - refit.cost))) / (1 + len(null))
+                candidates.append(self._judge(refit, p_family, change / max(np.linalg.norm(change), 1e-9), name))
+        return candidates
+
+    def refine_on_reference_tier(self, ordered: Sequence[Candidate]) -> tuple[tuple[Candidate, ...], set[str]]:
+        """Fits the best one, and those indistinguishable from it, on the reference tier: rough fits may stop short.
+
+        Also returns the names of effects that add nothing to one that they contain.
+        """
+        near = [c for c in ordered if c is ordered[0] or indistinguishable(ordered[0], c)][:_REFINED]
+        contained = {nested.effect for c in near for nested in c.effect.contains}
+        near += [c for c in ordered if c.effect.name in contained and c not in near]
+        refined = []
+        for c in near:
+            if c.replaces:  # fitted to the end already
+                refined.append(c)
+                continue
+            self._study.progress(f"fitting {c.effect.name} {c.setting.variant} to the end")
+            refined.append(self._judge(self._to_the_end(c.fit), c.p_family, c.signature))
+        refined = self._compare_with_contained(refined)
+        names = {c.effect.name for c in refined}
+        every = [*refined, *(c for c in ordered if c.effect.name not in names)]
+        while True:
+            redundant = add_nothing(every)
+            every.sort(key=lambda c: (c.effect.name in redundant, -c.heldout_gain))
+            first = every[0] if every else None
+            if first is None or first.effect.name in names:
+                return tuple(every), redundant
+            # fitted to the end the others are no better than this rough one: it is to be fitted, too
+            names.add(first.effect.name)
+            self._study.progress(f"fitting {first.effect.name} {first.setting.variant} to the end")
+            every[0] = self._judge(self._to_the_end(first.fit), first.p_family, first.signature)
+
+    def _compare_with_contained(self, candidates: Sequence[Candidate]) -> list[Candidate]:
+        """Refits effects that fit worse than one that they contain, and the one that they have become."""
+        found = {c.effect.name: c for c in candidates}
+        for c in candidates:
+            for nested in () if c.replaces else c.effect.contains:
+                member = found.get(nested.effect)
+                if member is not None and families.stalled(c.fit, member.fit):
+                    again = families.refit_as_richer(c.effect, member.fit, nested.effect, self._study)
+                    c = found[c.effect.name] = self._judge(
+                        min(again, c.fit, key=lambda f: f.cost), c.p_family, c.signature
+                    )
+                elif families.falls_back(c.fit, nested):
+                    setting = families.simpler(c.setting, nested, c.fit.problem.gripper)
+                    fallen = families.refit_as(setting, c.fit, c.effect.name, self._study)
+                    if member is None or fallen.cost < member.fit.cost:
+                        found[nested.effect] = self._judge(fallen, c.p_family, c.signature)
+        return list(found.values())
+
+    def _to_the_end(self, rough: Fit) -> Fit:
+        target, simulators = self._study.target, self._study.simulators
+        exact = fit_exactly(target, rough.problem, simulators, rough.vector)
+        if not _ALL_FITTED < rms_error(exact, target) < _FAR:
+            return exact
+        # it may have ended where an effect's size meets a step of the simulation, or in another valley
+        starts = other_starts(exact, self._study)
+        ends = [fit_exactly(target, exact.problem, simulators, start) for start in starts]
+        return min([exact, *ends], key=lambda fit: fit.cost)
+
+    def _judge(self, refit: Fit, p_family: float, signature: np.ndarray, replaces: str = "") -> Candidate:
+        """What held-out grasps say of a fit with one more effect, its last one."""
+        target, held, after = self._study.target, self.held, self._study.heldout(refit)
+        gains = log_likelihood(after) - log_likelihood(held)
+        fall = max((1 - rms(after, target, w) / rms(held, target, w) for _, w in cells(target)), default=0.0)
+        error = rms(after, target)
+        share = explained_share(self.error, error)
+        setting = refit.problem.case(refit.vector).effects[-1]
+        return Candidate(setting, refit, p_family, gains, error, share, fall, signature, replaces)

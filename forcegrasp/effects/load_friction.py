@@ -1,0 +1,30 @@
+"""Dry friction that grows with the load of the gears."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from forcegrasp.effects.base import Contribution, Effect, Parameter
+
+
+class LoadFriction(Effect):
+    """Gears that are pressed together rub: dry friction in proportion to the force that the transmission carries.
+
+    It carries what the motor gives against what acts on the joint from outside: gravity, springs, a load, fingertips
+    that press. At rest the two are opposite, and it counts both, so that friction is 2 c times the load that is held.
+    """
+
+    name = "load_friction"
+    stage = "actuator"
+    family = "friction"
+    symptom = "force is lost while squeezing and held while easing; the offset that flips grows with the load"
+    formula = "|F| ≤ c |F_motor − F_outside|"
+    source = "Duclusaud et al. (2024), arXiv 2410.08650, model M3, forces of the last physics step"
+    look_alikes = ("coulomb_friction", "stiction", "force_hysteresis", "backlash")
+    separates = "holds that are approached from both sides under several loads: the band is as wide as the load is high"
+    parameters = (Parameter("coefficient", "friction per load c", "1", 0.0, 0.6, 0.15, trials=(0.1,)),)
+    order = 4
+
+    def act(self) -> Contribution:
+        load = self.plant.motor_force[self.rows] - self.plant.outside_force[self.rows]
+        return Contribution(friction=self["coefficient"] * np.abs(load))

@@ -1,0 +1,139 @@
+"""Effects that contain simpler ones: which of them is the answer, and what becomes of fits that stalled."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from forcegrasp.diagnosis import families
+from forcegrasp.diagnosis.add_effect import add_effect
+from forcegrasp.diagnosis.diagnose_set import diagnose_set
+from forcegrasp.diagnosis.evidence import add_nothing
+from forcegrasp.diagnosis.result import kept_steps
+from forcegrasp.diagnosis.study import Study
+from forcegrasp.effects import get_effect
+from forcegrasp.effects.for_gripper import effect_of, effects_of
+from forcegrasp.effects.setting import EffectSetting
+from forcegrasp.identify.fit import fit_exactly
+from forcegrasp.identify.fit_set import fit_model
+from forcegrasp.identify.fitted_model import model_of
+from forcegrasp.identify.loading import Loaded
+from forcegrasp.identify.predict import predict
+from forcegrasp.identify.problem import Problem
+from forcegrasp.importers.example import example_set
+from forcegrasp.physics import load_gripper
+from forcegrasp.replay.replay import Replay
+
+SAMPLES = 130
+FRICTION = ["coulomb_friction", "stiction"]
+
+
+def silent(text: str) -> None:
+    """Takes what a diagnosis tells about its progress."""
+
+
+def containers(gripper):
+    return [(effect, nested) for effect in effects_of(gripper).values() for nested in effect.contains]
+
+
+@pytest.mark.parametrize("name", ["tiago", "so101_gripper", "so101_jaw"])
+def test_shared_values_are_carried_over_both_ways(name):
+    gripper = load_gripper(name)
+    for effect, nested in containers(gripper):
+        member = effects_of(gripper)[nested.effect]
+        simple = EffectSetting(member, "", 0.7 * member.typical_values())
+        for rich in families.richer(simple, effect):
+            back = families.simpler(rich, nested, gripper)
+            for its in nested.same.values():
+                assert back.values[member.index(its)] == simple.values[member.index(its)]
+
+
+def test_effects_that_contain_one_another_are_related():
+    stiction, coulomb, backlash = (get_effect(n) for n in ("stiction", "coulomb_friction", "backlash"))
+    assert families.contain(stiction, coulomb)
+    assert families.contain(coulomb, stiction)
+    assert not families.contain(stiction, backlash)
+
+
+@pytest.mark.parametrize(
+    ("lead", "redundant"),
+    [
+        (np.array([3.0, -3.0, 2.0, -2.0]), True),  # no lead
+        (np.full(4, 3.0), True),  # a sure one, of 3 % of what the simple one gains
+        (np.full(4, 30.0), False),
+    ],
+)
+def test_an_effect_must_explain_more_than_the_one_it_contains(made_up, lead, redundant):
+    good = made_up.diagnosis("effect").steps[0].candidates[0]
+
+    def candidate(name: str, gains: np.ndarray):
+        return dataclasses.replace(good, setting=EffectSetting.typical(get_effect(name)), gains=gains)
+
+    simple = candidate("coulomb_friction", np.full(4, 100.0))
+    rich = candidate("stiction", 100.0 + lead)
+    assert add_nothing([simple, rich]) == ({"stiction"} if redundant else set())
+    assert add_nothing([rich, candidate("backlash", np.full(4, 100.0))]) == set()
+
+
+def jaw_with(effect: str, **values: float) -> Loaded:
+    """The commands of the starter set, on a jaw with this effect: read by an encoder, with a little noise."""
+    measured, gripper = example_set(), load_gripper("so101_jaw")
+    grasps = [
+        dataclasses.replace(
+            g, time_s=g.time_s[:SAMPLES], command_m=g.command_m[:SAMPLES], position_m=g.position_m[:SAMPLES],
+            force_n=g.force_n[:SAMPLES], start=(g.position_m[0], np.zeros(1)),
+        )
+        for g in measured.grasps[4:]
+    ]  # fmt: skip
+    hidden = EffectSetting.typical(effect_of(effect, gripper))
+    for name, value in values.items():
+        hidden.values[hidden.effect.index(name)] = value
+    problem = Problem(gripper, grasps, [hidden])
+    read = predict(Replay(gripper, grasps, encoders_known=False), [problem.case(problem.start())])[0]
+    noisy = read + 0.0003 * np.random.default_rng(0).standard_normal(read.shape)
+    found = tuple(dataclasses.replace(g, position_m=q, start=None) for g, q in zip(grasps, noisy, strict=True))
+    return Loaded(dataclasses.replace(measured, grasps=found), gripper, [])
+
+
+@pytest.fixture(scope="module")
+def sticking() -> Loaded:
+    """A jaw whose friction falls once it slides."""
+    return jaw_with("stiction", breakaway_n=0.15)
+
+
+def test_dry_friction_is_not_called_stiction():
+    diagnosis, _ = diagnose_set(jaw_with("coulomb_friction", force_n=0.08), None, FRICTION, 0, silent)
+    assert (diagnosis.verdict, diagnosis.effects) == ("effect", ("coulomb_friction",))
+
+
+def test_friction_in_the_model_gives_way_to_stiction(sticking):
+    """The step that found the simple one stays in the record; the answer has the richer one alone."""
+    target, _, base = fit_model(sticking, 0, silent)
+    coulomb = effect_of("coulomb_friction", sticking.gripper)
+    model = add_effect(sticking, model_of(base.fit, target, sticking, []), coulomb, silent).model
+    diagnosis, _ = diagnose_set(sticking, model, FRICTION, 0, silent)
+    assert diagnosis.preferred == ("stiction",)
+    assert [one.effect.name for one in diagnosis.fit.problem.effects] == ["stiction"]
+    assert diagnosis.steps[-1].replaces == "coulomb_friction"
+    assert diagnosis.error_after < 0.8 * diagnosis.error_before
+
+
+def test_a_fit_stuck_beside_the_effect_it_contains_is_fitted_again_from_there(sticking):
+    target, simulators, base = fit_model(sticking, 0, silent)
+    old, gripper = base.fit.problem, sticking.gripper
+    problem = Problem(gripper, old.grasps, [EffectSetting.typical(effect_of("coulomb_friction", gripper))])
+    member = fit_exactly(target, problem, simulators, np.r_[base.fit.vector, problem.start()[len(old) :]])
+    stiction = effect_of("stiction", gripper)
+    again = families.refit_as_richer(stiction, member, "coulomb_friction", Study(target, simulators, []))
+    assert families.stalled(member, again)
+    assert not families.stalled(again, member)
+    assert not families.falls_back(again, stiction.contains[0])
+
+
+def test_a_step_whose_effect_was_replaced_is_not_part_of_the_answer(made_up):
+    first = made_up.diagnosis("effect").steps[0]
+    richer = dataclasses.replace(first.candidates[0], replaces=first.effects[0])
+    second = dataclasses.replace(first, effects=("stiction",), candidates=(richer,))
+    assert kept_steps([first, second]) == [second]

@@ -1,0 +1,376 @@
+"""Effects of commands and drives, each against its equation once more: on signals, and as a user sees it."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+from scipy.signal import lfilter
+
+from forcegrasp.effects import get_effect
+from forcegrasp.effects.for_gripper import effect_of
+from forcegrasp.physics.gripper_file import load_gripper
+from forcegrasp.physics.plant import Plant
+
+from .rollouts import START_M, make_plant, path, rollout, start
+from .signals import DT, GAIN, T, make, send, settle, wave
+
+
+@pytest.mark.parametrize("steps", [1, 3, 12.25, 30.5])
+def test_command_delay_shifts_by_exactly_d(steps):
+    sent = send(make("command_delay", steps * DT), wave(), position=7.0)
+    expected = np.interp(T - steps * DT, [-1.0, -DT, *T], [7.0, 7.0, *wave()])
+    assert sent == pytest.approx(expected, abs=1e-12)
+
+
+def test_command_delay_shifts_all_motion_alike():
+    commands = path((0.0222, 1.0, 0.4), (0.026, 0.05, 0.4))
+    late = rollout(1, [(get_effect("command_delay"), [0.08], "", [0])], commands=commands)
+    base = rollout(1, commands=commands)
+    assert late.position[2:] == pytest.approx(base.position[:-2], abs=1e-6)  # the object settles meanwhile
+    assert late.force[2:] == pytest.approx(base.force[:-2], abs=5e-3)
+
+
+def test_command_deadband_drops_small_changes():
+    ramp = np.linspace(0.0, 0.01, 101)
+    held = send(make("command_deadband", 0.00035, variant="held"), ramp)
+    expected = np.floor(np.arange(101) / 4) * 4e-4  # every fourth increment of 0.1 mm is more than 0.35 mm away
+    assert held == pytest.approx(expected, abs=1e-12)
+    near, dropped = send(make("command_deadband", 0.00035), ramp, position=0.005), np.abs(ramp - 0.005) <= 0.00035
+    assert np.array_equal(near[~dropped], ramp[~dropped])
+    assert near[dropped] == pytest.approx(0.0046)  # the last one before
+
+
+def test_command_deadband_goes_by_the_encoder():
+    effect, new = make("command_deadband", 0.001), np.array([True])
+    stub = SimpleNamespace(position=np.full((1, 2), 0.01), measured_position=np.full((1, 2), 0.0102))
+    for recorded, dropped in ((None, True), (np.full((1, 2), 0.0097), False)):
+        stub.recorded_position = recorded
+        sent = effect.attach(stub, np.array([0])).command(np.full((1, 2), 0.0111), new)
+        assert np.all((sent == 0.01) == dropped)
+
+
+def test_command_deadband_decides_on_new_commands_only():
+    """A command that was dropped is not passed on later because the finger moved meanwhile."""
+    sent = send(make("command_deadband", 0.001), np.full(20, 0.0105), np.linspace(0.01, 0.0, 20), every=100)
+    assert np.all(sent == 0.01)
+
+
+@pytest.mark.parametrize(("name", "value"), [("actuator_lag", 0.05), ("rate_limit", 0.01), ("command_delay", 0.02)])
+def test_what_slows_a_command_starts_from_where_the_finger_stands(name, value):
+    np.testing.assert_allclose(send(make(name, value), np.full(30, 0.03), position=0.03), 0.03, rtol=1e-12)
+
+
+def test_a_dropped_command_is_not_taken_up_while_it_is_held():
+    plant = Plant(load_gripper("tiago"), 1, threads=1)
+    plant.attach([(make("command_deadband", 0.0003), np.array([0]))])
+    plant.reset(np.arange(1), np.zeros(1), np.full((1, 2), 0.044))
+    plant.advance(np.full((1, 2), 0.03), 30)
+    assert (plant.position > 0.035).all()  # on the way
+    plant.advance(plant.position.copy(), 1000)
+    np.testing.assert_allclose(plant.position, 0.03, atol=1e-5)
+
+
+def test_command_deadband_comes_before_a_delay():
+    """Both together do as the dead band alone, later; behind the delay it would see a command's age as its own."""
+    uses = [(get_effect("command_delay"), [0.05], "", [0]), (get_effect("command_deadband"), [0.0003], "held", [0])]
+    plant = make_plant(1, uses)
+    start(plant, [0])
+    for command in (START_M, START_M - 0.001):
+        plant.advance(np.full((1, 2), command), round(0.04 / plant.dt))
+    assert plant.position[0, 0] == pytest.approx(START_M, abs=1e-7)
+    plant.advance(np.full((1, 2), START_M - 0.001), 200, fresh=False)
+    assert plant.position[0, 0] < START_M - 0.0009
+
+
+@pytest.mark.parametrize("height", [0.004, 0.016])
+def test_rate_limit_makes_ramps(height):
+    step = np.where(T < 0.1, 0.0, height)
+    sent = send(make("rate_limit", 0.02), step)
+    expected = np.clip(0.02 * (T - 0.1 + DT), 0, height)
+    assert sent == pytest.approx(expected, abs=1e-12)
+    assert send(make("rate_limit", 0.02), 0.019 * T) == pytest.approx(0.019 * T, abs=1e-12)
+
+
+def test_actuator_lag_is_an_exponential():
+    tau = 0.05
+    sent = send(make("actuator_lag", tau), np.where(T < 0.1, 0.0, 1.0))
+    assert sent == pytest.approx(np.where(T < 0.1, 0.0, 1 - np.exp(-(T - 0.1 + DT) / tau)), abs=1e-12)
+    keep = np.exp(-DT / tau)
+    assert send(make("actuator_lag", tau), wave()) == pytest.approx(lfilter([1 - keep], [1, -keep], wave()), abs=1e-12)
+
+
+@pytest.mark.parametrize("friction", [0.01, 0.03, 0.1])
+def test_coulomb_friction_stops_short_by_an_offset_that_flips(friction):
+    command, far = 0.030, 0.006
+    closing = settle("coulomb_friction", (friction,), command + far, command).position[0] - command
+    opening = settle("coulomb_friction", (friction,), command - 0.003, command).position[0] - command
+    assert closing == pytest.approx([friction / GAIN] * 2, rel=0.02)
+    assert opening == pytest.approx([-friction / GAIN] * 2, rel=0.02)
+
+
+def test_coulomb_friction_holds_up_to_its_size():
+    plant = settle("coulomb_friction", (0.05,), START_M)
+    plant.advance(np.full((1, 2), START_M + 0.95 * 0.05 / GAIN), 2000)
+    assert plant.position[0] == pytest.approx([START_M] * 2, abs=2e-5)  # in 4 s
+    plant.advance(np.full((1, 2), START_M + 1.5 * 0.05 / GAIN), 2000)
+    assert plant.position[0] == pytest.approx([START_M + 0.5 * 0.05 / GAIN] * 2, abs=2e-5)
+
+
+def test_stiction_follows_the_stribeck_curve():
+    for stribeck in (0.002, 0.01):
+        effect = make("stiction", 0.05, 0.4, stribeck)
+        for speed in (0.0, 0.001, 0.002, -0.002, 0.01, 1.0):
+            stub = SimpleNamespace(velocity=np.full((1, 2), speed))
+            friction = effect.attach(stub, np.array([0])).act().friction
+            assert friction == pytest.approx(0.02 + 0.03 * np.exp(-((speed / stribeck) ** 2)), abs=1e-12)
+
+
+def test_stiction_sticks_then_jumps():
+    """On a slow ramp the finger waits until the spring of the servo pulls with F_s, then slips at once."""
+    speed, breakaway = 0.0005, 0.15
+    plant = settle("stiction", (breakaway, 0.2, 0.002), START_M)
+    ramp, seen = START_M + speed * np.arange(1, 2001) * plant.dt, []
+    for command in ramp:
+        plant.advance(np.full((1, 2), command))
+        seen.append((plant.position[0, 0], plant.velocity[0, 0]))
+    position, velocity = np.array(seen).T
+    first = np.argmax(position > START_M + 2e-5)
+    assert ramp[first] - START_M == pytest.approx(breakaway / GAIN, rel=0.1)
+    assert velocity[first:].max() > 5 * speed
+    assert velocity[first + np.argmax(velocity[first:]) :].min() < 0.1 * speed  # and sticks again
+
+
+@pytest.mark.parametrize("coefficient", [0.1, 0.3])
+def test_load_friction_takes_its_share_of_a_squeeze(coefficient):
+    """While closing |f| = c (F + P), so that of the motor's force F the pads get P = F (1 − c) / (1 + c)."""
+    plant = settle("load_friction", (coefficient,), 0.0245, 0.0235, 0.0225)
+    motor = GAIN * (plant.position[0] - 0.0225)
+    np.testing.assert_allclose(plant.motor_force[0], -motor, rtol=1e-3)
+    np.testing.assert_allclose(plant.outside_force[0], plant.pad_force[0])
+    assert plant.pad_force[0] == pytest.approx(motor * (1 - coefficient) / (1 + coefficient), rel=0.04)
+
+
+@pytest.mark.parametrize("side", [-1, 1])
+def test_load_friction_of_a_pendulum_is_as_wide_as_its_load(side):
+    """Crept to from either side: F (1 ∓ c) = W (1 ± c), with F = kp (u − q) and W = m g l sin q."""
+    coefficient, target = 0.1, 0.6
+    plant = Plant(load_gripper("xl330_pendulum"), 1, threads=1)
+    gain = plant.model.actuator_gainprm[0, 0]
+    plant.attach([(get_effect("load_friction")(np.array([[coefficient]]), plant.dt), np.array([0]))])
+    plant.reset(np.arange(1), np.zeros(1), np.full((1, 1), 0.3))
+    plant.advance(np.full((1, 1), target + 0.3 * side), 1500)
+    for command in np.linspace(target + 0.3 * side, target, 6000):
+        plant.advance(np.full((1, 1), command))
+    plant.advance(np.full((1, 1), target), 500)
+    angle = plant.position[0, 0]
+    motor, weight = gain * (target - angle), 0.49 * 9.81 * 0.1 * np.sin(angle)
+    np.testing.assert_allclose(plant.outside_force[0, 0], -weight, rtol=1e-3)
+    ratio = (1 - coefficient) / (1 + coefficient)
+    assert motor == pytest.approx(weight * ratio**side, rel=0.02)
+
+
+@pytest.mark.parametrize("target", [0.030, 0.0225])
+def test_motor_offset_is_held_by_the_servo(target):
+    """At rest F_0 + kp (u − q) = 0 in free air, and what the pads feel in contact."""
+    offset = np.array([0.03, -0.02])
+    plant = settle("motor_offset", tuple(offset), target)
+    held = GAIN * (plant.position[0] - target) - offset
+    assert held == pytest.approx(plant.pad_force[0], rel=0.03, abs=2e-5)
+    again = settle("motor_offset", tuple(offset), 0.034 if target == 0.030 else 0.024, target, seconds=2.4)
+    assert again.position == pytest.approx(plant.position, abs=3e-5)  # wherever it comes from
+
+
+@pytest.mark.parametrize("limit", [0.1, 0.25])
+def test_force_limit_is_a_plateau(limit):
+    for target in (0.012, 0.002):
+        force = settle("force_limit", (limit,), target).pad_force[0]
+        assert force.mean() == pytest.approx(limit, rel=0.01)
+        assert force == pytest.approx([limit] * 2, rel=0.03)  # readings have tangential parts in them
+    soft = settle("force_limit", (limit,), 0.0244)
+    assert soft.pad_force[0] == pytest.approx(settle("", (), 0.0244).pad_force[0], rel=1e-4)
+
+
+# --- presliding, direction, limits of the loop -----------------------------------------------------------------
+
+
+def dahl(path: np.ndarray, slip: float) -> np.ndarray:
+    """Bend of the bristles along a path, ``dz = (1 − z sign(dx) / z_c) dx`` in a thousand small steps each."""
+    bend, seen = 0.0, []
+    for moved in np.diff(path, prepend=path[0]) / 1000:
+        for _ in range(1000):
+            bend += (1 - bend * np.sign(moved) / slip) * moved
+        seen.append(bend)
+    return np.array(seen)
+
+
+def test_presliding_bends_as_dahl_says():
+    force, slip = 0.04, 3e-4
+    path = np.concatenate([np.linspace(0, 8e-4, 40), np.linspace(8e-4, 7e-4, 20), np.linspace(7e-4, -5e-4, 30)])
+    effect, pushes, held = make("presliding", force, slip), [], []
+    for position, velocity in zip(path, np.gradient(path, DT), strict=True):
+        stub = SimpleNamespace(position=np.full((1, 2), position), velocity=np.full((1, 2), velocity))
+        added = effect.attach(stub, np.array([0])).act()
+        pushes.append(added.motor_push[0, 0])
+        held.append(added.damping[0, 0])
+        assert not added.friction.any()
+    bend = dahl(path, slip)
+    assert np.array(pushes) == pytest.approx(-force * bend / slip, abs=1e-4 * force)
+    rate = 1 - np.sign(np.gradient(path)) * bend / slip
+    assert np.array(held) == pytest.approx(force / slip * (DT + 0.004) * rate, rel=2e-3)
+
+
+@pytest.mark.parametrize("step", [2e-4, 1e-3])
+def test_presliding_gives_way_to_a_small_push(step):
+    """The servo's spring against the bristles: kp (δ − x) = F_c (1 − exp(−x / z_c))."""
+    force, slip = 0.2, 5e-4
+    plant = settle("presliding", (force, slip), START_M + step)
+    expected = brentq(lambda x: GAIN * (step - x) + force * np.expm1(-x / slip), 0, step)
+    assert plant.position[0] - START_M == pytest.approx([expected] * 2, rel=0.06)  # it comes with a little swing
+    assert settle("coulomb_friction", (force,), START_M + step).position[0] == pytest.approx([START_M] * 2, abs=2e-5)
+
+
+@pytest.mark.parametrize("slip", [1e-6, 1e-5, 1e-4])
+def test_presliding_is_coulomb_friction_after_a_long_way(slip):
+    friction, command = 0.03, 0.030
+    for before, side in ((command + 0.006, 1), (command - 0.003, -1)):
+        plant = settle("presliding", (friction, slip), before, command)
+        assert plant.position[0] - command == pytest.approx([side * friction / GAIN] * 2, rel=0.06)
+
+
+def test_presliding_is_the_same_with_large_steps():
+    commands = path((0.0262, 0.02, 0.2), (0.0268, 0.01, 0.2), (0.0255, 0.01, 0.2))
+    for slip in (1e-5, 1e-4):
+        use = [(get_effect("presliding"), [0.05, slip], "", [0])]
+        fast, reference = (rollout(1, use, tier, commands).position for tier in ("fast", "reference"))
+        base = rollout(1, commands=commands).position
+        assert np.abs(fast - reference).max() < 0.04 * np.abs(reference - base).max()
+
+
+@pytest.mark.parametrize("excess", [5.0, -5.0])
+def test_direction_friction_lags_in_one_direction(excess):
+    """On a ramp the servo's spring holds damping (9 + 1 N s/m, and the excess) times speed."""
+    plant, speed = settle("direction_friction", (excess,), 0.035), 0.004
+    for side in (1, -1):  # opening, closing
+        for command in 0.035 + side * (speed * np.arange(1, 1001) * plant.dt - (0.0 if side > 0 else 0.008)):
+            plant.advance(np.full((1, 2), command))
+        damping = 10 + (abs(excess) if side * excess > 0 else 0)
+        assert GAIN * side * (command - plant.position[0]) == pytest.approx([damping * speed] * 2, rel=0.03)
+
+
+def test_back_emf_is_the_line_of_a_motor():
+    effect, wide = make("back_emf", 0.2, 0.05), (np.full((1, 2), -1.0), np.full((1, 2), 1.0))
+    for speed in (-0.1, -0.02, 0.0, 0.03, 0.05, 0.2):
+        stub = SimpleNamespace(velocity=np.full((1, 2), speed), inertia=np.full((1, 2), np.inf))
+        low, high = effect.attach(stub, np.array([0])).motor_range(*wide)
+        assert high == pytest.approx(np.full((1, 2), min(0.2 * (1 - speed / 0.05), 1.0)))
+        assert low == pytest.approx(np.full((1, 2), min(max(-0.2 * (1 + speed / 0.05), -1.0), high[0, 0])))
+
+
+@pytest.mark.parametrize("gripper", ["tiago", "robotiq_2f85"])
+@pytest.mark.parametrize("side", [-1, 1])
+def test_back_emf_has_a_highest_speed(gripper, side):
+    """A large step ends in F_s (1 − v / v_0) = c v, with the joint's damping c; also of a motor that is turned."""
+    plant = Plant(load_gripper(gripper), 2, threads=1)
+    stroke, inertia = plant.gripper.stroke, plant.model.dof_M0[plant.motor_dofs][0]
+    highest = 0.4 * stroke  # per second
+    stall = inertia * highest / 0.05  # which is reached soon
+    effect = get_effect("back_emf")(np.array([[stall, highest]]), plant.dt)
+    plant.attach([(effect, np.array([1]))])
+    begin = 0.65 if side > 0 else 0.98
+    for parameter, value in (("dof_damping", 0.0), ("dof_frictionloss", 0.0)):
+        plant.base(parameter)[:], plant.field(parameter)[:] = value, value
+    plant.reset(np.arange(2), np.zeros(2), np.full((2, plant.motors), begin * stroke))
+    speeds = []
+    for _ in range(round(0.8 / plant.dt)):
+        plant.advance(np.full((2, plant.motors), stroke if side > 0 else 0.0))
+        speeds.append(side * plant.velocity[1, 0])
+    assert max(speeds) == pytest.approx(highest, rel=0.03)
+    assert side * plant.velocity[0, 0] < highest or plant.position[0, 0] == pytest.approx(stroke if side > 0 else 0)
+
+
+def test_back_emf_at_any_size_is_stable():
+    values = [[stall, speed] for stall in (0.005, 0.5, 50.0) for speed in (0.001, 10.0)]
+    trace = rollout(6, [(get_effect("back_emf"), values, "", range(6))])
+    slow = np.diff(trace.true_position[:, 4, 0])
+    assert np.abs(slow).max() < 0.04 * 0.001 * 1.1  # m in a period
+    assert trace.distance(trace) == 0
+
+
+def test_position_deadband_gives_no_force_within_it():
+    near, far = np.full(5, 0.0104), np.full(5, 0.0106)
+    assert np.array_equal(send(make("position_deadband", 5e-4), near, position=0.01), np.full(5, 0.01))
+    assert np.array_equal(send(make("position_deadband", 5e-4), far, position=0.01), far)
+
+
+def test_position_deadband_stops_short_and_lets_itself_be_pushed():
+    band, command = 8e-4, 0.032
+    for before, side in ((command + 0.008, 1), (command - 0.004, -1)):
+        plant = settle("position_deadband", (band,), before, command)
+        short = side * (plant.position[0] - command)
+        assert np.all((short > 0.3 * band) & (short <= band))
+    pushes = [
+        (get_effect("position_deadband"), [band], "", [0]),
+        (get_effect("motor_offset"), [-0.01, -0.01], "", [0]),
+    ]
+    plant = make_plant(1, pushes, "reference")
+    start(plant, [0], np.zeros(1))
+    for at in (command + 0.004, command):
+        plant.advance(np.full((1, 2), at), 3000)
+    assert plant.position[0] == pytest.approx(
+        [command - band] * 2, rel=1e-3
+    )  # 10 mN, of 80 mN that friction would take
+
+
+@pytest.mark.parametrize(("share", "frequency"), [(0.3, 8.0), (1.0, 4.0)])
+def test_elastic_transmission_is_two_masses(share, frequency):
+    """A step of a servo, against the two equations of motion integrated by another program."""
+    plant = Plant(load_gripper("so101_jaw"), 1, threads=1, step_factor=0.25)
+    kind = get_effect("elastic_transmission")
+    plant.attach([(kind(np.array([[share, frequency]]), plant.dt), np.array([0]))])
+    plant.reset(np.arange(1), np.zeros(1))
+    inertia, gain, damping, goal = plant.model.dof_M0[0], 17.8, 0.6, 0.3
+    omega = 2 * np.pi * frequency
+
+    def motion(_: float, state: np.ndarray) -> list[float]:
+        q, v, x, w = state
+        pull = share * inertia * (omega**2 * (x - q) + 0.2 * omega * (w - v))
+        return [v, (gain * (goal - q) - damping * v + pull) / inertia, w, -pull / (share * inertia)]
+
+    times = plant.dt * np.arange(1, 2001)
+    expected = solve_ivp(motion, (0, times[-1]), [0, 0, 0, 0], t_eval=times, rtol=1e-8, atol=1e-10).y[0]
+    seen = []
+    for _ in times:
+        plant.advance(np.full((1, 1), goal))
+        seen.append(plant.position[0, 0])
+    assert np.abs(np.array(seen) - expected).max() < 0.02 * goal
+    assert np.abs(expected - goal).max() > 0.15 * goal
+
+
+@pytest.mark.parametrize("frequency", [0.5, 100.0])
+@pytest.mark.parametrize("share", [0.1, 4.0])
+def test_elastic_transmission_is_stable(share, frequency):
+    plant = Plant(load_gripper("so101_jaw"), 1, threads=1)
+    plant.attach([(get_effect("elastic_transmission")(np.array([[share, frequency]]), plant.dt), np.array([0]))])
+    plant.reset(np.arange(1), np.zeros(1))
+    for command in np.repeat([0.5, -0.5, 0.0], 100):
+        plant.advance(np.full((1, 1), command))
+        assert np.abs(plant.position).max() < 2
+    plant.advance(np.zeros((1, 1)), 2000)
+    assert np.abs(plant.position).max() < 0.02
+
+
+def test_commands_that_are_efforts_rest_at_none():
+    """What slows a command starts from no effort where efforts are commanded, wherever the joint stands."""
+    mechanism = load_gripper("dfki_pendulum")
+    plant = Plant(mechanism, 3, threads=1)
+    uses = [
+        (effect_of(name, mechanism), np.array([row])) for row, name in enumerate(("command_delay", "actuator_lag"), 1)
+    ]
+    plant.attach([(kind(np.array([[0.5]]), plant.dt), row) for kind, row in uses])
+    plant.reset(np.arange(3), np.zeros(3), np.full((3, 1), 2.0))
+    plant.advance(np.zeros((3, 1)), 100)
+    assert (plant.position == plant.position[0]).all()
