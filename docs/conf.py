@@ -32,11 +32,19 @@ nitpicky = True
 CONTENTS = ("index", "README")
 #: A heading of the reference that is a module; what the module's docstrings say goes below it.
 MODULE = re.compile(r"^## `(forcegrasp\.[\w.]+)`\n", re.MULTILINE)
+COLON = re.compile(r"(?<!:):(?=\s|$)")
 LINK = re.compile(r"\]\(([^)#:]+\.md)\)")
 
 
 def setup(app) -> None:
     app.connect("source-read", read)
+    app.connect("autodoc-process-docstring", without_type, priority=400)  # before Napoleon's 500
+
+
+def without_type(_app, what: str, _name: str, _object, _options, lines: list[str]) -> None:
+    """Puts a dash for the colon of an attribute's first line, before which Napoleon takes all for its type."""
+    if what in ("attribute", "data", "property") and lines:
+        lines[0] = COLON.sub(" –", lines[0])
 
 
 def read(_app, name: str, source: list[str]) -> None:
