@@ -50,7 +50,7 @@ def _fit(problem: Problem, target, residual: np.ndarray) -> Fit:
     jacobian = np.random.default_rng(1).standard_normal((*residual.shape, len(problem)))
     jacobian[~target.mask] = 0
     predicted = target.signals - residual * target.sigma
-    return Fit(problem, problem.start(), predicted, residual, jacobian, 0 * predicted, 0.1, 3)
+    return Fit(problem, problem.start(), predicted, residual, jacobian, 0 * predicted, 0.1, 3, target.weight)
 
 
 @pytest.fixture(scope="session")

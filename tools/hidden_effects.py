@@ -15,6 +15,7 @@ import shutil
 import sys
 import tempfile
 import time
+from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -31,13 +32,27 @@ PAIRS = (
     ("rate_limit", "force_saturation"),
     ("finger_compliance", "encoder_bias"),
 )
+#: Hidden in logs of a slide without fingers, alone and in pairs.
+OF_SERVOS = (
+    "coulomb_friction", "stiction", "load_friction", "presliding", "direction_friction", "position_deadband",
+    "back_emf", "motor_offset", "swinging_load", "readout_skew", "command_delay", "rate_limit", "actuator_lag",
+)  # fmt: skip
+PAIRS_OF_SERVOS = (
+    ("coulomb_friction", "motor_offset"),
+    ("load_friction", "readout_skew"),
+    ("stiction", "command_delay"),
+    ("position_deadband", "back_emf"),
+    ("presliding", "motor_offset"),
+    ("direction_friction", "rate_limit"),
+    ("swinging_load", "coulomb_friction"),
+)
 
 
 @dataclass(frozen=True)
 class Job:
     """One set to record and diagnose."""
 
-    group: str  #: "none", "one", "other reading", "two" or "outside"
+    group: str  #: "none", "one", "other reading", "two" or "outside"; "servo none", "servo one", "servo two"
     hidden: tuple[str, ...]  #: names in the recorder
     size: str
     seed: int
@@ -48,7 +63,12 @@ class Job:
     def name(self) -> str:
         """What the result is filed under."""
         parts = ["+".join(self.hidden) or "none", self.size, f"s{self.seed}", self.contact, f"n{self.grasps}"]
-        return "_".join(p for p in parts if p)
+        return "_".join(["servo", *filter(None, parts[:3])] if self.is_servo else filter(None, parts))
+
+    @property
+    def is_servo(self) -> bool:
+        """Whether it is logs of a servo, and not grasps."""
+        return self.group.startswith("servo")
 
 
 def jobs() -> list[Job]:
@@ -63,14 +83,23 @@ def jobs() -> list[Job]:
     found += [Job("other reading", (name,), "medium", 2) for name in VARIANTS]
     found += [Job("none", (), "", 1, contact) for contact in ("mujoco_multiccd", "penalty", "hertz")]
     found += [Job("one", (name,), "medium", 4, grasps=10) for name in CATALOGUE]
-    return found
+    return found + list(_servo_jobs())
+
+
+def _servo_jobs() -> Iterator[Job]:
+    """Sets of a servo: effects alone in three sizes, pairs of them three times, and 30 with nothing hidden."""
+    for seed, size in enumerate(("medium", "large", "small"), 1):
+        yield from (Job("servo none", (), "", 10 * seed + k, "", 0) for k in range(10))
+        yield from (Job("servo one", (name,), size, seed, "", 0) for name in OF_SERVOS)
+        yield from (Job("servo two", pair, "medium", seed, "", 0) for pair in PAIRS_OF_SERVOS)
 
 
 def right_names(job: Job) -> set[str]:
     """What a right diagnosis names."""
     from tests.independent.catalogue import VARIANT_OF
+    from tests.independent.slide import CALLED
 
-    return set() if job.group == "outside" else {VARIANT_OF.get(name, name) for name in job.hidden}
+    return set() if job.group == "outside" else {(VARIANT_OF | CALLED).get(name, name) for name in job.hidden}
 
 
 def run_job(job: Job) -> dict:
@@ -80,12 +109,16 @@ def run_job(job: Job) -> dict:
     from forcegrasp.identify.fitted_model import model_of
     from forcegrasp.identify.loading import load
     from forcegrasp.replay import replay
-    from tests.independent.rig import record
+    from tests.independent import rig, slide
 
     replay.THREADS = 1
     folder = Path(tempfile.mkdtemp())
     try:
-        truth = record(folder / "set", dict.fromkeys(job.hidden, job.size), job.seed, job.grasps, contact=job.contact)
+        chosen = dict.fromkeys(job.hidden, job.size)
+        if job.is_servo:
+            truth = slide.record(folder / "set", chosen, job.seed)
+        else:
+            truth = rig.record(folder / "set", chosen, job.seed, job.grasps, contact=job.contact)
         started, busy = time.perf_counter(), time.process_time()
         loaded = refuse_table(load(folder / "set"), "fit")
         diagnosis, _ = diagnose_set(loaded, None, [], 0, lambda text: None)
@@ -107,7 +140,7 @@ def run_job(job: Job) -> dict:
         "reason": diagnosis.base.reason,
         "seconds": seconds,
         "processor_s": processor,
-        "intervals": _intervals(model, truth),
+        "intervals": [] if job.is_servo else _intervals(model, truth),
     }
 
 

@@ -41,7 +41,7 @@ def falls_back(fit: Fit, nested: Nested) -> bool:
     last = len(fit.problem.effects) - 1
     effect = fit.problem.effects[last].effect
     first = fit.problem.first_entry(last)
-    errors = np.sqrt(np.diag(fit.covariance())) * max(1.0, float(np.sqrt(np.mean(fit.residual**2))))
+    errors = np.sqrt(np.diag(fit.covariance())) * max(1.0, float(np.sqrt(np.mean((fit.weight * fit.residual) ** 2))))
     for name, value in nested.at.items():
         index = first + effect.index(name)
         entry = fit.problem.entries[index]
@@ -91,7 +91,8 @@ def _refit(settings: Sequence[EffectSetting], fit: Fit, without: str, study: Stu
     starts = [np.r_[base, problem.start()[len(base) :]] for problem in problems]
     if len(starts) > 1:
         cases = [problem.case(start) for problem, start in zip(problems, starts, strict=True)]
-        errors = [float(np.sum(study.target.residual(one) ** 2)) for one in predict(study.simulators.cheap, cases)]
+        left = map(study.target.residual, predict(study.simulators.cheap, cases))
+        errors = [float(np.sum((fit.weight * one) ** 2)) for one in left]
         best = int(np.argmin(errors))
         problems, starts = problems[best : best + 1], starts[best : best + 1]
     return fit_exactly(study.target, problems[0], study.simulators, starts[0])

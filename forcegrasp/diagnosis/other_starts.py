@@ -41,7 +41,7 @@ def other_starts(fit: Fit, study: Study) -> list[np.ndarray]:
         return []
     signals = predict(study.simulators.exact, [problem.case(start) for start in starts])
     others = Background(fit, (), without=index)
-    left = np.stack([study.target.residual(one).ravel() for one in signals], axis=1)
+    left = np.stack([(fit.weight * study.target.residual(one)).ravel() for one in signals], axis=1)
     costs = np.sum(others.remove(left) ** 2, axis=0)
     double = fit.vector.copy()
     double[index] = entry.coordinate(2 * size)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
@@ -22,6 +23,7 @@ from forcegrasp.identify.noise_floor import beyond_fit, excess, numerical_error,
 from forcegrasp.identify.progress import Progress, silent
 from forcegrasp.identify.target import Target
 from forcegrasp.identify.verdict import Verdict
+from forcegrasp.identify.weights import reweigh
 
 #: Largest number of effects that are looked for.
 MOST_EFFECTS = 6
@@ -71,8 +73,9 @@ def diagnose(
         steps.append(step)
         if not step.effects:
             break
-        fit = step.candidates[0].fit
         progress(f"found {step.effects[0]}: held-out error {step.error_before:.2f} → {step.error_after:.2f} × noise")
+        target, fit = reweigh(target, step.candidates[0].fit, simulators)
+        study = dataclasses.replace(study, target=target)
         if not _left(study, fit)[0]:
             break
     error_after, (left, noise) = rms(study.heldout(fit), target), _left(study, fit)

@@ -40,9 +40,8 @@ class Background:
     """
 
     def __init__(self, fit: Fit, numerical: Sequence[np.ndarray], without: int | None = None) -> None:
-        slopes = fit.jacobian.reshape(-1, len(fit.problem))
-        slopes = slopes if without is None else np.delete(slopes, without, axis=1)
-        columns = [slopes, *(n.reshape(-1, 1) for n in numerical)]
+        slopes = fit.slopes if without is None else np.delete(fit.slopes, without, axis=1)
+        columns = [slopes, *((fit.weight * n).reshape(-1, 1) for n in numerical)]
         matrix = np.concatenate(columns, axis=1)
         norms = np.linalg.norm(matrix, axis=0)
         left, singular, _ = np.linalg.svd(matrix[:, norms > 0] / norms[norms > 0], full_matrices=False)
@@ -86,10 +85,10 @@ class Signatures:
         Returns:
           For each effect and variant all its trials' scores, best first; effects that leave no trace are missing.
         """
-        residual, tried = fit.residual.ravel(), self._trials(effects)
+        residual, tried = (fit.weight * fit.residual).ravel(), self._trials(effects)
         if not tried:
             return []
-        change = np.stack([self._changes[trial] for trial in tried], axis=1)
+        change = _weighted(np.stack([self._changes[trial] for trial in tried], axis=1), fit)
         clean = background.remove(change)
         found: dict[tuple[type[Effect], str], list[Score]] = {}
         for kind, columns in _kinds(tried).items():
@@ -113,8 +112,8 @@ def best_sizes(scores: Sequence[Score], study: Study, fit: Fit, background: Back
     tried = [setting for sizes in options for setting in sizes]
     if not tried:
         return list(scores)
-    residual = fit.residual.reshape(-1, 1)
-    left = np.sum(background.remove(residual - _changes(tried, study, fit)) ** 2, axis=0)
+    residual = (fit.weight * fit.residual).reshape(-1, 1)
+    left = np.sum(background.remove(residual - _weighted(_changes(tried, study, fit), fit)) ** 2, axis=0)
     gains, found, low = np.sum(background.remove(residual) ** 2) - left, [], 0
     for score, sizes in zip(scores, options, strict=True):
         if sizes:
@@ -141,6 +140,11 @@ def _changes(tried: Sequence[EffectSetting], study: Study, fit: Fit) -> np.ndarr
     signals = predict(study.simulators.cheap, cases)
     target = study.target
     return np.where(target.mask[..., None], (signals[1:] - signals[0]) / target.sigma, 0.0).reshape(len(tried), -1).T
+
+
+def _weighted(changes: np.ndarray, fit: Fit) -> np.ndarray:
+    """Changes of the signals, ``(N, tried)``, as they count in a fit."""
+    return changes * np.broadcast_to(fit.weight, fit.residual.shape).reshape(-1, 1)
 
 
 def null_gains(scores: list[list[Score]], rng: np.random.Generator, draws: int = 400) -> np.ndarray:

@@ -105,7 +105,7 @@ class _Start:
         """What a signature must gain for its effect to be worth a fit."""
         if not groups:
             return np.inf
-        beyond = float(np.sum(self._fit.residual**2) - self._study.target.readings)
+        beyond = self._fit.cost - self._study.target.cost_of_noise
         best = max(group[0].gain for group in groups)
         return max(float(np.quantile(null, 1 - ALARM)), _MIN_GAIN_RATIO * best, _MAX_GAIN_FACTOR * LEAST_SHARE * beyond)
 
@@ -124,7 +124,7 @@ class _Start:
             self._study.progress(f"refitting with {effect.name} in place of {name}")
             refit = families.refit_as_richer(effect, self._fit, name, self._study)
             if not any(families.falls_back(refit, nested) for nested in effect.contains):
-                change = ((refit.predicted - self._fit.predicted) / self._study.target.sigma).ravel()
+                change = (refit.weight * (self._fit.residual - refit.residual)).ravel()
                 p_family = (1 + int(np.sum(null >= self._fit.cost - refit.cost))) / (1 + len(null))
                 candidates.append(self._judge(refit, p_family, change / max(np.linalg.norm(change), 1e-9), name))
         return candidates
@@ -189,7 +189,7 @@ class _Start:
     def _judge(self, refit: Fit, p_family: float, signature: np.ndarray, replaces: str = "") -> Candidate:
         """What held-out grasps say of a fit with one more effect, its last one."""
         target, held, after = self._study.target, self.held, self._study.heldout(refit)
-        gains = log_likelihood(after) - log_likelihood(held)
+        gains = log_likelihood(target.weight * after) - log_likelihood(target.weight * held)
         fall = max((1 - rms(after, target, w) / rms(held, target, w) for _, w in cells(target)), default=0.0)
         error = rms(after, target)
         share = explained_share(self.error, error)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from forcegrasp.identify.cross_validation import rms
 from forcegrasp.identify.fit import Fit, Simulators, fit_exactly, fit_once
 from forcegrasp.identify.initial_guess import guess
 from forcegrasp.identify.problem import Problem
@@ -78,21 +79,21 @@ def _cost_tolerance(best: Fit, target: Target) -> float:
 def _ends_agree(ends: Sequence[Fit], target: Target) -> bool:
     """Whether two fits at least ended in the best place."""
     best = min(ends, key=lambda f: f.cost)
-    tolerance = max(_cost_tolerance(best, target), _SAME_BEYOND * (best.cost - target.readings))
+    tolerance = max(_cost_tolerance(best, target), _SAME_BEYOND * (best.cost - target.cost_of_noise))
     return sum(f.cost - best.cost <= tolerance for f in ends) >= 2
 
 
 def check_gradient(fit: Fit, target: Target, errors: tuple[float, ...] = ()) -> BaseFit:
     """Whether one fit converged: projected gradient of at most 5 standard errors."""
-    if fit.gradient > _MAX_GRADIENT * max(1.0, rms_error(fit, target)):
+    if fit.gradient > _MAX_GRADIENT * max(1.0, float(np.sqrt(fit.cost / target.readings))):
         reason = f"the error still falls where the fit ended (slope of {fit.gradient:.1f} standard errors)"
         return BaseFit(fit, errors, False, reason)
     return BaseFit(fit, errors, True)
 
 
 def rms_error(fit: Fit, target: Target) -> float:
-    """Root mean square of a fit's residuals ÷ noise."""
-    return float(np.sqrt(fit.cost / target.readings))
+    """Root mean square of a fit's residuals ÷ noise; of several recordings as :func:`rms` has it."""
+    return rms(fit.residual, target)
 
 
 def _random_start(problem: Problem, contact_estimate: np.ndarray, rng: np.random.Generator) -> np.ndarray:

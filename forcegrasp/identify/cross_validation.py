@@ -55,11 +55,12 @@ def heldout_residual(fit: Fit, target: Target, folds: Sequence[np.ndarray]) -> n
     """
     p = len(fit.problem)
     jacobian, residual = fit.jacobian, fit.residual
-    inner = np.einsum("gskp,gskq->gpq", jacobian, jacobian, optimize=True)
-    slope = np.einsum("gskp,gsk->gp", jacobian, residual, optimize=True)
+    weighted, off = fit.weight[..., None] * jacobian, fit.weight * residual
+    inner = np.einsum("gskp,gskq->gpq", weighted, weighted, optimize=True)
+    slope = np.einsum("gskp,gsk->gp", weighted, off, optimize=True)
     held = np.full(residual.shape, np.nan)
     doubtful: list[tuple[np.ndarray, np.ndarray]] = []
-    far = fit.cost > _FAR**2 * target.readings
+    far = np.sum(residual**2) > _FAR**2 * target.readings
     counts = (_COUNTS if target.gripper.is_servo else np.inf) if far else _COUNTS_NEAR
     for fold in folds:
         rest = np.setdiff1d(np.arange(len(target.grasps)), fold)
@@ -78,14 +79,14 @@ def heldout_residual(fit: Fit, target: Target, folds: Sequence[np.ndarray]) -> n
 def _simulate(fit: Fit, target: Target, doubtful: list[tuple[np.ndarray, np.ndarray]], held: np.ndarray) -> None:
     """Replaces residuals of folds by simulated ones, of the longest step that lowers the error of the others."""
     problem, replay = fit.problem, Replay(fit.problem.gripper, fit.problem.grasps)
-    everything = np.sum(fit.residual**2)
+    squares = np.sum((fit.weight * fit.residual) ** 2, axis=(1, 2))
     for scale in _SHARES:
         vectors = [np.clip(fit.vector + scale * step, problem.low, problem.high) for _, step in doubtful]
         residuals = target.residual(predict(replay, [problem.case(vector) for vector in vectors]))
         left = []
         for (fold, step), residual in zip(doubtful, residuals, strict=True):
-            others = np.sum(residual**2) - np.sum(residual[fold] ** 2)
-            if others <= everything - np.sum(fit.residual[fold] ** 2):
+            others = np.delete(np.sum((fit.weight * residual) ** 2, axis=(1, 2)), fold)
+            if others.sum() <= np.delete(squares, fold).sum():
                 held[fold] = residual[fold]
             else:
                 left.append((fold, step))
@@ -109,6 +110,8 @@ def log_likelihood(residual: np.ndarray) -> np.ndarray:
 def rms(residual: np.ndarray, target: Target, where: np.ndarray | None = None) -> float:
     """Root mean square of the residuals of existing samples; NaN if there are none.
 
+    Of several recordings of a servo it is the geometric mean of theirs: the fastest motion must not stand for all.
+
     Args:
       residual: in units of the noise, ``(G, S, C)``; grasps of no fold are NaN and left out.
       where: further choice of samples and signals, broadcast to ``(G, S, C)``.
@@ -116,4 +119,10 @@ def rms(residual: np.ndarray, target: Target, where: np.ndarray | None = None) -
     chosen = np.broadcast_to(target.mask[:, :, None] & np.isfinite(residual), residual.shape)
     if where is not None:
         chosen = chosen & where
-    return float(np.sqrt(np.mean(residual[chosen] ** 2))) if chosen.any() else float("nan")
+    groups = target.recordings.values() if len(target.recordings) > 1 else [slice(None)]
+    inside = [residual[group][chosen[group]] for group in groups]
+    squares = [(len(one), np.mean(one**2)) for one in inside if len(one)]
+    if not squares:
+        return float("nan")
+    counts, means = np.array(squares).T
+    return float(np.exp(0.5 * np.average(np.log(np.maximum(means, 1e-12)), weights=counts)))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 
 import numpy as np
@@ -50,24 +51,29 @@ class Fit(ShortRepr):
     correction: np.ndarray  #: exact minus cheap prediction, ``(G, S, C)``
     gradient: float  #: largest |slope| of the cost along one coordinate, in its own standard error; 0 at an optimum
     evaluations: int
+    weight: np.ndarray  #: by which residuals count, ``(G, 1, 1)``
 
     def summary(self) -> str:
         return f"{counted(len(self.vector), 'parameter')}, sum of squared residuals {self.cost:.4g}"
 
     @property
     def cost(self) -> float:
-        """Sum of squared residuals, in units of the noise."""
-        return float(np.sum(self.residual**2))
+        """Weighted sum of squared residuals, in units of the noise."""
+        return float(np.sum((self.weight * self.residual) ** 2))
 
     @property
     def values(self) -> np.ndarray:
         """Parameters in their own units, ``(p,)``."""
         return self.problem.values(self.vector)
 
+    @property
+    def slopes(self) -> np.ndarray:
+        """The weighted Jacobian, ``(N, p)``."""
+        return (self.weight[..., None] * self.jacobian).reshape(-1, len(self.problem))
+
     def covariance(self) -> np.ndarray:
         """Covariance of the coordinates, ``(p, p)``, if the noise is white; see :mod:`.intervals`."""
-        flat = self.jacobian.reshape(-1, len(self.problem))
-        return np.linalg.pinv(flat.T @ flat, rcond=1e-12)
+        return np.linalg.pinv(self.slopes.T @ self.slopes, rcond=1e-12)
 
 
 def fit_once(
@@ -137,12 +143,12 @@ def _descend(
         vector[free] = part
         return vector
 
-    problem = local.problem
+    problem, weight = local.problem, local.target.weight
     solution = least_squares(
-        lambda part: -local.target.residual(local.value(whole(part)) + shift).ravel(),
+        lambda part: -(weight * local.target.residual(local.value(whole(part)) + shift)).ravel(),
         start[free],
         # scipy is not annotated: its type is guessed from its default, a string
-        jac=lambda part: local.slopes(whole(part)).reshape(-1, len(problem))[:, free],  # pyright: ignore[reportArgumentType]
+        jac=lambda part: (weight[..., None] * local.slopes(whole(part))).reshape(-1, len(problem))[:, free],  # pyright: ignore[reportArgumentType]
         bounds=(problem.low[free], problem.high[free]),
         x_scale="jac",
         ftol=tolerance,
@@ -154,15 +160,15 @@ def _descend(
 
 
 def _finish(local: _Local, vector: np.ndarray, predicted: np.ndarray, correction, free: np.ndarray, total: int) -> Fit:
-    problem = local.problem
-    jacobian = local.slopes(vector, anew=True)
-    residual = local.target.residual(predicted)
-    flat = jacobian.reshape(-1, len(problem))
-    slope = flat.T @ residual.ravel() / np.maximum(np.linalg.norm(flat, axis=0), 1e-12)
+    problem, weight = local.problem, local.target.weight
+    residual, jacobian = local.target.residual(predicted), local.slopes(vector, anew=True)
+    correction = np.broadcast_to(correction, predicted.shape)
+    fit = Fit(problem, vector, predicted, residual, jacobian, correction, 0.0, total, weight)
+    flat = fit.slopes
+    slope = flat.T @ (weight * residual).ravel() / np.maximum(np.linalg.norm(flat, axis=0), 1e-12)
     blocked = ~free | ((vector <= problem.low + 1e-6) & (slope < 0)) | ((vector >= problem.high - 1e-6) & (slope > 0))
     steepest = float(np.abs(slope[~blocked]).max(initial=0))
-    correction = np.broadcast_to(correction, predicted.shape)
-    return Fit(problem, vector, predicted, residual, jacobian, correction, steepest, total)
+    return dataclasses.replace(fit, gradient=steepest)
 
 
 def _difference(problem: Problem, simulators: Simulators, vector: np.ndarray) -> np.ndarray:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 
 from forcegrasp.errors import ConfigError
@@ -11,6 +13,7 @@ from forcegrasp.identify.loading import Loaded
 from forcegrasp.identify.problem import Problem
 from forcegrasp.identify.progress import Progress
 from forcegrasp.identify.target import Target, make_target
+from forcegrasp.identify.weights import reweigh
 from forcegrasp.measure import MeasurementSet
 from forcegrasp.models.model_file import Model
 from forcegrasp.physics.sensors import is_rounding
@@ -21,7 +24,8 @@ def fit_model(loaded: Loaded[MeasurementSet], seed: int, progress: Progress) -> 
     target = make_target(loaded.measured, loaded.gripper)
     problem = Problem(loaded.gripper, target.grasps)
     simulators = Simulators(problem)
-    return target, simulators, fit_base(target, problem, simulators, np.random.default_rng(seed), progress)
+    base = fit_base(target, problem, simulators, np.random.default_rng(seed), progress)
+    return _weighed(target, simulators, base)
 
 
 def apply_model(
@@ -44,7 +48,15 @@ def apply_model(
         names = ", ".join(e.name for e, u in zip(problem.entries, unknown, strict=True) if u)
         progress(f"the model does not say {names}: fitted")
     free = np.ones(len(problem), bool) if refit else unknown
-    return target, simulators, check_gradient(fit_once(target, problem, simulators, vector, free=free), target)
+    base = check_gradient(fit_once(target, problem, simulators, vector, free=free), target)
+    return _weighed(target, simulators, base) if refit else (target, simulators, base)
+
+
+def _weighed(target: Target, simulators: Simulators, base: BaseFit) -> tuple[Target, Simulators, BaseFit]:
+    weighed, fit = reweigh(target, base.fit, simulators)
+    if fit is not base.fit and base.converged:
+        base = check_gradient(fit, weighed, base.errors)
+    return weighed, simulators, dataclasses.replace(base, fit=fit)
 
 
 def _coordinates(problem: Problem, model: Model) -> tuple[np.ndarray, np.ndarray]:

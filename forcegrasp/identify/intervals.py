@@ -28,12 +28,11 @@ def standard_errors(fit: Fit, numerical: Sequence[np.ndarray] = ()) -> np.ndarra
       numerical: from :func:`~forcegrasp.identify.noise_floor.numerical_error`, each ``(G, S, C)``.
     """
     inverse = fit.covariance()
-    slopes = np.einsum("gskp,gsk->gp", fit.jacobian, fit.residual, optimize=True)
+    slopes = np.einsum("gskp,gsk->gp", fit.jacobian, fit.weight**2 * fit.residual, optimize=True)
     count, p = slopes.shape
     freedom = count / max(1, count - min(p, count - 1))
     by_grasp = inverse @ (slopes.T @ slopes * min(freedom, 4.0)) @ inverse
-    flat = fit.jacobian.reshape(-1, p)
-    shifts = [inverse @ (flat.T @ n.ravel()) for n in numerical]
+    shifts = [inverse @ (fit.slopes.T @ (fit.weight * n).ravel()) for n in numerical]
     variance = np.maximum(np.diag(inverse), np.diag(by_grasp)) + sum((s**2 for s in shifts), np.zeros(p))
     return np.sqrt(np.maximum(variance, 0.0))
 

@@ -34,11 +34,10 @@ def numerical_error(fit: Fit, target: Target) -> tuple[np.ndarray, ...]:
 
 def beyond_fit(fit: Fit, numerical: Sequence[np.ndarray]) -> tuple[np.ndarray, ...]:
     """What of the numerical errors no fitted parameter makes up for, each ``(G, S, C)``."""
-    slopes = fit.jacobian.reshape(-1, len(fit.problem))
     left = []
     for one in numerical:
-        shift = np.linalg.lstsq(slopes, one.ravel(), rcond=None)[0]
-        left.append(one - (slopes @ shift).reshape(one.shape))
+        shift = np.linalg.lstsq(fit.slopes, (fit.weight * one).ravel(), rcond=None)[0]
+        left.append(one - fit.jacobian @ shift)
     return tuple(left)
 
 

@@ -41,6 +41,7 @@ class Target(ShortRepr):
     sigma_known: bool  #: whether the noise was given with the set; estimated from it otherwise
     phase: np.ndarray  #: index into :attr:`phases`, ``(G, S)``; −1 where there is no sample
     gripper: Gripper  #: whose channels they are
+    weight: np.ndarray  #: by which each grasp's residuals count in a fit, ``(G, 1, 1)``; see :mod:`.weights`
 
     @property
     def axis(self) -> SignalAxis:
@@ -90,11 +91,17 @@ class Target(ShortRepr):
         picked = tuple(self.grasps[i] for i in keep)
         longest = max(len(grasp.time_s) for grasp in picked)
         signals, mask, phase = (a[keep][:, :longest] for a in (self.signals, self.mask, self.phase))
-        return dataclasses.replace(self, grasps=picked, signals=signals, mask=mask, phase=phase)
+        weight = self.weight[keep]
+        return dataclasses.replace(self, grasps=picked, signals=signals, mask=mask, phase=phase, weight=weight)
 
     def residual(self, predicted: np.ndarray) -> np.ndarray:
         """(measured − predicted) ÷ noise, ``(..., G, S, C)``; 0 where there is no sample."""
         return np.where(self.mask[:, :, None], (self.signals - predicted) / self.sigma, 0.0)
+
+    @property
+    def cost_of_noise(self) -> float:
+        """The weighted sum of squares that noise alone leaves."""
+        return float(np.sum(self.mask[..., None] * self.weight**2)) * self.signals.shape[-1]
 
 
 def make_target(measured: MeasurementSet, gripper: Gripper) -> Target:
@@ -121,4 +128,5 @@ def make_target(measured: MeasurementSet, gripper: Gripper) -> Target:
     for index, grasp in enumerate(grasps):
         phase[index, : len(grasp.time_s)] = find_phases(grasp, sigma, gripper)
     phase[~mask] = -1
-    return Target(grasps, signals, mask, sigma, sensor, quantum, None not in given, phase, gripper)
+    weight = np.ones((len(grasps), 1, 1))
+    return Target(grasps, signals, mask, sigma, sensor, quantum, None not in given, phase, gripper, weight)

@@ -38,7 +38,7 @@ def make(count: int = G, lengths: tuple[int, ...] | None = None) -> Target:
     mask = np.arange(S) < np.array(lengths or [S] * count)[:, None]
     phase = np.where(mask, np.arange(S) * len(PHASES) // S, -1)
     grasps = tuple(grasp(i) for i in range(count))
-    return Target(grasps, np.zeros((count, S, 4)), mask, ONES, ONES, 0 * ONES, True, phase, TIAGO)
+    return Target(grasps, np.zeros((count, S, 4)), mask, ONES, ONES, 0 * ONES, True, phase, TIAGO, np.ones((count, 1, 1)))
 
 
 class _Counted(SimpleNamespace):
@@ -55,7 +55,7 @@ def linear_fit(target: Target, jacobian: np.ndarray, measured: np.ndarray) -> Fi
     ]
     predicted = jacobian @ theta
     residual = np.where(target.mask[..., None], measured - predicted, 0)
-    return Fit(_Counted(count=p), theta, predicted, residual, jacobian, 0 * predicted, 0.0, 1)
+    return Fit(_Counted(count=p), theta, predicted, residual, jacobian, 0 * predicted, 0.0, 1, target.weight)
 
 
 def refit_without(fold: np.ndarray, jacobian: np.ndarray, measured: np.ndarray) -> np.ndarray:
@@ -207,7 +207,7 @@ def fit_at(jacobian: np.ndarray, residual: np.ndarray, *effects: str, **values: 
     grasps = [grasp(i, thing="cup") for i in range(len(residual))]
     problem = Problem(TIAGO, grasps, [EffectSetting.typical(get_effect(name)) for name in effects])
     vector = np.array([e.coordinate(values.get(e.parameter, e.start)) for e in problem.entries])
-    return Fit(problem, vector, 0 * residual, residual, jacobian, 0 * residual, 0.0, 1)
+    return Fit(problem, vector, 0 * residual, residual, jacobian, 0 * residual, 0.0, 1, np.ones((len(residual), 1, 1)))
 
 
 def random_slopes(p: int, size: float = 50.0) -> np.ndarray:
@@ -314,7 +314,7 @@ def test_eleven_pairs_are_one_warning():
         first, second = names.index(one), names.index(other)
         slopes[..., second] = slopes[..., first] + 0.05 * slopes[..., second]
     residual = np.zeros((11, S, 4))
-    fit = Fit(problem, problem.start(), residual, residual, slopes, residual, 0.0, 1)
+    fit = Fit(problem, problem.start(), residual, residual, slopes, residual, 0.0, 1, np.ones((11, 1, 1)))
     (line,) = warnings(fit, np.full(len(names), 0.01))
     assert line.startswith("position_gain and velocity_gain are confounded (correlation -0.99")
     assert "; rho_m and force_scale are confounded in 11 objects or grasps (correlation up to -0.99" in line

@@ -1,0 +1,62 @@
+"""Recordings of a servo count alike, however much of them a model misses."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from forcegrasp.identify.base_fit import rms_error
+from forcegrasp.identify.cross_validation import rms
+from forcegrasp.identify.fit import Simulators, fit_exactly
+from forcegrasp.identify.loading import load
+from forcegrasp.identify.problem import Problem
+from forcegrasp.identify.target import make_target
+from forcegrasp.identify.weights import reweigh
+from tests.independent.slide import record
+
+
+@pytest.fixture(scope="module")
+def missed(tmp_path_factory: pytest.TempPathFactory) -> SimpleNamespace:
+    """Two recordings of a slide whose drive is too slow for the commands of the first; the model doesn't know."""
+    folder = tmp_path_factory.mktemp("weights") / "set"
+    record(folder, {"rate_limit": {"speed": 0.01}}, 3, recordings=2, samples=500)
+    loaded = load(folder)
+    target = make_target(loaded.measured, loaded.gripper)
+    problem = Problem(loaded.gripper, target.grasps)
+    simulators = Simulators(problem)
+    fit = fit_exactly(target, problem, simulators, problem.start())
+    return SimpleNamespace(target=target, simulators=simulators, fit=fit)
+
+
+def errors(fit, target) -> np.ndarray:
+    return np.array([np.sqrt(np.mean(fit.residual[i][target.mask[i]] ** 2)) for i in target.recordings.values()])
+
+
+def test_each_recording_counts_by_what_is_left_of_it(missed):
+    before = errors(missed.fit, missed.target)
+    target, fit = reweigh(missed.target, missed.fit, missed.simulators)
+    after = errors(fit, target)
+    easier = int(np.argmin(before))
+    assert before.max() > 2 * before.min() > 2
+    weights = np.array([target.weight[i[0], 0, 0] for i in target.recordings.values()])
+    assert weights * after == pytest.approx(1.0, rel=0.25)
+    assert after[easier] < before[easier]  # which the other one had decided
+    assert fit.cost == pytest.approx(target.readings, rel=0.3)
+    assert fit.gradient < 5
+
+
+def test_one_recording_is_left_as_it_is(missed):
+    members = next(iter(missed.target.recordings.values()))
+    alone = missed.target.subset(members)
+    fit = SimpleNamespace(residual=missed.fit.residual[members])
+    assert reweigh(alone, fit, missed.simulators) == (alone, fit)
+
+
+def test_an_error_is_that_of_a_typical_recording(missed):
+    one, other = errors(missed.fit, missed.target)
+    counts = [missed.target.mask[i].sum() for i in missed.target.recordings.values()]
+    expected = np.exp(np.average(np.log([one, other]), weights=counts))
+    assert rms(missed.fit.residual, missed.target) == pytest.approx(expected)
+    assert rms_error(missed.fit, missed.target) == pytest.approx(expected)
