@@ -28,12 +28,14 @@ _AROUND, _AROUND_S = 4, 0.02
 _CANDIDATES, _UNSURE_S = 15, 0.01
 # A servo rests at first if it moves less than this share of what it moves in one of the samples soon after.
 _RESTED = 0.1
-#: Most windows of a set; of longer recordings they are spread evenly.
-MOST_WINDOWS = 240
+#: Most windows of a set, and the share of them at least that something moves in, if there are so many.
+MOST_WINDOWS, MOVING = 120, 0.75
+# Something moves in a window if a joint goes further than this share of all that it goes.
+_MOVES = 0.01
 
 
 def cut(recordings: Sequence[MeasuredGrasp], skew: BaseParameter | None = None) -> tuple[MeasuredGrasp, ...]:
-    """Windows of recordings, in order; of very many they are spread evenly.
+    """Windows of recordings, in order; of very many most of those that something moves in, spread evenly.
 
     Args:
       recordings: each from its start to its end.
@@ -48,8 +50,16 @@ def cut(recordings: Sequence[MeasuredGrasp], skew: BaseParameter | None = None) 
     ]
     if len(windows) <= MOST_WINDOWS:
         return tuple(windows)
-    kept = np.unique(np.linspace(0, len(windows) - 1, MOST_WINDOWS).round().astype(int))
-    return tuple(windows[i] for i in kept)
+    span = np.ptp(np.concatenate([one.position_m for one in recordings]), axis=0)
+    moving = np.array([np.any(np.ptp(window.position_m, axis=0) > _MOVES * span) for window in windows])
+    most = min(int(moving.sum()), max(MOST_WINDOWS - int((~moving).sum()), round(MOVING * MOST_WINDOWS)))
+    kept = [_spread(np.flatnonzero(moving), most), _spread(np.flatnonzero(~moving), MOST_WINDOWS - most)]
+    return tuple(windows[i] for i in np.sort(np.concatenate(kept)))
+
+
+def _spread(indices: np.ndarray, count: int) -> np.ndarray:
+    """So many of these, evenly spread."""
+    return indices[np.linspace(0, len(indices) - 1, min(count, len(indices))).round().astype(int)]
 
 
 def _without_gaps(one: MeasuredGrasp) -> list[slice]:

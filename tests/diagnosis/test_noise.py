@@ -33,7 +33,18 @@ def make(count: int = G) -> Target:
         MeasuredGrasp(f"g{i}", "cup", "", 0.02, 0.0, None, np.arange(S) * 0.04, pair, pair, pair, None)
         for i in range(count)
     )
-    return Target(grasps, np.zeros((count, S, 4)), mask, ONES, ONES, 0 * ONES, True, np.tile(PHASE, (count, 1)), TIAGO, np.ones((count, 1, 1)))
+    return Target(
+        grasps,
+        np.zeros((count, S, 4)),
+        mask,
+        ONES,
+        ONES,
+        0 * ONES,
+        True,
+        np.tile(PHASE, (count, 1)),
+        TIAGO,
+        np.ones((count, 1, 1)),
+    )
 
 
 def normal(seed: int) -> np.ndarray:

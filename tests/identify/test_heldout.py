@@ -38,7 +38,9 @@ def make(count: int = G, lengths: tuple[int, ...] | None = None) -> Target:
     mask = np.arange(S) < np.array(lengths or [S] * count)[:, None]
     phase = np.where(mask, np.arange(S) * len(PHASES) // S, -1)
     grasps = tuple(grasp(i) for i in range(count))
-    return Target(grasps, np.zeros((count, S, 4)), mask, ONES, ONES, 0 * ONES, True, phase, TIAGO, np.ones((count, 1, 1)))
+    return Target(
+        grasps, np.zeros((count, S, 4)), mask, ONES, ONES, 0 * ONES, True, phase, TIAGO, np.ones((count, 1, 1))
+    )
 
 
 class _Counted(SimpleNamespace):

@@ -83,6 +83,19 @@ def test_a_start_lies_where_the_servo_is_at_rest_and_no_window_crosses_a_gap(exa
     assert max(float(part.name.split()[1]) for part in parts) > 6
 
 
+def test_of_a_very_long_set_a_quarter_of_the_windows_are_rests(example):
+    sine = next(one for one in example.grasps if one.name == "sine")
+    time = np.arange(0, 400, 0.02)
+    angle = np.where(time < 300, 0.5, 0.5 + 0.2 * np.sin(np.pi * time))[:, None]
+    nothing = np.zeros((len(time), sine.force_n.shape[1]))
+    long = dataclasses.replace(sine, time_s=time, command_m=angle, position_m=angle, force_n=nothing, rows=None)
+    parts = windows.cut([long])
+    moving = [np.ptp(part.position_m) > 0.1 for part in parts]
+    assert (len(parts), sum(moving)) == (windows.MOST_WINDOWS, windows.MOVING * windows.MOST_WINDOWS)
+    assert moving == sorted(moving)
+    assert np.diff([float(part.name.split()[1]) for part in parts]).max() < 12
+
+
 def test_a_window_goes_on_for_as_long_as_its_last_samples_may_be_read_late(example):
     sine, jaw = example.grasps[4], load_gripper("so101_jaw")
     plain, late = windows.cut([sine])[1], windows.cut([sine], jaw.parameters[SKEW])[1]
