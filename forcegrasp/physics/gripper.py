@@ -27,8 +27,12 @@ SPECIAL = ("force_scale", "radius_m", "offset_m")
 SKEW = "readout_skew_s"
 #: Parameter of a mechanism: what an effort reads for one N or N·m of the motor, such as a current. Nor does it.
 EFFORT_SCALE = "effort_scale"
+#: Parameter of a mechanism with one motor: how much faster it moves at a window's start than it was read, unit per s.
+START_VELOCITY = "start_velocity"
 #: Parameters that change what is read, and nothing that happens.
 OF_READINGS = ("force_scale", EFFORT_SCALE, SKEW)
+#: Parameters of a mechanism that need no `writes`.
+KNOWN_TO_REPLAY = (SKEW, EFFORT_SCALE, START_VELOCITY)
 SIDES = ("left", "right")
 # A motor that moves by less than this share of the largest command step stands against something.
 _STALL = 0.1

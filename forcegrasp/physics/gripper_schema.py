@@ -11,7 +11,7 @@ from pydantic import AfterValidator, Field, PlainValidator, PositiveFloat, model
 
 from forcegrasp.errors import closest
 from forcegrasp.files.validate import Record, counted, must, text, wrong
-from forcegrasp.physics.gripper import EFFORT_SCALE, SIDES, SKEW, SPECIAL
+from forcegrasp.physics.gripper import KNOWN_TO_REPLAY, SIDES, SPECIAL
 from forcegrasp.physics.gripper_parts import BaseParameter, FieldWrite
 
 FORMAT, FIRST_FORMAT = "forcegrasp-gripper/2", "forcegrasp-gripper/1"
@@ -238,9 +238,9 @@ class ServoParameter(ParameterEntry):
 
 def _writes_or_is_read(parameters: dict[str, ServoParameter]) -> dict[str, ServoParameter]:
     for name, parameter in parameters.items():
-        if not parameter.writes and name not in (SKEW, EFFORT_SCALE):
+        if not parameter.writes and name not in KNOWN_TO_REPLAY:
             raise wrong("must name a field of the model, such as `dof_damping`", name, "writes")
-        if parameter.writes and name in (SKEW, EFFORT_SCALE):
+        if parameter.writes and name in KNOWN_TO_REPLAY:
             raise wrong(f"must be []; the simulator knows what {name} is", name, "writes")
     return parameters
 

@@ -10,7 +10,7 @@ import mujoco
 
 from forcegrasp.errors import ConfigError, closest
 from forcegrasp.files.validate import refusal, validate
-from forcegrasp.physics.gripper import Gripper
+from forcegrasp.physics.gripper import START_VELOCITY, Gripper
 from forcegrasp.physics.gripper_checks import check_write, compile_scene
 from forcegrasp.physics.gripper_parts import NO_TRAINING, STEP_SHARE, TYPICAL_STROKE, Motor
 from forcegrasp.physics.gripper_schema import MechanismDescription, ScaleEntry
@@ -72,6 +72,8 @@ def _in_scene(mechanism: Gripper) -> Gripper:
             check_write(where, model, write)
             if write.joint and write.joint not in joints:
                 raise ConfigError(f"{where}@{write.joint}: is no motor's joint{closest(write.joint, joints)}")
+    if START_VELOCITY in mechanism.parameters and len(joints) > 1:
+        raise refusal(mechanism.path, f"parameters.{START_VELOCITY}", "is for mechanisms with one motor; leave it out")
     turns = {model.joint(joint).type[0] == mujoco.mjtJoint.mjJNT_HINGE for joint in joints}
     if len(turns) > 1:
         raise refusal(mechanism.path, "motors", "some of their joints turn and some slide; describe them apart")

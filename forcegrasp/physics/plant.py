@@ -13,7 +13,7 @@ from mujoco.batch import Batch
 from forcegrasp.physics import guard
 from forcegrasp.physics.attached_effects import AttachedEffects
 from forcegrasp.physics.fast import SPHERE
-from forcegrasp.physics.gripper import OF_READINGS, Gripper
+from forcegrasp.physics.gripper import OF_READINGS, START_VELOCITY, Gripper
 from forcegrasp.physics.gripper_parts import BaseParameter
 from forcegrasp.physics.inertia import inertia_of_radius
 from forcegrasp.physics.protocols import PlantEffect
@@ -480,6 +480,6 @@ def write_base(plant: Plant, ids: np.ndarray, values: Mapping[str, np.ndarray]) 
             plant.force_scale[ids] = value
         elif name == "radius_m":
             plant.write_radius(ids, value)
-        elif name not in ("offset_m", *OF_READINGS):
+        elif name not in ("offset_m", START_VELOCITY, *OF_READINGS):
             plant.write(plant.gripper.parameters[name], ids, value)
     return values.get("offset_m", np.zeros(len(ids)))

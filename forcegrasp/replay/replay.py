@@ -12,7 +12,7 @@ from forcegrasp.effects import Effect
 from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.errors import PhysicsError
 from forcegrasp.measure.schema import MeasuredGrasp
-from forcegrasp.physics.gripper import Gripper
+from forcegrasp.physics.gripper import START_VELOCITY, Gripper
 from forcegrasp.physics.plant import Plant, write_base
 from forcegrasp.physics.sensors import ReadingEffects
 from forcegrasp.short_repr import ShortRepr
@@ -153,7 +153,10 @@ class Replay:
         plant.attach([(e.effect(e.values, self.dt, e.variant), e.rows) for e in effects if len(e.rows)])
         ids = np.arange(n)
         offset = write_base(plant, ids, base)
-        plant.reset(ids, offset, self.start_m[grasp], self._start_velocity[grasp] if self.gripper.is_servo else None)
+        velocity = self._start_velocity[grasp] if self.gripper.is_servo else None
+        if velocity is not None and START_VELOCITY in base:
+            velocity = velocity + base[START_VELOCITY][:, None]
+        plant.reset(ids, offset, self.start_m[grasp], velocity)
         position, force = (np.empty((n, self._steps, width)) for width in (plant.motors, plant.channels))
         objects = np.empty((n, self._steps))
         position[:, 0], force[:, 0], objects[:, 0] = plant.position, plant.transduced_force, plant.object_position
