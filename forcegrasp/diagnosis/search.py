@@ -85,7 +85,13 @@ def diagnose(
         return Diagnosis(Verdict.NOT_FITTED, (), (), base, base.fit, target, folds, error_before, error_before, odd=odd)
     only_of_set = all(s.candidates and s.candidates[0].effect.of_set for s in found)
     verdict = conclude(
-        [s.verdict for s in found if s.verdict], error_before, error_after, floor, bool(left), only_of_set
+        [s.verdict for s in found if s.verdict],
+        error_before,
+        error_after,
+        floor,
+        bool(left),
+        only_of_set,
+        whole_recordings=len(target.recordings) > 1,
     )
     names = [s.effects[0] for s in found] if verdict.names_effects else []
     if verdict is Verdict.ONE_OF:

@@ -26,7 +26,13 @@ def explained_share(before: float, after: float, noise: float = 1.0) -> float:
 
 
 def conclude(
-    found: Sequence[Verdict], before: float, after: float, floor: float, left: bool, only_of_set: bool = False
+    found: Sequence[Verdict],
+    before: float,
+    after: float,
+    floor: float,
+    left: bool,
+    only_of_set: bool = False,
+    whole_recordings: bool = False,
 ) -> Verdict:
     """The verdict: that of the weakest step, if what was found explains enough.
 
@@ -37,10 +43,11 @@ def conclude(
       floor: what noise and the simulation's own error leave.
       left: whether something is left that is neither.
       only_of_set: whether all that was found is of the set, and not of the gripper.
+      whole_recordings: whether motions were held out as wholes, to which a look-alike carries over less.
     """
     if not found:
         return Verdict.UNKNOWN if left else Verdict.EXPLAINED
-    enough = EXPLAINED_FAR if after > FAR * floor else EXPLAINED
+    enough = EXPLAINED_FAR if after > FAR * floor and not whole_recordings else EXPLAINED
     if left and explained_share(before, after) < enough:
         return Verdict.UNKNOWN
     if Verdict.ONE_OF in found:

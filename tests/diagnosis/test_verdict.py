@@ -100,6 +100,13 @@ def test_the_verdict(found, before, after, left, verdict):
     assert conclude([Verdict(step) for step in found], before, after, 1.0, left) == verdict
 
 
+def test_of_motions_held_out_as_wholes_half_of_the_error_is_enough():
+    found = [Verdict.EFFECT]
+    assert conclude(found, 10.0, 5.0, 1.0, left=True) is Verdict.UNKNOWN
+    assert conclude(found, 10.0, 5.0, 1.0, left=True, whole_recordings=True) is Verdict.EFFECT
+    assert conclude(found, 10.0, 8.0, 1.0, left=True, whole_recordings=True) is Verdict.UNKNOWN
+
+
 def test_shares_are_of_the_mean_square_beyond_the_noise():
     assert explained_share(3.0, 2.0) == pytest.approx(5 / 8)
     assert explained_share(5.0, 3.0, noise=3.0) == pytest.approx(1.0)
