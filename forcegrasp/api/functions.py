@@ -73,7 +73,7 @@ def compare(
     given, loaded = (None, loaded) if model is None else _beside(model, loaded, show)
     found, used, notes = comparison.compare(loaded, given, seed, show)
     name = "" if model is None else _name(model)
-    return CompareResult(loaded, found, used, name, (*notes, *used.warnings))
+    return CompareResult(loaded, found, used, name, (*notes, *used.warnings), _file_of(model))
 
 
 def fit(data: AnySet, *, out: str | Path | None = None, seed: int = 0, progress: Progress | None = None) -> FitResult:
@@ -128,7 +128,7 @@ def diagnose(
     tried = diagnose_set.chosen_effects(loaded.gripper, only)
     given, loaded = (None, loaded) if model is None else _beside(model, loaded, show)
     diagnosis, _ = diagnose_set.diagnose_set(loaded, given, [effect.name for effect in tried], seed, show)
-    return DiagnoseResult(loaded, diagnosis, advise(diagnosis), tuple(tried), only, given is None)
+    return DiagnoseResult(loaded, diagnosis, advise(diagnosis), tuple(tried), only, _file_of(model))
 
 
 def add(
@@ -183,7 +183,7 @@ def report(result: ModelResult | TableResult, out: str | Path | None = None) -> 
     for name, model in result.models().items():
         write_model(model, folder / name)
     return measuring.write_files(
-        folder, result.file, result.to_dict(), result.title, result.answer, result.sections(), result.data
+        folder, result.file, result.to_dict(), result.title, result.box(folder), result.sections(), result.data
     )
 
 
@@ -203,6 +203,11 @@ def _beside(model: AnyModel, loaded: Loaded[MeasurementSet], show: Progress) -> 
     for warning in warned.warnings[len(loaded.warnings) :]:
         show(f"warning: {warning}")
     return given, warned
+
+
+def _file_of(model: AnyModel | None) -> str:
+    """The path of a model that was given as a file; empty otherwise."""
+    return str(model) if isinstance(model, (str, Path)) else ""
 
 
 def _name(model: AnyModel) -> str:

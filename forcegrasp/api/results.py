@@ -26,7 +26,8 @@ from forcegrasp.reports import comparison as comparison_report
 from forcegrasp.reports import diagnosis as diagnosis_report
 from forcegrasp.reports import final_force as final_force_report
 from forcegrasp.reports import fit as fit_report
-from forcegrasp.reports.html import Section
+from forcegrasp.reports import next_step
+from forcegrasp.reports.html import Answer, Section
 from forcegrasp.short_repr import ShortRepr, counted, cut, some
 
 
@@ -54,6 +55,10 @@ class Result(ShortRepr):
         """The sections of the report: what the answer rests on."""
         raise NotImplementedError
 
+    def box(self, folder: Path) -> Answer | str:
+        """The box above the report that is written into a folder: the answer, how sure it is, and what to do next."""
+        return self.answer
+
     def models(self) -> dict[str, Model]:
         """The models that lie beside the report, by the names of their files."""
         return {}
@@ -73,6 +78,7 @@ class CompareResult(Result):
     model: Model  #: what was judged
     given: str  #: what that model was given as; empty if it is the base model, fitted to this set
     notes: tuple[str, ...]  #: what to bear in mind
+    given_file: str = ""  #: the model's file, if it was given as one
 
     file = "compare"
 
@@ -101,8 +107,14 @@ class CompareResult(Result):
     def sections(self) -> list[Section]:
         return comparison_report.sections(self.comparison, list(self.notes))
 
+    def box(self, folder: Path) -> Answer:
+        commands = next_step.after_comparison(
+            self.comparison, self.data.measured.path, self.given_file or folder / measuring.BASE_MODEL
+        )
+        return comparison_report.answer_box(self.comparison, self.notes, commands)
+
     def models(self) -> dict[str, Model]:
-        return {} if self.given else {measuring.BASE_MODEL: dataclasses.replace(self.model, warnings=self.notes)}
+        return {} if self.given_file else {measuring.BASE_MODEL: dataclasses.replace(self.model, warnings=self.notes)}
 
     def summary(self) -> str:
         worst = comparison_report.worst_cell(self.comparison.cells())
@@ -148,6 +160,10 @@ class FitResult(Result):
     def sections(self) -> list[Section]:
         return fit_report.fit_sections(self.base, self.target, self.model)
 
+    def box(self, folder: Path) -> Answer:
+        command = next_step.after_fit(self.data.measured.path, self.path or folder / "model.yaml")
+        return fit_report.model_box(self.answer, self.model, [command])
+
     def models(self) -> dict[str, Model]:
         return {"model.yaml": self.model}
 
@@ -167,7 +183,7 @@ class DiagnoseResult(Result):
     advice: Advice | None  #: which grasp to record next
     tried: tuple[type[Effect], ...]
     only: tuple[str, ...]  #: the effects that were asked for; empty if all were tried
-    from_base: bool  #: whether it starts from the base model, for none was given
+    given_file: str = ""  #: the file of the model to start from, if it was given as one
 
     file = "diagnosis"
 
@@ -205,8 +221,11 @@ class DiagnoseResult(Result):
 
     @property
     def answer(self) -> str:
-        answer = diagnosis_report.answer(self.diagnosis)
-        return f"{answer} Only {', '.join(self.only)} were tried." if self.only else answer
+        return f"{diagnosis_report.answer(self.diagnosis)} {self._note}".rstrip()
+
+    @property
+    def _note(self) -> str:
+        return f"Only {', '.join(self.only)} were tried." if self.only else ""
 
     @property
     def title(self) -> str:
@@ -218,9 +237,14 @@ class DiagnoseResult(Result):
     def sections(self) -> list[Section]:
         return diagnosis_report.sections(self.diagnosis, self.advice, self.tried)
 
+    def box(self, folder: Path) -> Answer:
+        known, found = self.given_file or folder / measuring.BASE_MODEL, folder / measuring.FOUND_MODEL
+        commands = next_step.after_diagnosis(self.diagnosis, self.advice, self.data.measured.path, known, found)
+        return diagnosis_report.answer_box(self.diagnosis, self.advice, commands, self._note)
+
     def models(self) -> dict[str, Model]:
-        base = {measuring.BASE_MODEL: self._base_model} if self.from_base else {}
-        return base | ({"model.yaml": self.model} if self.verdict.lacks_effects else {})
+        base = {} if self.given_file else {measuring.BASE_MODEL: self._base_model}
+        return base | ({measuring.FOUND_MODEL: self.model} if self.verdict.lacks_effects else {})
 
     def summary(self) -> str:
         found = f"{self.verdict} {some(self.effects)}".strip()
@@ -267,6 +291,11 @@ class AddResult(Result):
 
     def sections(self) -> list[Section]:
         return fit_report.add_sections(self.added, self.effect)
+
+    def box(self, folder: Path) -> Answer:
+        path = self.path or folder / "model.yaml"
+        command = next_step.after_adding(self.data.measured.path, path, self.model.gripper)
+        return fit_report.model_box(self.answer, self.model, [command])
 
     def models(self) -> dict[str, Model]:
         return {"model.yaml": self.model}

@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
-from pathlib import Path
-
-from forcegrasp.assets import DEFAULT_GRIPPER
 from forcegrasp.cli.results import default_out, need, print_table, progress_printer
 from forcegrasp.cli.verb import Verb
 from forcegrasp.config.verbs import AddConfig
@@ -40,6 +36,7 @@ def run(config: AddConfig) -> None:
     from forcegrasp.identify import loading
     from forcegrasp.models.model_file import write_model
     from forcegrasp.reports import fit as fit_report
+    from forcegrasp.reports.next_step import after_adding
 
     check_effects("effect", [config.effect])
     folder = check_folder(default_out("add", ""))
@@ -56,25 +53,16 @@ def run(config: AddConfig) -> None:
     print_table(fit_report.printed_parameters(added.model))
     print("\n".join([lead, *(f"warning: {warning}" for warning in added.model.warnings)]))
     write_model(added.model, path)
-    if loaded.gripper.is_servo:
-        print(f"wrote {path}. See what is left: forcegrasp compare data={data} model={path}")
-    else:
-        print(f"wrote {path}. Train with it: {train_command(path, added.model.gripper.name_or_path)}")
+    command = after_adding(data, path, added.model.gripper)
+    print(f"wrote {path}\nnext: {command}")
     write_results(
         folder,
         "add",
         fit_report.add_json(added, effect, loaded.measured.name, path),
         f"{effect.name} added: {loaded.measured.name}",
-        lead,
+        fit_report.model_box(lead, added.model, [command]),
         fit_report.add_sections(added, effect),
         loaded,
-    )
-
-
-def train_command(model: Path, gripper: str) -> str:
-    """What to type to train with a model of this gripper."""
-    return shlex.join(
-        ["forcegrasp", "train", f"model={model}", *([] if gripper == DEFAULT_GRIPPER else [f"gripper={gripper}"])]
     )
 
 

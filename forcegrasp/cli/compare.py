@@ -33,6 +33,7 @@ def run(config: CompareConfig) -> None:
     from forcegrasp.identify import comparison, loading
     from forcegrasp.models.model_file import write_model
     from forcegrasp.reports import comparison as comparison_report
+    from forcegrasp.reports.next_step import after_comparison
 
     out = check_folder(default_out("compare", config.out))
     loaded = loading.load(data)
@@ -47,15 +48,16 @@ def run(config: CompareConfig) -> None:
     print_table(comparison_report.printed(found))
     print("\n".join([lead, *comparison_report.details(found), *(f"note: {note}" for note in notes)]))
     if model is None:
-        known = out / BASE_MODEL
-        write_model(dataclasses.replace(used, warnings=tuple(notes)), known)
-        print(f"wrote {known}. Which effect is missing? forcegrasp diagnose data={data} model={known}")
+        write_model(dataclasses.replace(used, warnings=tuple(notes)), out / BASE_MODEL)
+        print(f"wrote {out / BASE_MODEL}: the base model, fitted to this set")
+    commands = after_comparison(found, data, config.model or out / BASE_MODEL)
+    print(f"next: {commands[0]}")
     write_results(
         out,
         "compare",
         comparison_report.compare_json(found, loaded.measured.name, name, notes),
         f"Where the model fails: {loaded.measured.name}",
-        lead,
+        comparison_report.answer_box(found, notes, commands),
         comparison_report.sections(found, notes),
         loaded,
     )

@@ -29,6 +29,7 @@ def run(config: DiagnoseConfig) -> None:
 
     from forcegrasp.cli.measuring import (
         BASE_MODEL,
+        FOUND_MODEL,
         base_model,
         check_effects,
         check_folder,
@@ -44,6 +45,7 @@ def run(config: DiagnoseConfig) -> None:
     from forcegrasp.identify.fitted_model import model_of
     from forcegrasp.models.model_file import write_model
     from forcegrasp.reports import diagnosis as diagnosis_report
+    from forcegrasp.reports.next_step import after_diagnosis
 
     check_effects("effects", config.effects)
     out = check_folder(default_out("diagnose", config.out))
@@ -57,27 +59,27 @@ def run(config: DiagnoseConfig) -> None:
     diagnosis, _ = diagnose_set.diagnose_set(loaded, model, [e.name for e in tried], config.seed, progress_printer())
     advice = advise(diagnosis)
     lead, table = diagnosis_report.answer(diagnosis), diagnosis_report.printed(diagnosis)
-    if config.effects:
-        lead += f" Only {', '.join(config.effects)} were tried."
+    note = f"Only {', '.join(config.effects)} were tried." if config.effects else ""
+    lead = f"{lead} {note}".rstrip()
     if table is not None:
         print_table(table)
     print("\n".join([f"{diagnosis.verdict}: {lead}", *diagnosis_report.lines(diagnosis, advice)]))
-    known = config.model or out / BASE_MODEL
+    known, found = config.model or out / BASE_MODEL, out / FOUND_MODEL
+    commands = after_diagnosis(diagnosis, advice, data, known, found)
     if model is None:
         write_model(base_model(diagnosis.base, diagnosis.target, loaded), out / BASE_MODEL)
         print(f"wrote {known}: the base model, fitted to this set")
     if diagnosis.verdict.lacks_effects:
-        first = next(iter(diagnosis.shares()), diagnosis.effects[0])  # rounding is in the noise already
-        print(f"add it: forcegrasp add data={data} model={known} effect={first} out=better.yaml")
         better = model_of(diagnosis.fit, diagnosis.target, loaded, diagnosis.numerical)
-        write_model(better, out / "model.yaml")
-        print(f"or take the model with {', '.join(e.effect.name for e in better.effects)}: {out / 'model.yaml'}")
+        write_model(better, found)
+        print(f"wrote {found}: the model with {', '.join(e.effect.name for e in better.effects)}")
+    print("\n".join(f"{'or' if k else 'next'}: {command}" for k, command in enumerate(commands)))
     write_results(
         out,
         "diagnosis",
         diagnosis_report.diagnosis_json(diagnosis, advice, tried, loaded.measured.name),
         f"What the model lacks: {loaded.measured.name}",
-        lead,
+        diagnosis_report.answer_box(diagnosis, advice, commands, note),
         diagnosis_report.sections(diagnosis, advice, tried),
         loaded,
     )

@@ -28,6 +28,7 @@ def run(config: FitConfig) -> None:
     from forcegrasp.identify import fit_set, loading
     from forcegrasp.models.model_file import write_model
     from forcegrasp.reports import fit as fit_report
+    from forcegrasp.reports.next_step import after_fit
 
     folder = check_folder(default_out("fit", ""))
     path = check_file(folder / "model.yaml" if not config.out else need(config.out, "out", "model.yaml"))
@@ -39,13 +40,14 @@ def run(config: FitConfig) -> None:
     print_table(fit_report.printed_parameters(model))
     print("\n".join([lead, *(f"warning: {warning}" for warning in model.warnings)]))
     write_model(model, path)
-    print(f"wrote {path}. Which effect is missing? forcegrasp diagnose data={data} model={path}")
+    command = after_fit(data, path)
+    print(f"wrote {path}\nnext: {command}")
     write_results(
         folder,
         "fit",
         fit_report.fit_json(base, target, model, loaded.measured.name, path),
         f"Base model of {loaded.measured.name}",
-        lead,
+        fit_report.model_box(lead, model, [command]),
         fit_report.fit_sections(base, target, model),
         loaded,
     )

@@ -22,11 +22,13 @@ if TYPE_CHECKING:
     from forcegrasp.identify.target import Target
     from forcegrasp.measure import FinalForceTable, MeasurementSet
     from forcegrasp.models.model_file import Model
-    from forcegrasp.reports.html import Section
+    from forcegrasp.reports.html import Answer, Section
 
 
 #: The base model that compare and diagnose fit where none is given, beside their report.
 BASE_MODEL = "base_model.yaml"
+#: The model with all effects that a diagnosis found, beside its report.
+FOUND_MODEL = "model.yaml"
 #: With an effect added, the error must fall to less than this share.
 LEAST_FALL = 0.995
 
@@ -73,7 +75,13 @@ def tell_warnings(loaded: Loaded) -> None:
 
 
 def write_results(
-    out: Path, name: str, content: dict[str, Any], title: str, lead: str, sections: Sequence[Section], loaded: Loaded
+    out: Path,
+    name: str,
+    content: dict[str, Any],
+    title: str,
+    lead: str | Answer,
+    sections: Sequence[Section],
+    loaded: Loaded,
 ) -> None:
     """Writes the report and the JSON file beside it, and says where."""
     report = write_files(out, name, content, title, lead, sections, loaded)
@@ -81,7 +89,13 @@ def write_results(
 
 
 def write_files(
-    out: Path, name: str, content: dict[str, Any], title: str, lead: str, sections: Sequence[Section], loaded: Loaded
+    out: Path,
+    name: str,
+    content: dict[str, Any],
+    title: str,
+    lead: str | Answer,
+    sections: Sequence[Section],
+    loaded: Loaded,
 ) -> Path:
     """Writes the report and the JSON file beside it; returns the report's path."""
     import mujoco

@@ -20,7 +20,7 @@ from forcegrasp.doctor.packages import installed
 DATA = {
     "conf": ("train.yaml", "evaluate.yaml", "experiment/ib.yaml", "budget/quick.yaml"),
     "assets": ("known_grasps.json",),
-    "reports": ("report.html",),
+    "reports": ("report.html", "view.js"),
 }
 AGAIN = "install it again: pip install . in a checkout, or make setup"
 

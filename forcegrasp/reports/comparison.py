@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,8 @@ from forcegrasp.identify.comparison import Cell, Comparison
 from forcegrasp.identify.cross_validation import rms
 from forcegrasp.identify.target import Target
 from forcegrasp.reports import figures
-from forcegrasp.reports.html import Picture, Section, Table, Text
+from forcegrasp.reports.html import Answer, Command, Picture, Section, Table, Text
+from forcegrasp.reports.view import view_section
 
 # Error ÷ floor up to which a model is as good as the data can tell.
 _AT_FLOOR = 1.03
@@ -33,6 +35,7 @@ PHASE_WORDS = {
 }
 # Share of the error below which what it goes with is no news.
 _WORTH_TELLING = 0.05
+_GOES_WITH = "what it goes with"
 
 
 def amount(value: float, unit: str) -> str:
@@ -150,6 +153,14 @@ def answer(comparison: Comparison) -> str:
     )
 
 
+def answer_box(comparison: Comparison, notes: Sequence[str], commands: Sequence[Command]) -> Answer:
+    """The answer as a box: how large the error is, where, how sure that is, and what to do next."""
+    rows = [(name, text) for name, text in _rows(comparison) if name != "by recording, each held out"]
+    rows += [("to bear in mind", note) for note in notes]
+    told = [(f"{name[0].upper()}{name[1:]}", f"{text}.") for name, text in rows]
+    return Answer(answer(comparison), told, commands=commands)
+
+
 def printed(comparison: Comparison) -> Printed:
     """Error per phase and signal, for the terminal."""
     table = Printed("phase", box=box.SIMPLE_HEAD, padding=(0, 1))
@@ -178,13 +189,19 @@ def _printed_cell(cell: Cell | None) -> Plain:
 
 def details(comparison: Comparison) -> list[str]:
     """Lines below the table: worst grasps, what the error goes with, and the noise."""
+    return [text if name == _GOES_WITH else f"{name}: {text}" for name, text in _rows(comparison)]
+
+
+def _rows(comparison: Comparison) -> list[tuple[str, str]]:
+    """The same as pairs of what is told and its text."""
     errors, target = comparison.by_grasp(), comparison.target
     worst = [f"{target.grasps[i].label} ({errors[i]:.1f} ×)" for i in worst_grasps(comparison)]
-    lines = [*_recording_lines(comparison), f"worst {target.part}s: {', '.join(worst)}"]
+    rows = [*_recording_rows(comparison), (f"worst {target.part}s", ", ".join(worst))]
     name, kind, share = comparison.explanations()[0]
     if share >= _WORTH_TELLING and not at_floor(comparison.floor_ratio(), comparison.floor):
-        lines.append(f"{share:.0%} of the {kind} error goes with {covariate_words(name)}")
-    return [*lines, noise_sentence(target)]
+        rows.append((_GOES_WITH, f"{share:.0%} of the {kind} error goes with {covariate_words(name)}"))
+    noise, _, sizes = noise_sentence(target).partition(": ")
+    return [*rows, (noise, sizes)]
 
 
 def covariate_words(name: str) -> str:
@@ -201,6 +218,7 @@ def sections(comparison: Comparison, notes: list[str]) -> list[Section]:
     """What the answer rests on."""
     row = "recording" if comparison.target.recordings else "grasp"
     found = [
+        view_section(comparison.target, {"model": comparison.predicted}),
         _by_signal_and_phase(comparison),
         Section(f"Error by {row} and phase", [grid_picture(comparison)]),
         _worst(comparison),
@@ -219,10 +237,11 @@ def grid_picture(comparison: Comparison, model: str = "the model") -> Picture:
         figures.heat_map(grid, rows, comparison.target.phases),
         f"Error of {model} ÷ sensor noise, of each {row} (rows) in each phase, all signals together. 1 is the noise."
         + (" The worst forty are shown." if len(rows) > 40 else ""),
+        in_view=True,
     )
 
 
-def _recording_lines(comparison: Comparison) -> list[str]:
+def _recording_rows(comparison: Comparison) -> list[tuple[str, str]]:
     """The error of each of a servo's recordings, where there are several; their loads may differ."""
     found, target = comparison.by_recording(), comparison.target
     if len(found) < 2:
@@ -231,7 +250,7 @@ def _recording_lines(comparison: Comparison) -> list[str]:
     for recording, ratios in sorted(found.items(), key=lambda item: -max(item[1].values())):
         signals = zip(ratios.values(), target.sigma.tolist(), target.axis.units, strict=True)
         rows.append(f"{recording} {', '.join(f'{amount(r * sigma, unit)} {r:.1f}×' for r, sigma, unit in signals)}")
-    return [f"by recording, each held out: {'; '.join(rows)}"]
+    return [("by recording, each held out", "; ".join(rows))]
 
 
 def _by_signal_and_phase(comparison: Comparison) -> Section:
@@ -259,6 +278,7 @@ def _by_signal_and_phase(comparison: Comparison) -> Section:
             Picture(
                 figures.heat_map(grid[shown], phases, [words(s) for s in names]),
                 f"Error ÷ sensor noise. {PHASE_WORDS[comparison.target.part]}",
+                in_view=True,
             ),
             Table(head, rows, frozenset(i for i, cell in enumerate(cells) if cell.ratio > _MARKED)),
             Text(f"S{noise_sentence(comparison.target)[1:]}."),
@@ -280,6 +300,7 @@ def _worst(comparison: Comparison) -> Section:
                 figures.overlay(target, index, comparison.predicted[index]),
                 f"{target.part.capitalize()} {grasp.label}: error {errors[index]:.2f} × noise. Dots are measured, lines"
                 " are the model's; below, measured − model ÷ noise, with a band of ± 2.",
+                in_view=True,
             )
         )
     return Section(f"The worst {target.part}s", blocks)

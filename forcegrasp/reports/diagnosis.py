@@ -27,7 +27,18 @@ from forcegrasp.reports.comparison import (
     words,
     worst_cell,
 )
-from forcegrasp.reports.diagnosis_words import lacks, left_sentence, noise_words, odd_words, preference, shares_sentence
+from forcegrasp.reports.diagnosis_words import (
+    certainty,
+    lacks,
+    left_sentence,
+    left_share,
+    noise_words,
+    odd_words,
+    percent,
+    preference,
+    runner_up,
+    shares_sentence,
+)
 from forcegrasp.reports.findings import (
     candidate_json,
     candidate_parameters,
@@ -40,8 +51,10 @@ from forcegrasp.reports.findings import (
     remaining,
     where,
 )
-from forcegrasp.reports.fit import ADVICE, steps_picture, symptom_picture
-from forcegrasp.reports.html import Picture, Section, Table, Text
+from forcegrasp.reports.fit import ADVICE, rounding_words, steps_picture, symptom_picture
+from forcegrasp.reports.html import Answer, Command, Picture, Section, Table, Text
+from forcegrasp.reports.symptom import symptom_of
+from forcegrasp.reports.view import view_section
 
 _PRINTED = 5
 
@@ -50,11 +63,13 @@ def diagnosis_json(diagnosis: Diagnosis, advice: Advice | None, tried: Sequence[
     """The diagnosis in plain types."""
     return {
         "set": name,
+        "answer": answer(diagnosis),
         "verdict": diagnosis.verdict,
         "effects": list(diagnosis.effects),
         "preferred": list(diagnosis.preferred),
         "explained_share": diagnosis.explained,
         "shares": diagnosis.shares(),
+        "left_share": left_share(diagnosis) if diagnosis.shares() else None,
         "odd_grasps": [dataclasses.asdict(grasp) for grasp in diagnosis.odd],
         "steps": [_step_json(step, diagnosis) for step in diagnosis.steps],
         "ranking": ranking(diagnosis),
@@ -104,7 +119,8 @@ def answer(diagnosis: Diagnosis) -> str:
         with_found = f"{found} put right" if d.verdict is Verdict.DATA else found
         fall = f"With {with_found} the error on held-out {d.target.part}s falls {change}"
         rest = f"What is left is largest in {place}." if d.left else noise
-        return f"{lacks(d)} {fall} the sensor noise; up to {d.floor:.2f} is noise. {rest}".rstrip()
+        told = " ".join(filter(None, (lacks(d), shares_sentence(d))))
+        return f"{told} {fall} the sensor noise; up to {d.floor:.2f} is noise. {rest}".rstrip()
     if d.verdict is Verdict.EXPLAINED:
         of_noise = f"the error on held-out {d.target.part}s is {d.error_before:.2f} × the sensor noise"
         if noise:
@@ -120,6 +136,44 @@ def answer(diagnosis: Diagnosis) -> str:
             f" {d.error_before:.2f} × the sensor noise, and {best}. Look at {place}."
         )
     return f"No diagnosis, for the base model is not fitted: {d.base.reason}. To do: {ADVICE}."
+
+
+def answer_box(diagnosis: Diagnosis, advice: Advice | None, commands: Sequence[Command], note: str = "") -> Answer:
+    """The answer as a box: what, how sure, the runner-up, what is left, and what to do next.
+
+    Args:
+      diagnosis: what was found.
+      advice: the next grasp, if there is one.
+      commands: what to do next, the best first.
+      note: what else to bear in mind.
+    """
+    d = diagnosis
+    fall = f"{d.error_before:.2f} → {d.error_after:.2f} × the sensor noise on held-out {d.target.part}s"
+    what = answer(d)
+    if d.verdict.names_effects:
+        what, left = lacks(d), left_sentence(d).removeprefix("what is left is ")
+        rows = [("Explains", shares_sentence(d)), ("Error", f"{fall}; up to {d.floor:.2f} is noise.")]
+    else:
+        left = left_sentence(d).removeprefix("what is left is ") if d.verdict is Verdict.UNKNOWN else ""
+        rows = []
+    rows += [
+        ("How sure", certainty(d)),
+        ("Runner-up", runner_up(d) if d.verdict.lacks_effects else ""),
+        ("What is left", f"{left[:1].upper()}{left[1:]}{'.' if left else ''}"),
+        ("Noise", noise_words(d) if d.verdict.names_effects else ""),
+        ("Look first at", f"{odd_words(d)}." if d.odd and d.steps else ""),
+        (
+            "Record next",
+            f"{advice.sentence().removeprefix('record next: ')}."
+            if advice is not None and d.verdict is not Verdict.ONE_OF
+            else "",
+        ),
+        ("Note", note),
+    ]
+    shares = d.shares() if d.verdict.names_effects else {}
+    shares |= {"left": left_share(d)} if shares else {}
+    parts = [(f"{name} {percent(share)}", share) for name, share in shares.items()]
+    return Answer(what, [(name, text) for name, text in rows if text], parts, commands)
 
 
 def printed(diagnosis: Diagnosis) -> Printed | None:
@@ -161,20 +215,28 @@ def _value(effect: type[Effect], name: str, value: float, digits: int) -> str:
 def lines(diagnosis: Diagnosis, advice: Advice | None) -> list[str]:
     """What stands below the table: symptoms, rivals, what is left, and what to record next."""
     text = []
-    for step, _ in found_steps(diagnosis):
+    for step, before in found_steps(diagnosis):
         effect = effect_of(step.effects[0], diagnosis.target.gripper)
-        text.append(f"{effect.name}: {effect.symptom}")
+        text.append(f"{effect.name}: {_symptom(step, before, diagnosis)}")
         text += [f"  {line}" for line in _final_texts(diagnosis, effect)]
         text += [f"  it could also be: {listed(step.effects[1:], 'or')}"] if len(step.effects) > 1 else []
     if diagnosis.odd and diagnosis.steps:
         text.append(f"look at these first: {odd_words(diagnosis)}")
-    if diagnosis.shares():
-        text.append(shares_sentence(diagnosis))
     if diagnosis.verdict is Verdict.UNKNOWN or diagnosis.verdict.names_effects:
         text.append(left_sentence(diagnosis))
     if advice is not None:
         text.append(advice.sentence())
     return [*text, noise_sentence(diagnosis.target), *(f"warning: {warning}" for warning in final_warnings(diagnosis))]
+
+
+def _symptom(step: Step, before: Fit, diagnosis: Diagnosis) -> str:
+    """What an effect that was found changes in these data, in words."""
+    target, name = diagnosis.target, step.effects[0]
+    if step.is_counted:
+        return rounding_words(target)
+    seen = symptom_of(target, before, step.candidates[0].fit).sentence()
+    later = next((s.effects[0] for s in diagnosis.steps if s.replaces == name), "")
+    return f"{seen} (later {later} took its place)" if later else seen
 
 
 def _final_texts(diagnosis: Diagnosis, effect: type[Effect]) -> list[str]:
@@ -192,8 +254,16 @@ def sections(diagnosis: Diagnosis, advice: Advice | None, tried: Sequence[type[E
     if advice is not None:
         found.append(_advice_section(diagnosis, advice))
     attempts = [_tried_section(diagnosis, tried)] if diagnosis.steps else []
-    left = _left_sections(diagnosis)
-    return [*found, *attempts, *left] if diagnosis.effects else [*left, *found, *attempts]
+    left, view = _left_sections(diagnosis), _view(diagnosis)
+    return [view, *found, *attempts, *left] if diagnosis.effects else [view, *left, *found, *attempts]
+
+
+def _view(diagnosis: Diagnosis) -> Section:
+    """The base model's predictions beside those of the final model."""
+    models = {"base model": diagnosis.base.fit.predicted}
+    if diagnosis.fit is not diagnosis.base.fit:
+        models[f"model with {listed(diagnosis.preferred)}"] = diagnosis.fit.predicted
+    return view_section(diagnosis.target, models)
 
 
 def _step_section(number: int, step: Step, before: Fit, diagnosis: Diagnosis) -> Section:
@@ -203,9 +273,11 @@ def _step_section(number: int, step: Step, before: Fit, diagnosis: Diagnosis) ->
     else:
         seen = symptom_picture(diagnosis.target, before, step.candidates[0].fit, effect)
     fall = f"Held-out error {step.error_before:.2f} → {step.error_after:.2f} × noise."
+    told = _symptom(step, before, diagnosis)
     blocks: list = [
-        Text(f"Symptom: {effect.symptom}. {fall}", strong=True),
+        Text(f"{told[0].upper()}{told[1:]}. {fall}", strong=True),
         seen,
+        Text(f"What is known of {effect.name}: {effect.symptom}."),
     ]
     rows = [
         (name, _value(effect, name, p.value, 4), f"{p.low:.4g} to {p.high:.4g}", "" if p.unit == "1" else p.unit)
@@ -292,6 +364,7 @@ def _left_sections(diagnosis: Diagnosis) -> list[Section]:
             figures.overlay(target, worst, left.predicted[worst]),
             f"{target.part.capitalize()} {grasp.label}, the worst under {model}: error {left.by_grasp()[worst]:.2f} ×"
             " noise. Dots are measured, lines are the model's.",
+            in_view=True,
         ),
         Text(f"S{noise_sentence(target)[1:]}."),
     ]

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
-from forcegrasp.diagnosis.result import Diagnosis, Step, kept_steps
+import numpy as np
+
+from forcegrasp.diagnosis.result import Candidate, Diagnosis, Step, kept_steps
 from forcegrasp.diagnosis.verdict import EXPLAINED_FAR, MUCH
 from forcegrasp.effects.for_gripper import effect_of
 from forcegrasp.identify.intervals import listed
 from forcegrasp.identify.verdict import Verdict
 from forcegrasp.reports.comparison import covariate_words, words
 from forcegrasp.reports.findings import where
+
+# Of all that is left, a phase that has so much is where it is.
+_NEARLY_ALL = 0.8
 
 
 def lacks(diagnosis: Diagnosis) -> str:
@@ -23,7 +28,7 @@ def lacks(diagnosis: Diagnosis) -> str:
         names = f"{listed(steps[0].effects, 'or')}: {_undecided(steps[0])}"
     else:
         names = listed([_with_rivals(step) for step in steps])
-    return f"The model lacks {names}{_but(diagnosis)}."
+    return f"{_but(diagnosis)}The model lacks {names}."
 
 
 def odd_words(diagnosis: Diagnosis) -> str:
@@ -41,12 +46,37 @@ def _fault(step: Step, diagnosis: Diagnosis) -> str:
 
 
 def shares_sentence(diagnosis: Diagnosis) -> str:
-    """How much of the error each effect explains, and how much is left."""
+    """How much of the error each effect explains, and how much is left, and where; empty if none was fitted."""
     shares = diagnosis.shares()
-    parts = [f"{name} explains {share:.0%}" for name, share in shares.items()]
-    return (
-        f"of the mean square error beyond the noise {listed(parts)}; {max(0.0, 1 - sum(shares.values())):.0%} is left"
-    )
+    if not shares:
+        return ""
+    (first, share), *others = shares.items()
+    parts = [f"{first} explains {percent(share)}", *(f"{name} {percent(share)}" for name, share in others)]
+    left = percent(left_share(diagnosis))
+    rest = f"{left} is left, {place_of_rest(diagnosis)}" if diagnosis.left else "no more than noise is left"
+    return f"Of the error beyond the noise (mean square) {', '.join(parts)}; {rest}."
+
+
+def left_share(diagnosis: Diagnosis) -> float:
+    """Share of the held-out mean square beyond the noise that no effect of the final model explains."""
+    return max(0.0, 1 - sum(diagnosis.shares().values()))
+
+
+def percent(share: float) -> str:
+    """A share in words; what is not quite nothing, or not quite all, is not rounded to it."""
+    if 0 < share < 0.005:
+        return "under 1%"
+    return "over 99%" if 0.995 <= share < 0.9995 else f"{share:.0%}"
+
+
+def place_of_rest(diagnosis: Diagnosis) -> str:
+    """The phase that has most of what is left beyond the noise."""
+    held, phase = diagnosis.heldout(), diagnosis.target.phase
+    held = held if np.isfinite(held).any() else diagnosis.fit.residual
+    beyond = [float(np.nansum(held[phase == index] ** 2 - 1)) for index in range(len(diagnosis.target.phases))]
+    most = int(np.argmax(beyond))
+    nearly_all = beyond[most] > _NEARLY_ALL * sum(max(0.0, one) for one in beyond)
+    return f"{'' if nearly_all else 'most of it '}in {words(diagnosis.target.phases[most])}"
 
 
 def _with_rivals(step: Step) -> str:
@@ -70,13 +100,78 @@ def preference(step: Step) -> str:
     return "it has fewer parameters or a larger held-out gain"
 
 
+def is_not_all(diagnosis: Diagnosis) -> bool:
+    """Whether the effects that were found leave so much that more must be missing."""
+    d = diagnosis
+    return bool(d.left) and (d.error_after > MUCH * d.floor or d.explained < EXPLAINED_FAR)
+
+
 def _but(diagnosis: Diagnosis) -> str:
     d = diagnosis
-    if not d.left or (d.error_after <= MUCH * d.floor and d.explained >= EXPLAINED_FAR):
+    if not is_not_all(d):
         return ""
     return (
-        f"; but that is not all, for {d.error_after:.2f} × the sensor noise is left on held-out {d.target.part}s where"
-        f" {d.floor:.2f} would be noise ({d.explained:.0%} of the mean square beyond it is explained)"
+        f"Not all is found: {d.error_after:.2f} × the sensor noise is left on held-out {d.target.part}s where"
+        f" {d.floor:.2f} would be noise ({d.explained:.0%} of the mean square beyond it is explained). "
+    )
+
+
+def certainty(diagnosis: Diagnosis) -> str:
+    """How sure the verdict is: as sure as its weakest step."""
+    d, weakest = diagnosis, weakest_step(diagnosis)
+    judged = f"on {d.target.part}s held out of the fit"
+    if d.verdict is Verdict.NOT_FITTED:
+        return "Nothing can be said before the base model is fitted."
+    if d.verdict is Verdict.EXPLAINED:
+        return f"No effect lowers the error {judged} by more than chance. Effects that leave no trace are not excluded."
+    if d.verdict is Verdict.UNKNOWN:
+        return f"Sure that something is missing: the error {judged} is far beyond the noise. What it is, is not known."
+    if weakest is None:
+        return f"Judged by a fit of all other {d.target.part}s." if d.odd else "Counted, not fitted: it is certain."
+    name, p = weakest.effects[0], weakest.candidates[0].p_family
+    several = len(kept_steps(d.steps)) > 1
+    if len(weakest.effects) > 1:
+        step = "Its weakest step decides: " if several else ""
+        return f"{step}Something is missing, but {listed(weakest.effects, 'and')} explain these data alike."
+    noise = f"noise alone does as well with a probability of {p:.2g} at most, whichever effect is tried"
+    clear = f"Clear {judged}: no other effect comes near, and {noise}."
+    if several:
+        clear = f"Clear {judged}, {name} (the weakest) included: no other effect comes near, and {noise}."
+    return f"{clear} But not all is found." if is_not_all(d) else clear
+
+
+def weakest_step(diagnosis: Diagnosis) -> Step | None:
+    """The step on which the verdict rests least firmly; None if none was fitted."""
+    fitted = [step for step in kept_steps(diagnosis.steps) if step.candidates]
+    return max(fitted, key=lambda s: (len(s.effects) > 1, s.candidates[0].p_family, _lead(s)), default=None)
+
+
+def _lead(step: Step) -> float:
+    """What the best effect that was not found gains, of what the one that was found gains."""
+    other = _best_other(step)
+    return other.heldout_gain / max(step.candidates[0].heldout_gain, 1e-9) if other else -np.inf
+
+
+def _best_other(step: Step) -> Candidate | None:
+    others = [c for c in step.candidates if c.effect.name not in step.effects]
+    return max(others, key=lambda c: c.heldout_gain, default=None)
+
+
+def runner_up(diagnosis: Diagnosis) -> str:
+    """What came next to the weakest of the effects that were found, in words; empty if nothing was found."""
+    step = weakest_step(diagnosis)
+    if step is None:
+        return ""
+    first, *rivals = step.candidates[: len(step.effects)]
+    if rivals:
+        left = [f"{c.effect.name} leaves {c.error_after:.2f} × noise" for c in rivals]
+        return f"{listed(left)}, {first.effect.name} {first.error_after:.2f}."
+    other = _best_other(step)
+    if other is None or other.heldout_gain <= 0:
+        return f"None: no other effect explains anything of what {first.effect.name} does."
+    return (
+        f"{other.effect.name}, which leaves {other.error_after:.2f} × noise where {first.effect.name} leaves"
+        f" {first.error_after:.2f} (held-out gain {other.heldout_gain:+.0f} beside {first.heldout_gain:+.0f})."
     )
 
 

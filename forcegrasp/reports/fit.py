@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,13 +17,15 @@ from forcegrasp.effects import Effect
 from forcegrasp.identify.base_fit import BaseFit, rms_error
 from forcegrasp.identify.cross_validation import heldout_residual, make_folds, rms
 from forcegrasp.identify.fit import Fit
-from forcegrasp.identify.intervals import reached_bound
+from forcegrasp.identify.intervals import listed, reached_bound
 from forcegrasp.identify.target import Target
 from forcegrasp.models.model_file import Fitted, Model
 from forcegrasp.physics.sensors import is_rounding
 from forcegrasp.reports import figures
 from forcegrasp.reports.comparison import amount, noise_sentence, value_text, words
-from forcegrasp.reports.html import Picture, Section, Table, Text
+from forcegrasp.reports.html import Answer, Command, Picture, Section, Table, Text
+from forcegrasp.reports.symptom import symptom_of
+from forcegrasp.reports.view import view_section
 
 #: What to do about a fit that did not converge.
 ADVICE = (
@@ -146,6 +148,11 @@ def fit_answer(base: BaseFit, target: Target) -> str:
     return f"The base model is NOT fitted: {base.reason}. What was reached: {errors}. To do: {ADVICE}."
 
 
+def model_box(what: str, model: Model, commands: Sequence[Command]) -> Answer:
+    """The answer about a fitted model as a box: what, what to bear in mind, and what to do next."""
+    return Answer(what, [("To bear in mind", f"{warning}.") for warning in model.warnings], commands=commands)
+
+
 def fit_sections(base: BaseFit, target: Target, model: Model) -> list[Section]:
     """What the answer rests on."""
     starts = [(str(k), f"{error:.3f}") for k, error in enumerate(base.errors, 1)]
@@ -165,8 +172,10 @@ def fit_sections(base: BaseFit, target: Target, model: Model) -> list[Section]:
         figures.overlay(target, worst, base.fit.predicted[worst]),
         f"{target.part.capitalize()} {grasp.label}, the worst: error {errors[worst]:.2f} × noise. Dots are measured,"
         " lines are the model's.",
+        in_view=True,
     )
-    return [parameters_section(model), Section("Starts", gate), Section(f"The worst {target.part}", [picture])]
+    view = view_section(target, {"model": base.fit.predicted})
+    return [view, parameters_section(model), Section("Starts", gate), Section(f"The worst {target.part}", [picture])]
 
 
 # --- add ---------------------------------------------------------------------------------------------------------
@@ -223,12 +232,15 @@ def add_sections(added: Added, effect: type[Effect]) -> list[Section]:
     rows.append(("all", added.error_before, added.error_after))
     fall = Picture(figures.falls(rows), "Errors on grasps held out of the fit, without and with the effect.")
     if is_rounding(effect):
-        seen = steps_picture(added.target)
+        seen, told = steps_picture(added.target), rounding_words(added.target)
     else:
         seen = symptom_picture(added.target, added.before, added.after, effect)
+        told = symptom_of(added.target, added.before, added.after).sentence()
+    models = {"base model": added.before.predicted, f"model with {effect.name}": added.after.predicted}
     return [
+        view_section(added.target, models),
         Section("Before and after", [fall, Text(f"S{noise_sentence(added.target)[1:]}.")]),
-        Section(f"What {effect.name} looks like here", [Text(f"Symptom: {effect.symptom}."), seen]),
+        Section(f"What {effect.name} looks like here", [Text(f"{told[0].upper()}{told[1:]}."), seen]),
         parameters_section(added.model),
     ]
 
@@ -245,6 +257,17 @@ def symptom_picture(target: Target, before: Fit, after: Fit, effect: type[Effect
         f" error {errors[0]:.2f} × noise without it, {errors[1]:.2f} × with it. Below: measured − model ÷ noise, band"
         " ± 2.",
     )
+
+
+def rounding_words(target: Target) -> str:
+    """The steps that readings come in."""
+    axis = target.axis
+    steps = [
+        f"{kind}s are multiples of {amount(float(target.quantum[part.start]), axis.units[part.start])}"
+        for kind, part in axis.kinds.items()
+        if target.quantum[part.start]
+    ]
+    return f"readings of {listed(steps)}"
 
 
 def steps_picture(target: Target) -> Picture:

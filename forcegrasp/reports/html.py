@@ -1,11 +1,15 @@
-"""One HTML file that works offline: text, tables and figures, nothing loaded from anywhere."""
+"""One HTML file that works offline: the answer, text, tables, figures and a view to click in; nothing is loaded."""
 
 from __future__ import annotations
 
+import base64
+import hashlib
 import io
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from importlib.resources import files
 from pathlib import Path
+from typing import Any
 
 import jinja2
 import matplotlib as mpl
@@ -39,6 +43,14 @@ class Picture:
 
     figure: Figure
     caption: str
+    in_view: bool = False  #: whether a :class:`View` shows the same: where scripts run, the figure is hidden
+
+
+@dataclass(frozen=True)
+class View:
+    """Maps and traces to click in, drawn by ``view.js``, which says what data it reads."""
+
+    data: dict[str, Any]
 
 
 @dataclass(frozen=True)
@@ -46,16 +58,49 @@ class Section:
     """A heading and what stands under it."""
 
     title: str
-    blocks: list[Text | Table | Picture] = field(default_factory=list)
+    blocks: list[Text | Table | Picture | View] = field(default_factory=list)
+
+    @property
+    def in_view(self) -> bool:
+        """Whether nothing is in it that a view does not show."""
+        return bool(self.blocks) and all(isinstance(block, Picture) and block.in_view for block in self.blocks)
+
+    @property
+    def needs_script(self) -> bool:
+        """Whether nothing is in it without a script."""
+        return bool(self.blocks) and all(isinstance(block, View) for block in self.blocks)
 
 
-def write_report(path: str | Path, title: str, lead: str, sections: Sequence[Section], facts: dict[str, str]) -> Path:
+@dataclass(frozen=True)
+class Command:
+    """What to do next."""
+
+    purpose: str  #: such as "train with it"
+    line: str  #: to type
+
+    def __str__(self) -> str:
+        return f"{self.purpose}: {self.line}"
+
+
+@dataclass(frozen=True)
+class Answer:
+    """The box above everything else: what, how much of it, how sure, and what to do next."""
+
+    what: str
+    rows: Sequence[tuple[str, str]] = ()  #: such as "How sure" and a sentence
+    shares: Sequence[tuple[str, float]] = ()  #: parts of the error, such as "backlash 83%", drawn as one bar
+    commands: Sequence[Command] = ()  #: the next one first
+
+
+def write_report(
+    path: str | Path, title: str, lead: str | Answer, sections: Sequence[Section], facts: dict[str, str]
+) -> Path:
     """Writes a report.
 
     Args:
       path: the HTML file.
       title: what was asked.
-      lead: the answer in one or two sentences.
+      lead: the answer, or one or two sentences.
       sections: what the answer rests on.
       facts: name → value, for the last lines: set, fingerprint, versions.
 
@@ -67,8 +112,16 @@ def write_report(path: str | Path, title: str, lead: str, sections: Sequence[Sec
         loader=jinja2.PackageLoader("forcegrasp.reports", "."), autoescape=True, undefined=jinja2.StrictUndefined
     )
     environment.globals.update(svg=_svg, kind=lambda block: type(block).__name__)
+    environment.policies["json.dumps_kwargs"] = {"separators": (",", ":"), "allow_nan": False}
+    script = (files("forcegrasp.reports") / "view.js").read_text("utf-8") if any(map(_has_view, sections)) else ""
     html = environment.get_template("report.html").render(
-        title=title, lead=lead, sections=sections, facts={**facts, "forcegrasp": __version__}
+        title=title,
+        answer=Answer(lead) if isinstance(lead, str) else lead,
+        sections=sections,
+        facts={**facts, "forcegrasp": __version__},
+        script=Markup(script),
+        # a browser runs this script and no other, whatever a name may smuggle in
+        script_hash=base64.b64encode(hashlib.sha256(script.encode()).digest()).decode(),
     )
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -76,6 +129,10 @@ def write_report(path: str | Path, title: str, lead: str, sections: Sequence[Sec
     except OSError as error:
         raise ConfigError(f"out={path.parent}: could not write ({error.strerror})") from error
     return path
+
+
+def _has_view(section: Section) -> bool:
+    return any(isinstance(block, View) for block in section.blocks)
 
 
 _drawn = 0

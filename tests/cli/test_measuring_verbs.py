@@ -16,9 +16,9 @@ import yaml
 from rich import box
 from rich.table import Table
 
-from forcegrasp.cli.add import train_command
 from forcegrasp.cli.main import main
 from forcegrasp.cli.results import print_table
+from forcegrasp.reports.next_step import train_command
 
 # the loop takes half a minute: one worker should run it, once
 pytestmark = pytest.mark.xdist_group("measuring verbs")

@@ -1,0 +1,100 @@
+"""What to do after a verb, as commands to type."""
+
+from __future__ import annotations
+
+import shlex
+from pathlib import Path
+
+from forcegrasp.assets import DEFAULT_GRIPPER
+from forcegrasp.diagnosis.advice import Advice
+from forcegrasp.diagnosis.result import Diagnosis, kept_steps
+from forcegrasp.effects.for_gripper import effect_of
+from forcegrasp.identify.comparison import Comparison
+from forcegrasp.identify.intervals import listed
+from forcegrasp.identify.verdict import Verdict
+from forcegrasp.physics.gripper import Gripper
+from forcegrasp.reports.comparison import at_floor
+from forcegrasp.reports.diagnosis_words import is_not_all
+from forcegrasp.reports.html import Command
+
+
+def train_command(model: str | Path, gripper: str) -> str:
+    """What to type to train with a model of this gripper."""
+    return _line("train", f"model={model}", *([] if gripper == DEFAULT_GRIPPER else [f"gripper={gripper}"]))
+
+
+def after_diagnosis(
+    diagnosis: Diagnosis, advice: Advice | None, data: str | Path, known: str | Path, found: str | Path
+) -> list[Command]:
+    """What to do after a diagnosis, the best first.
+
+    Args:
+      diagnosis: what was found.
+      advice: the next grasp, if there is one that tells rivals apart.
+      data: the set.
+      known: file of the model that was diagnosed.
+      found: file of the model with the effects that were found.
+    """
+    d, again = diagnosis, _line("diagnose", f"data={data}")
+    gripper, compared = d.target.gripper, _line("compare", f"data={data}", f"model={known}")
+    if d.verdict is Verdict.NOT_FITTED:
+        return [Command("look for what went wrong in single recordings" if gripper.is_servo
+                        else "look for grasps that went wrong", _line("compare", f"data={data}"))]  # fmt: skip
+    if d.verdict is Verdict.DATA:
+        return [Command("put the set right, and diagnose again", again)]
+    if d.verdict is Verdict.UNKNOWN:
+        return [Command("look at where the model fails", compared)]
+    if d.verdict is Verdict.EXPLAINED:
+        noise = [Command("give the noise as it is, and diagnose again", again)] if d.noise is not None else []
+        return [*noise, _use("the model", known, data, gripper)]
+    first = next(iter(d.shares()), d.effects[0])  # rounding is in the noise already
+    added = Command(
+        f"add {first} alone" if len(d.shares()) > 1 else "add it",
+        _line("add", f"data={data}", f"model={known}", f"effect={first}", "out=better.yaml"),
+    )
+    with_all = f"the model that has {listed(d.preferred)}"
+    if d.verdict is Verdict.ONE_OF:
+        preferred = Command(f"until then take {first}, which is preferred", added.line)
+        return [Command(_to_tell_apart(d, advice), again), preferred]
+    if is_not_all(d):
+        return [Command(f"look at what {with_all} leaves", _line("compare", f"data={data}", f"model={found}")), added]
+    return [_use(with_all, found, data, gripper), added]
+
+
+def _to_tell_apart(diagnosis: Diagnosis, advice: Advice | None) -> str:
+    if advice is not None:
+        return f"{advice.sentence().replace('record next:', 'record', 1)}. Put it into the set, and diagnose again"
+    step = next(step for step in kept_steps(diagnosis.steps) if len(step.effects) > 1)
+    rivals = [effect_of(name, diagnosis.target.gripper) for name in step.effects]
+    telling = "; ".join(f"{effect.name}: {effect.separates}" for effect in rivals)
+    return f"record what tells them apart ({telling}), and diagnose again"
+
+
+def after_comparison(comparison: Comparison, data: str | Path, model: str | Path) -> list[Command]:
+    """What to do after a comparison with this model."""
+    if at_floor(comparison.floor_ratio(), comparison.floor):
+        return [_use("the model", model, data, comparison.target.gripper)]
+    return [after_fit(data, model)]
+
+
+def after_fit(data: str | Path, model: str | Path) -> Command:
+    """What to do with a base model."""
+    return Command("find out which effect is missing", _line("diagnose", f"data={data}", f"model={model}"))
+
+
+def after_adding(data: str | Path, model: str | Path, gripper: Gripper) -> Command:
+    """What to do with a model that has one more effect."""
+    if gripper.is_servo:
+        return Command("see what is left", _line("compare", f"data={data}", f"model={model}"))
+    return Command("train with it", train_command(model, gripper.name_or_path))
+
+
+def _use(what: str, model: str | Path, data: str | Path, gripper: Gripper) -> Command:
+    """What a model that lacks nothing is for."""
+    if gripper.is_servo:
+        return Command(f"see what {what} leaves", _line("compare", f"data={data}", f"model={model}"))
+    return Command(f"train with {what}", train_command(model, gripper.name_or_path))
+
+
+def _line(verb: str, *options: str) -> str:
+    return shlex.join(["forcegrasp", verb, *options])

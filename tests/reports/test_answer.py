@@ -1,0 +1,158 @@
+"""The box of a report: what, how much of it, how sure, the runner-up, what is left, and the next command."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+import yaml
+
+from forcegrasp.diagnosis.result import Diagnosis
+from forcegrasp.identify.fitted_model import model_of
+from forcegrasp.identify.verdict import Verdict
+from forcegrasp.models.model_file import write_model
+from forcegrasp.reports import comparison as comparison_report
+from forcegrasp.reports import diagnosis as diagnosis_report
+from forcegrasp.reports.diagnosis_words import percent, place_of_rest, shares_sentence, weakest_step
+from forcegrasp.reports.html import Answer
+from forcegrasp.reports.next_step import after_comparison, after_diagnosis
+from forcegrasp.reports.symptom import symptom_of
+
+
+def two_effects(made_up, **changed) -> Diagnosis:
+    """Two steps; the second leaves 2 % of the mean square beyond the noise."""
+    one = made_up.diagnosis("effect")
+    (first,) = one.steps
+    other = dataclasses.replace(first.candidates[1], p_family=0.008)
+    steps = (
+        dataclasses.replace(first, error_before=5.0, error_after=2.2),
+        dataclasses.replace(first, effects=("force_drift",), candidates=(other,), error_before=2.2, error_after=1.22),
+    )
+    return dataclasses.replace(
+        one, effects=("force_bias", "force_drift"), steps=steps, error_before=5.0, error_after=1.22, **changed
+    )
+
+
+def box(diagnosis: Diagnosis, advice=None) -> Answer:
+    commands = after_diagnosis(diagnosis, advice, "my set", "out/base_model.yaml", "out/model.yaml")
+    return diagnosis_report.answer_box(diagnosis, advice, commands, "Only some were tried.")
+
+
+def test_the_headline_says_how_much_each_effect_explains(made_up):
+    diagnosis = two_effects(made_up, left="in all")
+    told = shares_sentence(diagnosis)
+    assert told.startswith(
+        "Of the error beyond the noise (mean square) force_bias explains 84%, force_drift 14%; 2% is left, "
+    )
+    assert told in diagnosis_report.answer(diagnosis)
+    found = diagnosis_report.diagnosis_json(diagnosis, None, made_up.tried, "s")
+    assert found["answer"] == diagnosis_report.answer(diagnosis)
+    assert found["left_share"] + sum(found["shares"].values()) == pytest.approx(1)
+    assert [name for name, _ in box(diagnosis).shares] == ["force_bias 84%", "force_drift 14%", "left 2%"]
+
+
+def test_what_is_no_more_than_noise_is_not_given_a_place(made_up):
+    assert shares_sentence(made_up.diagnosis("effect")).endswith("; no more than noise is left.")
+    assert shares_sentence(made_up.diagnosis("explained")) == ""
+
+
+def test_the_rest_is_in_the_phase_that_has_most_of_it(made_up):
+    assert place_of_rest(made_up.diagnosis("unknown")) == "in hold"
+
+
+@pytest.mark.parametrize(
+    ("share", "told"), [(0.0, "0%"), (0.001, "under 1%"), (0.83, "83%"), (0.997, "over 99%"), (1.0, "100%")]
+)
+def test_nearly_nothing_is_not_nothing(share, told):
+    assert percent(share) == told
+
+
+def test_an_answer_is_as_sure_as_its_weakest_step(made_up):
+    diagnosis = two_effects(made_up)
+    assert weakest_step(diagnosis) is diagnosis.steps[1]
+    rows = dict(box(diagnosis).rows)
+    assert "force_drift (the weakest) included" in rows["How sure"]
+    assert "probability of 0.008 at most" in rows["How sure"]
+    assert "not all" not in rows["How sure"]
+    assert dict(box(two_effects(made_up, left="in all", floor=0.5)).rows)["How sure"].endswith("But not all is found.")
+    tie = dict(box(made_up.diagnosis("one_of"), made_up.advice).rows)
+    assert tie["How sure"] == "Something is missing, but force_bias and force_drift explain these data alike."
+    assert tie["Runner-up"] == "force_drift leaves 1.28 × noise, force_bias 1.00."
+
+
+@pytest.mark.parametrize(
+    ("verdict", "next_one", "purpose"),
+    [
+        ("effect", "forcegrasp train model=out/model.yaml", "the model that has force_bias"),
+        (
+            "one_of",
+            "forcegrasp diagnose 'data=my set'",
+            "record slow ramp (on thing 0); there force_bias and force_drift",
+        ),
+        ("explained", "forcegrasp train model=out/base_model.yaml", "the model"),
+        ("unknown", "forcegrasp compare 'data=my set' model=out/base_model.yaml", "where the model fails"),
+        ("not_fitted", "forcegrasp compare 'data=my set'", "grasps that went wrong"),
+    ],
+)
+def test_each_verdict_has_a_next_command(made_up, verdict, next_one, purpose):
+    answer = box(made_up.diagnosis(verdict), made_up.advice if verdict == "one_of" else None)
+    first, *others = answer.commands
+    assert first.line == next_one
+    assert purpose in first.purpose
+    names = verdict in ("effect", "one_of")
+    assert [c.line.split()[1] for c in others] == ["add"] * names
+    assert bool(answer.shares) == names
+    told = dict(answer.rows)
+    assert {"How sure", "Note"} <= set(told)
+    assert ("Runner-up" in told, "Explains" in told) == (names, names)
+    assert ("What is left" in told) == (names or verdict == "unknown")
+
+
+def test_what_leaves_much_is_looked_at_before_it_is_used(made_up):
+    first = box(two_effects(made_up, left="in all", floor=0.5)).commands[0]
+    assert first.line == "forcegrasp compare 'data=my set' model=out/model.yaml"
+    labels = dataclasses.replace(made_up.diagnosis("effect"), verdict=Verdict.DATA)
+    assert box(labels).commands[0].purpose == "put the set right, and diagnose again"
+
+
+def test_a_comparison_says_where_and_what_to_do(made_up):
+    commands = after_comparison(made_up.comparison, "s", "m.yaml")
+    answer = comparison_report.answer_box(made_up.comparison, ["a note"], commands)
+    assert answer.what == comparison_report.answer(made_up.comparison)
+    assert [c.line for c in answer.commands] == ["forcegrasp diagnose data=s model=m.yaml"]
+    told = dict(answer.rows)
+    assert told["Worst grasps"].startswith("g3 on thing 1")
+    assert told["To bear in mind"] == "a note."
+    calm = np.random.default_rng(3).standard_normal(made_up.comparison.residual.shape)
+    fine = dataclasses.replace(made_up.comparison, residual=calm, heldout=calm)
+    assert [c.line for c in after_comparison(fine, "s", "m.yaml")] == ["forcegrasp train model=m.yaml"]
+
+
+def test_a_symptom_is_of_these_data(made_up):
+    target, before, after = made_up.target, made_up.added.before, made_up.added.after
+    symptom = symptom_of(target, before, after)
+    assert (symptom.before.signal, symptom.before.phase, symptom.part) == ("force_l", "hold", "grasp g3 on thing 1")
+    assert symptom.before.ratio > 5 > 1.2 > symptom.after.ratio
+    assert symptom.sentence().endswith("There it is measured 73.2 mN above the model on average")
+    # an error of another sign while opening than while closing
+    flipped = np.array([np.gradient(g.position_m[:, 0], g.time_s) for g in target.grasps])
+    residual = after.residual.copy()
+    residual[..., 0] -= 8 * np.sign(np.round(flipped, 3))
+    told = symptom_of(target, dataclasses.replace(before, residual=residual), after).sentence()
+    assert "flips with the direction: position left is measured" in told
+    assert "above the model while it closes" in told
+    assert "below while it opens" in told
+
+
+def test_a_value_has_one_interval_wherever_it_stands(made_up, tmp_path):
+    diagnosis = made_up.diagnosis("effect")
+    write_model(model_of(diagnosis.fit, diagnosis.target, made_up.loaded, diagnosis.numerical), tmp_path / "m.yaml")
+    written = yaml.safe_load((tmp_path / "m.yaml").read_text())["effects"]["force_bias"]["left_n"]
+    found = diagnosis_report.diagnosis_json(diagnosis, None, made_up.tried, "s")["parameters"]["force_bias"]["left_n"]
+    assert found == pytest.approx(written)
+    line = next(text for text in diagnosis_report.lines(diagnosis, None) if text.startswith("  left_n"))
+    interval = f"{written['low']:.4g} to {written['high']:.4g}"
+    assert line == f"  left_n {written['value']:.4g} N (95 %: {interval})"
+    table = next(b for b in diagnosis_report.sections(diagnosis, None, made_up.tried)[1].blocks if hasattr(b, "header"))
+    assert list(table.rows[0]) == ["left_n", f"{written['value']:.4g}", interval, "N"]
