@@ -155,8 +155,7 @@ def answer(comparison: Comparison) -> str:
 
 def answer_box(comparison: Comparison, notes: Sequence[str], commands: Sequence[Command]) -> Answer:
     """The answer as a box: how large the error is, where, how sure that is, and what to do next."""
-    rows = [(name, text) for name, text in _rows(comparison) if name != "by recording, each held out"]
-    rows += [("to bear in mind", note) for note in notes]
+    rows = [*_rows(comparison), *(("to bear in mind", note) for note in notes)]
     told = [(f"{name[0].upper()}{name[1:]}", f"{text}.") for name, text in rows]
     return Answer(answer(comparison), told, commands=commands)
 
@@ -237,7 +236,7 @@ def grid_picture(comparison: Comparison, model: str = "the model") -> Picture:
         figures.heat_map(grid, rows, comparison.target.phases),
         f"Error of {model} ÷ sensor noise, of each {row} (rows) in each phase, all signals together. 1 is the noise."
         + (" The worst forty are shown." if len(rows) > 40 else ""),
-        in_view=True,
+        in_view=not comparison.target.recordings,
     )
 
 

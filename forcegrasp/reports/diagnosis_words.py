@@ -134,27 +134,33 @@ def certainty(diagnosis: Diagnosis) -> str:
         step = "Its weakest step decides: " if several else ""
         return f"{step}Something is missing, but {listed(weakest.effects, 'and')} explain these data alike."
     noise = f"noise alone does as well with a probability of {p:.2g} at most, whichever effect is tried"
-    clear = f"Clear {judged}: no other effect comes near, and {noise}."
-    if several:
-        clear = f"Clear {judged}, {name} (the weakest) included: no other effect comes near, and {noise}."
+    which = f"{name}, the weakest, is clear" if several else "Clear"
+    others = "no effect but those that contain it does" if _containing(weakest) else "no other effect does"
+    clear = f"{which} {judged}: {others} as well, and {noise}."
     return f"{clear} But not all is found." if is_not_all(d) else clear
 
 
 def weakest_step(diagnosis: Diagnosis) -> Step | None:
     """The step on which the verdict rests least firmly; None if none was fitted."""
     fitted = [step for step in kept_steps(diagnosis.steps) if step.candidates]
-    return max(fitted, key=lambda s: (len(s.effects) > 1, s.candidates[0].p_family, _lead(s)), default=None)
+    return max(fitted, key=lambda s: (len(s.effects) > 1, s.candidates[0].p_family, *_leads(s)), default=None)
 
 
-def _lead(step: Step) -> float:
-    """What the best effect that was not found gains, of what the one that was found gains."""
-    other = _best_other(step)
-    return other.heldout_gain / max(step.candidates[0].heldout_gain, 1e-9) if other else -np.inf
+def _leads(step: Step) -> tuple[float, float]:
+    """What the best effect that was not found gains, of what the one that was found gains; and how little that is."""
+    other, gain = _best_other(step), step.candidates[0].heldout_gain
+    return max(0.0, other.heldout_gain) / max(gain, 1e-9) if other else 0.0, -gain
 
 
 def _best_other(step: Step) -> Candidate | None:
-    others = [c for c in step.candidates if c.effect.name not in step.effects]
+    """The best of the effects that were not found; not of those that contain what was found, and fit as well."""
+    others = [c for c in step.candidates if c.effect.name not in step.effects and c not in _containing(step)]
     return max(others, key=lambda c: c.heldout_gain, default=None)
+
+
+def _containing(step: Step) -> list[Candidate]:
+    """Candidates that contain the effect that was found."""
+    return [c for c in step.candidates if step.effects[0] in {nested.effect for nested in c.effect.contains}]
 
 
 def runner_up(diagnosis: Diagnosis) -> str:
@@ -166,12 +172,14 @@ def runner_up(diagnosis: Diagnosis) -> str:
     if rivals:
         left = [f"{c.effect.name} leaves {c.error_after:.2f} × noise" for c in rivals]
         return f"{listed(left)}, {first.effect.name} {first.error_after:.2f}."
-    other = _best_other(step)
+    other, richer = _best_other(step), [c.effect.name for c in _containing(step)]
+    contains = f" {listed(richer)} would add little to {first.effect.name}, contained in it." if richer else ""
     if other is None or other.heldout_gain <= 0:
-        return f"None: no other effect explains anything of what {first.effect.name} does."
+        return f"None: no other effect explains any of what {first.effect.name} does.{contains}"
+    gains = f"held-out gain {other.heldout_gain:+.0f} beside {first.heldout_gain:+.0f}"
     return (
         f"{other.effect.name}, which leaves {other.error_after:.2f} × noise where {first.effect.name} leaves"
-        f" {first.error_after:.2f} (held-out gain {other.heldout_gain:+.0f} beside {first.heldout_gain:+.0f})."
+        f" {first.error_after:.2f} ({gains}).{contains}"
     )
 
 

@@ -247,8 +247,8 @@ def add_sections(added: Added, effect: type[Effect]) -> list[Section]:
 
 def symptom_picture(target: Target, before: Fit, after: Fit, effect: type[Effect]) -> Picture:
     """The grasp and signal on which an effect lowers the error most, without and with it."""
-    fall = np.sum(before.residual**2 - after.residual**2, axis=1)
-    index, signal = (int(i) for i in np.unravel_index(np.argmax(fall), fall.shape))
+    seen = symptom_of(target, before, after)
+    index, signal = seen.index, seen.channel
     grasp, count = target.grasps[index], target.mask[index].sum()
     errors = [np.sqrt(np.sum(fit.residual[index, :, signal] ** 2) / count) for fit in (before, after)]
     return Picture(

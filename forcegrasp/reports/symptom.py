@@ -22,6 +22,8 @@ class Symptom:
 
     before: Cell
     after: Cell
+    index: int  #: of the grasp, or window
+    channel: int  #: of the signal
     part: str  #: the grasp, or window, such as "grasp g3 on foam"
     goes_with: str  #: how the error without the effect varies, as a sentence; may be empty
 
@@ -45,16 +47,14 @@ def symptom_of(target: Target, before: Fit, after: Fit) -> Symptom:
     ]
     _, k, phase = max(cells)
     inside = target.phase == phase
-    part = target.grasps[int(np.argmax(np.sum(np.where(inside, falls[..., k], 0.0), axis=1)))]
+    index = int(np.argmax(np.sum(np.where(inside, falls[..., k], 0.0), axis=1)))
+    name = (target.axis.names[k], target.phases[phase])
     there = [
-        next(c for c in _as_comparison(target, fit).cells() if (c.signal, c.phase) == _named(target, k, phase))
+        next(cell for cell in _as_comparison(target, fit).cells() if (cell.signal, cell.phase) == name)
         for fit in (before, after)
     ]
-    return Symptom(there[0], there[1], f"{target.part} {part.label}", _goes_with(target, before, k, phase))
-
-
-def _named(target: Target, k: int, phase: int) -> tuple[str, str]:
-    return target.axis.names[k], target.phases[phase]
+    part = f"{target.part} {target.grasps[index].label}"
+    return Symptom(there[0], there[1], index, k, part, _goes_with(target, before, k, phase))
 
 
 def _as_comparison(target: Target, fit: Fit) -> Comparison:

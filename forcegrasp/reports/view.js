@@ -103,7 +103,7 @@ function showView(place, data) {
       const strength = Math.log(Math.max(1, value)) / top;
       const made = node("button", { type: "button", textContent: value < 100 ? value.toFixed(1) : value.toFixed(0), ariaPressed: pressed, onclick: click });
       made.style.background = `rgba(226, 110, 20, ${0.06 + 0.9 * strength})`;
-      if (strength > 0.45) made.style.color = "#000";
+      made.style.color = `light-dark(#000, ${strength > 0.7 ? "#000" : "#fff"})`;
       made.dataset.at = where;
       return node("td", {}, [made]);
     };

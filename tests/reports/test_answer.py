@@ -9,6 +9,8 @@ import pytest
 import yaml
 
 from forcegrasp.diagnosis.result import Diagnosis
+from forcegrasp.effects import get_effect
+from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.identify.fitted_model import model_of
 from forcegrasp.identify.verdict import Verdict
 from forcegrasp.models.model_file import write_model
@@ -72,13 +74,29 @@ def test_an_answer_is_as_sure_as_its_weakest_step(made_up):
     diagnosis = two_effects(made_up)
     assert weakest_step(diagnosis) is diagnosis.steps[1]
     rows = dict(box(diagnosis).rows)
-    assert "force_drift (the weakest) included" in rows["How sure"]
+    assert rows["How sure"].startswith(
+        "force_drift, the weakest, is clear on grasps held out of the fit: no other effect"
+    )
     assert "probability of 0.008 at most" in rows["How sure"]
     assert "not all" not in rows["How sure"]
     assert dict(box(two_effects(made_up, left="in all", floor=0.5)).rows)["How sure"].endswith("But not all is found.")
     tie = dict(box(made_up.diagnosis("one_of"), made_up.advice).rows)
     assert tie["How sure"] == "Something is missing, but force_bias and force_drift explain these data alike."
     assert tie["Runner-up"] == "force_drift leaves 1.28 × noise, force_bias 1.00."
+
+
+def test_an_effect_that_contains_what_was_found_is_no_runner_up(made_up):
+    one = made_up.diagnosis("effect")
+    best, other = one.steps[0].candidates
+    found = [
+        dataclasses.replace(c, setting=EffectSetting.typical(get_effect(name)), gains=np.full(8, gain))
+        for c, name, gain in ((best, "coulomb_friction", 90.0), (best, "stiction", 91.0), (other, "backlash", 20.0))
+    ]
+    steps = (dataclasses.replace(one.steps[0], effects=("coulomb_friction",), candidates=tuple(found)),)
+    rows = dict(box(dataclasses.replace(one, effects=("coulomb_friction",), steps=steps)).rows)
+    assert "no effect but those that contain it does as well" in rows["How sure"]
+    assert rows["Runner-up"].startswith("backlash, which leaves 1.28 × noise where coulomb_friction leaves 1.00")
+    assert rows["Runner-up"].endswith("stiction would add little to coulomb_friction, contained in it.")
 
 
 @pytest.mark.parametrize(
