@@ -6,15 +6,19 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from forcegrasp.diagnosis.doubt import leaves_less, more_likely, with_fault
+from forcegrasp.diagnosis.faults import suspects
 from forcegrasp.diagnosis.result import Diagnosis
 from forcegrasp.diagnosis.search import diagnose
 from forcegrasp.effects import Effect
 from forcegrasp.effects.for_gripper import effect_of, effects_of
 from forcegrasp.errors import MeasurementError
 from forcegrasp.identify import fit_set
+from forcegrasp.identify.base_fit import BaseFit
 from forcegrasp.identify.fit import Simulators
 from forcegrasp.identify.loading import Loaded
 from forcegrasp.identify.progress import Progress
+from forcegrasp.identify.target import Target
 from forcegrasp.measure import MeasurementSet
 from forcegrasp.models.model_file import Model
 from forcegrasp.physics.gripper import Gripper
@@ -30,7 +34,7 @@ def diagnose_set(
     seed: int,
     progress: Progress,
 ) -> tuple[Diagnosis, Simulators]:
-    """Which effects are missing.
+    """Which effects are missing, or what is wrong with the set.
 
     Raises:
       MeasurementError: if there are too few grasps to hold any out.
@@ -41,13 +45,25 @@ def diagnose_set(
             f"{loaded.measured.path}: {loaded.held_out} grasps are too few for a diagnosis,"
             f" {LEAST_GRASPS} are needed; record more (forcegrasp record shows a plan)"
         )
-    if model is None:
-        target, simulators, base = fit_set.fit_model(loaded, seed, progress)
-    else:
-        target, simulators, base = fit_set.apply_model(loaded, model, progress, refit=True)
     chosen = chosen_effects(loaded.gripper, names)
-    rng = np.random.default_rng(seed + 1)
-    return diagnose(target, base, simulators, chosen, rng, progress), simulators
+
+    def fitted(one: Loaded[MeasurementSet]) -> tuple[Target, Simulators, BaseFit]:
+        if model is None:
+            return fit_set.fit_model(one, seed, progress)
+        return fit_set.apply_model(one, model, progress, refit=True)
+
+    def search(target: Target, simulators: Simulators, base: BaseFit) -> Diagnosis:
+        return diagnose(target, base, simulators, chosen, np.random.default_rng(seed + 1), progress)
+
+    said = fitted(loaded)
+    for fault in suspects(loaded, said[0], said[2].fit):
+        progress(f"fitting the set with {fault.name} put right")
+        right = fitted(fault.put_right)
+        if leaves_less(fault, (right[0], right[2].fit), (said[0], said[2].fit)):
+            found = with_fault(search(*right), fault, (said[0], said[2].fit))
+            certain = not found.left and not fault.expected  # else an effect may do as well
+            return (found if certain else more_likely(found, search(*said))), right[1]
+    return search(*said), said[1]
 
 
 def chosen_effects(gripper: Gripper, names: Sequence[str]) -> list[type[Effect]]:

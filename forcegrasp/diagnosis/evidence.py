@@ -16,15 +16,15 @@ LEAST_SHARE = 0.25
 _PARALLEL = 0.995
 # An effect with fewer parameters that gains this share of what the best one gains can't be ruled out.
 _NEARLY = 0.95
-# Between an effect and a fault of the set a lead below this decides nothing: to take one for the other costs most.
-_LEAST_LEAD = 10.0
+#: Between an effect and a fault of the set a lead below this decides nothing: to take one for the other costs most.
+LEAST_LEAD = 10.0
 
 
 def is_significant(candidate: Candidate, least_gain: float) -> bool:
     """Whether noise would hardly do as well: ``least_gain`` is the share by which some signal's error must fall."""
     return (
         candidate.p_family <= ALARM
-        and _is_beyond_chance(candidate.gains, 5.0)
+        and is_beyond_chance(candidate.gains, 5.0)
         and candidate.largest_fall >= least_gain
         and candidate.share >= LEAST_SHARE
     )
@@ -35,7 +35,7 @@ def indistinguishable(winner: Candidate, other: Candidate) -> bool:
     parallel = abs(float(winner.signature @ other.signature))
     simpler = len(other.effect.parameters) < len(winner.effect.parameters)
     nearly = simpler and other.heldout_gain > _NEARLY * winner.heldout_gain
-    least = _LEAST_LEAD if winner.effect.of_set != other.effect.of_set else 0.0
+    least = LEAST_LEAD if winner.effect.of_set != other.effect.of_set else 0.0
     return other.heldout_gain > 0 and (not _leads(winner, other, least) or parallel > _PARALLEL or nearly)
 
 
@@ -53,10 +53,10 @@ def add_nothing(candidates: Sequence[Candidate]) -> set[str]:
 
 def _leads(winner: Candidate, other: Candidate, least: float = 0.0) -> bool:
     """Whether the difference of what two effects gain is beyond its standard error, and beyond ``least``."""
-    return _is_beyond_chance(winner.gains - other.gains, least)
+    return is_beyond_chance(winner.gains - other.gains, least)
 
 
-def _is_beyond_chance(gains: np.ndarray, least: float) -> bool:
+def is_beyond_chance(gains: np.ndarray, least: float) -> bool:
     """Whether the sum of what grasps gain, ``(G,)``, is beyond its standard error, and beyond ``least``."""
     gains = gains[np.isfinite(gains)]
     error = gains.std(ddof=1) * np.sqrt(len(gains)) if len(gains) > 1 else np.inf

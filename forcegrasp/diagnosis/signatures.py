@@ -147,14 +147,24 @@ def _weighted(changes: np.ndarray, fit: Fit) -> np.ndarray:
     return changes * np.broadcast_to(fit.weight, fit.residual.shape).reshape(-1, 1)
 
 
-def null_gains(scores: list[list[Score]], rng: np.random.Generator, draws: int = 400) -> np.ndarray:
+def null_gains(
+    scores: list[list[Score]], rng: np.random.Generator, draws: int = 400, noise: np.ndarray | None = None
+) -> np.ndarray:
     """Largest gain of any signature when nothing but sensor noise is left, ``(draws,)``.
 
     The base fit is simulated again with new noise; what it would absorb is already out of the signatures.
+
+    Args:
+      scores: the signatures of each effect and variant.
+      rng: draws the noise.
+      draws: how often.
+      noise: what it is ÷ what was assumed, of each signal, ``(C,)``; as assumed by default.
     """
     if not scores:
         return np.zeros(draws)
     signatures = np.stack([s.signature for group in scores for s in group], axis=1).astype(np.float32)
+    if noise is not None:  # a signature adds up many readings: of heavy tails nothing is left but their variance
+        signatures *= np.tile(noise, len(signatures) // len(noise))[:, None].astype(np.float32)
     gains = np.empty(draws)
     for low in range(0, draws, 50):
         count = min(50, draws - low)

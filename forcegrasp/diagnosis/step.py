@@ -8,6 +8,7 @@ import numpy as np
 
 from forcegrasp.diagnosis import families
 from forcegrasp.diagnosis.evidence import ALARM, LEAST_SHARE, add_nothing, indistinguishable, is_significant
+from forcegrasp.diagnosis.noise_check import unexpected_noise
 from forcegrasp.diagnosis.other_starts import other_starts
 from forcegrasp.diagnosis.refine import refine
 from forcegrasp.diagnosis.result import Candidate, Step
@@ -59,7 +60,7 @@ def look_further(
     new = signatures.missing(effects)
     signatures.simulate(fit, new)
     groups = signatures.scores(fit, start.background, effects)
-    null = null_gains(groups, rng)
+    null = null_gains(groups, rng, noise=start.noise)
     threshold = start.refit_threshold(groups, null)
     stale = {g[0].setting.effect for g in groups if g[0].gain > _RESIMULATE_RATIO * threshold} - set(new)
     if stale:
@@ -100,6 +101,9 @@ class _Start:
         self.background = Background(fit, study.numerical)
         self.held = study.heldout(fit)  #: residuals of held-out grasps, ``(G, S, C)``
         self.error = rms(self.held, study.target)
+        noise = unexpected_noise(self.held, study.numerical, study.target, fit.predicted)
+        #: noise of each signal ÷ what was assumed, ``(C,)``; None if that may be what it is
+        self.noise = None if noise is None else np.maximum(noise.ratio, 1.0)
 
     def refit_threshold(self, groups: Sequence[Sequence[Score]], null: np.ndarray) -> float:
         """What a signature must gain for its effect to be worth a fit."""

@@ -10,6 +10,7 @@ from typing import Generic, TypeVar
 from forcegrasp.identify.sensor_noise import check_given_noise
 from forcegrasp.identify.windows import cut
 from forcegrasp.measure import FinalForceTable, MeasurementSet, check_servo, check_set, check_table, read_set
+from forcegrasp.measure.check_givens import check_givens
 from forcegrasp.models.model_file import Model
 from forcegrasp.physics.gripper import SKEW, Gripper
 from forcegrasp.physics.gripper_file import load_gripper
@@ -55,6 +56,7 @@ def load(path: str | Path) -> Loaded[MeasurementSet] | Loaded[FinalForceTable]:
         )
     half_opening_m = float(gripper.opening.opening_m[-1]) / 2
     warnings = check_set(measured, gripper.stroke, half_opening_m=half_opening_m, pads_at=gripper.pads_at)
+    warnings += check_givens(measured, gripper.period_s)
     return Loaded(measured, gripper, warnings + check_given_noise(measured, gripper.unit))
 
 

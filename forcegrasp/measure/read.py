@@ -18,6 +18,8 @@ from forcegrasp.measure.samples import check_samples
 from forcegrasp.measure.schema import (
     FORMAT,
     OBJECT,
+    OFFSET_STD_M,
+    RADIUS_STD_M,
     Columns,
     FinalForceTable,
     MeasuredGrasp,
@@ -41,6 +43,8 @@ class Meta(TextRecord):
     license: Text = Field(default="", description="on what terms they may be used")
     position_std_m: Positive | None = Field(default=None, description="noise of the positions, m or rad")
     force_std_n: Positive | None = Field(default=None, description="noise of the forces, N")
+    object_radius_std_m: Positive = Field(default=RADIUS_STD_M, description="standard deviation of the radii, m")
+    object_offset_std_m: Positive = Field(default=OFFSET_STD_M, description="that of the objects' places, m")
 
 
 _GRASPS = FileColumns(
@@ -81,6 +85,9 @@ def _read_table(folder: Path, meta: Meta, facts: dict[str, Any]) -> FinalForceTa
     if meta.position_std_m is not None:
         problem = "a table of final forces has no positions; remove it"
         raise refusal(show(folder / "meta.yaml"), "position_std_m", problem, MeasurementError)
+    for key in sorted(meta.model_fields_set & {"object_radius_std_m", "object_offset_std_m"}):
+        problem = "a table of final forces has no radii or places; remove it"
+        raise refusal(show(folder / "meta.yaml"), key, problem, MeasurementError)
     _refuse_files(folder, "final_force", ("grasps.csv", "samples.csv", "samples.parquet"))
     rows = read_csv(find_file(folder, "table.csv"), _FINAL)
     objects = tuple(rows.frame["object"].to_list())
@@ -99,11 +106,14 @@ def _read_grasps(folder: Path, meta: Meta, facts: dict[str, Any]) -> Measurement
     _check_grasps(table)
     samples = read_samples(folder, in_samples)
     grasps = _grasps(folder, table, samples, columns)
+    tolerances = (meta.object_radius_std_m, meta.object_offset_std_m)
     return MeasurementSet(
         **facts,
         position_std_m=meta.position_std_m,
+        radius_std_m=tolerances[0],
+        offset_std_m=tolerances[1],
         grasps=grasps,
-        fingerprint=fingerprint_of_set(meta.gripper, meta.position_std_m, meta.force_std_n, grasps),
+        fingerprint=fingerprint_of_set(meta.gripper, meta.position_std_m, meta.force_std_n, grasps, tolerances),
         notes=table.notes() + samples.notes(),
     )
 

@@ -19,6 +19,9 @@ if TYPE_CHECKING:
 FORMAT = "forcegrasp-measurements/1"
 SPLITS = ("fit", "check")
 OBJECT = "o_y_m"
+#: Standard deviations of radii and places of objects where a set gives none: a calliper's on something not quite round,
+#: and a mark's on the table.
+RADIUS_STD_M, OFFSET_STD_M = 5e-5, 5e-4
 #: Of servos: whether the motor is switched on (1 or 0), and a force or torque from outside, N or N·m.
 ENABLED, LOAD = "enabled", "load"
 _SIDES = {"l": "left", "r": "right"}
@@ -122,6 +125,8 @@ class MeasurementSet(ShortRepr):
     grasps: tuple[MeasuredGrasp, ...]
     fingerprint: str  #: sha256 of all that a result can depend on; see ``fingerprint_of_set``
     notes: tuple[str, ...] = field(default=(), compare=False)  #: what was odd when it was read, one line each
+    radius_std_m: float = RADIUS_STD_M  #: standard deviation of the radii that are given
+    offset_std_m: float = OFFSET_STD_M  #: that of the objects' places
     kind: str = "grasps"  #: or "servo": recordings of a mechanism that grasps nothing
 
     @property
@@ -159,13 +164,19 @@ class FinalForceTable(ShortRepr):
 
 
 def fingerprint_of_set(
-    gripper: str, position_std_m: float | None, force_std_n: float | None, grasps: Iterable[MeasuredGrasp]
+    gripper: str,
+    position_std_m: float | None,
+    force_std_n: float | None,
+    grasps: Iterable[MeasuredGrasp],
+    tolerances: tuple[float, float] = (RADIUS_STD_M, OFFSET_STD_M),
 ) -> str:
     """Returns a sha256 in hex of the content: the same for CSV and Parquet, and whatever the order of the grasps.
 
     The folder's name, the source and the licence don't count: no result depends on them.
     """
     digest = _Digest("grasps", gripper, position_std_m, force_std_n)
+    if tolerances != (RADIUS_STD_M, OFFSET_STD_M):  # sets from before they could be given keep theirs
+        digest.facts(*tolerances)
     for grasp in sorted(grasps, key=lambda grasp: grasp.name):
         digest.facts(grasp.name, grasp.object, grasp.session, grasp.radius_m, grasp.offset_m, grasp.split)
         for name in sorted(grasp.settings):

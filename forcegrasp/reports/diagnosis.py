@@ -15,6 +15,7 @@ from forcegrasp.diagnosis.advice import Advice
 from forcegrasp.diagnosis.result import NOTHING, Candidate, Diagnosis, Step
 from forcegrasp.effects import Effect
 from forcegrasp.effects.for_gripper import effect_of
+from forcegrasp.identify.cross_validation import rms
 from forcegrasp.identify.fit import Fit
 from forcegrasp.identify.intervals import listed, reached_bound
 from forcegrasp.identify.verdict import Verdict
@@ -29,6 +30,7 @@ from forcegrasp.reports.comparison import (
 )
 from forcegrasp.reports.diagnosis_words import (
     certainty,
+    fault_words,
     lacks,
     left_sentence,
     left_share,
@@ -36,6 +38,7 @@ from forcegrasp.reports.diagnosis_words import (
     odd_words,
     percent,
     preference,
+    row_sentence,
     runner_up,
     shares_sentence,
 )
@@ -57,6 +60,8 @@ from forcegrasp.reports.symptom import symptom_of
 from forcegrasp.reports.view import view_section
 
 _PRINTED = 5
+#: A held-out error of so many times the floor wants a reason where nothing is missing.
+UNSURE = 1.03
 
 
 def diagnosis_json(diagnosis: Diagnosis, advice: Advice | None, tried: Sequence[type[Effect]], name: str) -> dict:
@@ -70,6 +75,9 @@ def diagnosis_json(diagnosis: Diagnosis, advice: Advice | None, tried: Sequence[
         "explained_share": diagnosis.explained,
         "shares": diagnosis.shares(),
         "left_share": left_share(diagnosis) if diagnosis.shares() else None,
+        "fault": None if diagnosis.fault is None else {
+            "name": diagnosis.fault.name, "words": diagnosis.fault.words, "check": diagnosis.fault.check
+        },
         "odd_grasps": [dataclasses.asdict(grasp) for grasp in diagnosis.odd],
         "steps": [_step_json(step, diagnosis) for step in diagnosis.steps],
         "ranking": ranking(diagnosis),
@@ -109,10 +117,16 @@ def _step_json(step: Step, diagnosis: Diagnosis) -> dict[str, Any]:
 
 def answer(diagnosis: Diagnosis) -> str:
     """The verdict in words."""
+    of_model, of_set = _of_model(diagnosis), fault_words(diagnosis)
+    rival = diagnosis.fault is not None and diagnosis.fault.name in diagnosis.effects[1:]
+    return " ".join(filter(None, (of_model, of_set) if rival else (of_set, of_model)))
+
+
+def _of_model(diagnosis: Diagnosis) -> str:
     d, cell, noise = diagnosis, worst_cell(remaining(diagnosis).cells()), noise_words(diagnosis)
-    found = listed(d.preferred) if d.preferred else ""
+    found = listed([*([d.fault.name] if d.verdict is Verdict.DATA and d.fault else []), *d.preferred] or [""])
     place = f"{words(cell.signal)}, {words(cell.phase)} ({cell.ratio:.1f} × noise)"
-    if d.verdict is Verdict.DATA and not d.steps:
+    if d.verdict is Verdict.DATA and not d.steps:  # labels
         return lacks(d)
     if d.verdict.names_effects:
         change = f"from {d.error_before:.2f} to {d.error_after:.2f} ×"
@@ -125,9 +139,13 @@ def answer(diagnosis: Diagnosis) -> str:
         of_noise = f"the error on held-out {d.target.part}s is {d.error_before:.2f} × the sensor noise"
         if noise:
             return f"The model explains these data: they show no missing effect; {of_noise}. {noise}"
+        unsure = "" if d.error_after < UNSURE * d.floor else (
+            f" A fit of all {d.target.part}s leaves {rms(d.fit.residual, d.target):.2f} ×: where few are left to fit an"
+            " object by, those held out are missed."
+        )  # fmt: skip
         return (
             f"The model explains these data: {of_noise}, and up to {d.floor:.2f} is noise and the simulation's own"
-            " error. They show no missing effect."
+            f" error. They show no missing effect.{unsure}"
         )
     if d.verdict is Verdict.UNKNOWN:
         best = f"{found} would only take it down to {d.error_after:.2f} ×" if found else "no effect explains it"
@@ -222,6 +240,8 @@ def lines(diagnosis: Diagnosis, advice: Advice | None) -> list[str]:
         text += [f"  it could also be: {listed(step.effects[1:], 'or')}"] if len(step.effects) > 1 else []
     if diagnosis.odd and diagnosis.steps:
         text.append(f"look at these first: {odd_words(diagnosis)}")
+    if row := row_sentence(diagnosis):
+        text.append(row)
     if diagnosis.verdict is Verdict.UNKNOWN or diagnosis.verdict.names_effects:
         text.append(left_sentence(diagnosis))
     if advice is not None:

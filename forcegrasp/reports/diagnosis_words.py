@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 
+from forcegrasp.diagnosis.faults import Fault
 from forcegrasp.diagnosis.result import Candidate, Diagnosis, Step, kept_steps
 from forcegrasp.diagnosis.verdict import EXPLAINED_FAR, MUCH
 from forcegrasp.effects.for_gripper import effect_of
 from forcegrasp.identify.intervals import listed
 from forcegrasp.identify.verdict import Verdict
 from forcegrasp.reports.comparison import covariate_words, words
-from forcegrasp.reports.findings import where
+from forcegrasp.reports.findings import found_parameters, where
+from forcegrasp.short_repr import counted
+
+# A delay is one of whole rows if it is that close to it.
+_WHOLE = 0.1
 
 # Of all that is left, a phase that has so much is where it is.
 _NEARLY_ALL = 0.8
@@ -19,11 +24,13 @@ _NEARLY_ALL = 0.8
 def lacks(diagnosis: Diagnosis) -> str:
     """The effects that were found, what else they could be, and how much they leave, in one sentence."""
     steps = kept_steps(diagnosis.steps)
-    if diagnosis.verdict is Verdict.DATA and not steps:
+    if diagnosis.verdict is Verdict.DATA and not steps and diagnosis.fault is None:
         seems = f"Not the model but the set seems to be wrong: {odd_words(diagnosis)}"
         return f"{seems}. Put their labels right, or leave them out."
     if diagnosis.verdict is Verdict.DATA:
-        return f"Not the model but the set seems to be wrong: {listed([_fault(step, diagnosis) for step in steps])}."
+        faults = [_named(diagnosis.fault)] if diagnosis.fault is not None else []
+        faults += [_of_step(step, diagnosis) for step in steps]
+        return f"Not the model but the set seems to be wrong: {listed(faults)}."
     if len(steps) == 1 and len(steps[0].effects) > 1:
         names = f"{listed(steps[0].effects, 'or')}: {_undecided(steps[0])}"
     else:
@@ -40,9 +47,40 @@ def odd_words(diagnosis: Diagnosis) -> str:
     return f"{named}{as_other}, judged by a fit of all others"
 
 
-def _fault(step: Step, diagnosis: Diagnosis) -> str:
+def fault_words(diagnosis: Diagnosis) -> str:
+    """What seems to be wrong with the set besides what the model lacks, or in place of it; empty if nothing."""
+    if diagnosis.fault is None or diagnosis.verdict is Verdict.DATA:
+        return ""
+    named = _named(diagnosis.fault)
+    if diagnosis.fault.expected and diagnosis.fault.name not in diagnosis.effects:
+        return f"Objects were moved within the tolerance of what the set gives: {diagnosis.fault.words}."
+    if diagnosis.fault.name in diagnosis.effects[1:]:
+        return f"Or the set is wrong, and nothing is missing: {named}; these data can't tell which."
+    return f"The set seems to be wrong: {named}. What follows is of the set with that put right."
+
+
+def _named(fault: Fault) -> str:
+    return f"{fault.name} ({fault.words}; to check: {fault.check})"
+
+
+def _of_step(step: Step, diagnosis: Diagnosis) -> str:
     effect = effect_of(step.effects[0], diagnosis.target.gripper)
     return f"{effect.name} ({effect.symptom}; to check: {effect.separates})"
+
+
+def row_sentence(diagnosis: Diagnosis) -> str:
+    """Delays of whole rows, which the set itself may have; empty if there are none."""
+    step = float(np.median(np.concatenate([np.diff(grasp.time_s) for grasp in diagnosis.target.grasps])))
+    whole = []
+    for effect, parameters in found_parameters(diagnosis).items():
+        rows = parameters["delay_s"].value / step if "delay_s" in parameters else 0.0
+        if round(rows) and abs(rows - round(rows)) < _WHOLE:
+            whole.append(f"{effect} is {counted(round(rows), 'row')} of the set")
+    if not whole:
+        return ""
+    return (
+        f"{listed(whole)}: is each column written in the row in which it was read or commanded? A log may be late, too"
+    )
 
 
 def shares_sentence(diagnosis: Diagnosis) -> str:

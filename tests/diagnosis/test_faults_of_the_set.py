@@ -8,12 +8,14 @@ import numpy as np
 import pytest
 
 from forcegrasp.diagnosis.diagnose_set import diagnose_set
+from forcegrasp.diagnosis.faults import suspects
 from forcegrasp.diagnosis.odd_grasps import odd_grasps
+from forcegrasp.diagnosis.tolerance import move_given
 from forcegrasp.identify.fit_set import apply_model, fit_model
 from forcegrasp.identify.fitted_model import model_of
 from forcegrasp.identify.loading import Loaded, load
 from forcegrasp.models.model_file import Model
-from forcegrasp.reports.diagnosis import answer
+from forcegrasp.reports.diagnosis import answer, diagnosis_json
 from tests.independent.rig import record
 
 pytestmark = pytest.mark.xdist_group("one fit for all")
@@ -56,6 +58,84 @@ def test_swapped_force_columns_are_told(sound):
     diagnosis, _ = diagnose_set(swapped, model, ["swapped_forces"], 0, silent)
     assert (diagnosis.verdict, diagnosis.effects) == ("data", ("swapped_forces",))
     assert "press on one finger by hand" in answer(diagnosis)
+
+
+def row_late(values: np.ndarray) -> np.ndarray:
+    """Each row holds what the one before should."""
+    return np.concatenate([values[:1], values[:-1]])
+
+
+def row_early(values: np.ndarray) -> np.ndarray:
+    """Each row holds what the next one should."""
+    return np.concatenate([values[1:], values[-1:]])
+
+
+@pytest.mark.parametrize(
+    ("name", "told", "change"),
+    [
+        ("time_scale", "2 times too long", lambda i, g: {"time_s": 2 * g.time_s}),
+        ("force_tare", "at grasp 4", lambda i, g: {"force_n": g.force_n - [0.2 * (i >= 4), 0.0]}),
+        ("early_row", "forces are what was read one row later", lambda i, g: {"force_n": row_early(g.force_n)}),
+        ("early_row", "positions and forces are", lambda i, g: {"command_m": row_late(g.command_m)}),
+    ],
+)
+def test_a_fault_is_put_right_and_told(sound, name, told, change):
+    loaded, model = sound
+    places = {g.name: i for i, g in enumerate(loaded.measured.grasps)}
+    wrong = changed(loaded, lambda g: dataclasses.replace(g, **change(places[g.name], g)))
+    diagnosis, _ = diagnose_set(wrong, model, ["force_bias", "command_delay"], 0, silent)
+    assert (diagnosis.verdict, diagnosis.effects) == ("data", (name,))
+    assert diagnosis.error_before > 1.3 > diagnosis.error_after
+    text = answer(diagnosis)
+    assert text.startswith(f"Not the model but the set seems to be wrong: {name} (")
+    assert told in text
+    found = diagnosis_json(diagnosis, None, [], "s")
+    assert found["fault"]["name"] == name
+    assert told in found["fault"]["words"]
+
+
+def inexact(name: str, radius_m: float, offset_m: float, radius_std_m: float = 5e-5):
+    """A change of the set: one object's radius, and all places."""
+
+    def change(measured):
+        grasps = tuple(
+            dataclasses.replace(g, radius_m=g.radius_m + radius_m * (g.object == name), offset_m=g.offset_m + offset_m)
+            for g in measured.grasps
+        )
+        return dataclasses.replace(measured, grasps=grasps, radius_std_m=radius_std_m)
+
+    return change
+
+
+def test_what_is_given_moves_within_its_tolerance_and_is_told(sound):
+    loaded, model = sound
+    name = loaded.measured.grasps[0].object
+    measured = inexact(name, 1e-4, 4e-4)(loaded.measured)
+    diagnosis, _ = diagnose_set(dataclasses.replace(loaded, measured=measured), model, ["force_bias"], 0, silent)
+    assert (diagnosis.verdict, diagnosis.effects) == ("explained", ())
+    assert diagnosis.error_before > 1.3 > diagnosis.error_after
+    assert "moved within the tolerance of what the set gives: radius of thing_0 by -0.1 mm" in answer(diagnosis)
+
+
+def test_given_more_exactly_it_does_not_move(sound):
+    loaded, model = sound
+    name = loaded.measured.grasps[0].object
+    measured = inexact(name, 1e-4, 4e-4, radius_std_m=1e-6)(loaded.measured)
+    target, _, base = apply_model(dataclasses.replace(loaded, measured=measured), model, silent, refit=True)
+    assert move_given(measured, target, base.fit) is None
+    easy = dataclasses.replace(measured, radius_std_m=5e-5)
+    moved = move_given(easy, target, base.fit)
+    assert moved is not None
+    assert moved.radius_m[name] == pytest.approx(-1e-4, abs=2e-5)
+    assert max(abs(move) for other, move in moved.radius_m.items() if other != name) < 2e-5
+    assert list(moved.offset_m.values()) == pytest.approx([-4e-4] * len(moved.offset_m), abs=3e-4)
+    assert moved.price > len(moved.radius_m) + len(moved.offset_m)
+
+
+def test_a_sound_set_has_no_suspects(sound):
+    loaded, model = sound
+    target, _, base = apply_model(loaded, model, silent, refit=True)
+    assert suspects(loaded, target, base.fit) == []
 
 
 def test_swapped_labels_are_told_and_nothing_else_is_looked_for(sound):

@@ -8,6 +8,9 @@ import numpy as np
 import pytest
 
 from forcegrasp.diagnosis.noise_check import Noise, unexpected_noise
+from forcegrasp.diagnosis.signatures import Score, null_gains
+from forcegrasp.effects import get_effect
+from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.identify.noise_floor import excess
 from forcegrasp.identify.phases import PHASES
 from forcegrasp.identify.target import Target
@@ -186,6 +189,18 @@ def test_in_doubt_it_is_not_noise():
     target, nothing = make(1), tuple(n[:1] for n in NOTHING)
     assert excess(1.2 * normal(0)[:1], nothing, target)
     assert unexpected_noise(1.2 * normal(0)[:1], nothing, target, GRASPS[:1]) is None
+
+
+@pytest.mark.parametrize(("channel", "times"), [(3, 9.0), (0, 1.0)])
+def test_chance_gains_as_much_as_the_noise_that_there_is(channel, times):
+    """Three times the noise in one signal is nine times the gain by chance of an effect that shows there."""
+    signature = np.zeros((G, S, 4))
+    signature[..., channel] = 1 / np.sqrt(G * S)
+    scores = [[Score(EffectSetting.typical(get_effect("force_bias")), 1.0, signature.ravel())]]
+    as_said, as_is = (
+        null_gains(scores, np.random.default_rng(0), noise=noise) for noise in (None, np.array([1.0, 1.0, 1.0, 3.0]))
+    )
+    assert as_is == pytest.approx(times * as_said, rel=1e-3)
 
 
 # --- in words ------------------------------------------------------------------------------------------------------

@@ -1,0 +1,61 @@
+"""Whether a set with a fault put right is the likelier one, and what that makes of a diagnosis."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from forcegrasp.diagnosis.evidence import LEAST_LEAD, is_beyond_chance
+from forcegrasp.diagnosis.faults import Fault
+from forcegrasp.diagnosis.result import Diagnosis
+from forcegrasp.diagnosis.verdict import EXPLAINED, explained_share
+from forcegrasp.identify.cross_validation import heldout_residual, log_likelihood, make_folds, rms
+from forcegrasp.identify.fit import Fit
+from forcegrasp.identify.target import Target
+from forcegrasp.identify.verdict import Verdict
+
+_Fitted = tuple[Target, Fit]
+
+
+def leaves_less(fault: Fault, right: _Fitted, said: _Fitted) -> bool:
+    """Whether the base model of a set put right leaves much less on held-out grasps than that of the set as it is."""
+    before, after = rms(_held(*said), said[0]), rms(_held(*right), right[0])
+    return is_beyond_chance(_gains(fault, right, said), LEAST_LEAD) and explained_share(before, after) > EXPLAINED
+
+
+def with_fault(found: Diagnosis, fault: Fault, said: _Fitted) -> Diagnosis:
+    """The diagnosis of a set put right: its fault comes first among what was found, the error before is the set's."""
+    before = rms(_held(*said), said[0])
+    if fault.expected:
+        return dataclasses.replace(found, fault=fault, error_before=before)
+    if found.verdict is Verdict.EXPLAINED:
+        return dataclasses.replace(found, verdict=Verdict.DATA, effects=(fault.name,), fault=fault, error_before=before)
+    effects = (fault.name, *found.effects) if found.verdict.names_effects else ()
+    return dataclasses.replace(found, effects=effects, fault=fault, error_before=before)
+
+
+def more_likely(right: Diagnosis, said: Diagnosis) -> Diagnosis:
+    """The diagnosis that held-out grasps speak for: of the set put right, or as it is; of neither, both are named."""
+    if right.fault is None:
+        return right
+    gains = _gains(right.fault, (right.target, right.fit), (said.target, said.fit))
+    if is_beyond_chance(gains, LEAST_LEAD) or not said.verdict.names_effects:
+        return right
+    if is_beyond_chance(-gains, LEAST_LEAD):
+        return said
+    return dataclasses.replace(
+        said, verdict=Verdict.ONE_OF, effects=(*said.effects, right.fault.name), fault=right.fault
+    )
+
+
+def _held(target: Target, fit: Fit) -> np.ndarray:
+    return heldout_residual(fit, target, make_folds(target.grasps))
+
+
+def _gains(fault: Fault, right: _Fitted, said: _Fitted) -> np.ndarray:
+    """Change of each held-out grasp's log-likelihood, ``(G,)``, over the rows that both sets have: the last ones."""
+    better, worse = _held(*right), _held(*said)
+    scale = right[0].sigma / said[0].sigma
+    gains = log_likelihood(better * scale) - log_likelihood(worse[:, -better.shape[1] :])
+    return gains - fault.price / len(gains)

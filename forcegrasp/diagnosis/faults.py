@@ -1,0 +1,128 @@
+"""Faults of a set that no effect stands for, each with the set put right, for the base model to be fitted again."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from forcegrasp.diagnosis.signatures import Background
+from forcegrasp.diagnosis.tolerance import move_given
+from forcegrasp.identify.base_fit import rms_error
+from forcegrasp.identify.fit import Fit
+from forcegrasp.identify.intervals import listed
+from forcegrasp.identify.loading import Loaded
+from forcegrasp.identify.target import Target
+from forcegrasp.measure.check_givens import Tare, clock_factor, find_tare, times
+from forcegrasp.measure.schema import MeasuredGrasp, MeasurementSet
+from forcegrasp.short_repr import ShortRepr, cut
+
+# A row's shift is worth a fit if it takes this share off the squares that a fit leaves beyond the noise.
+_WORTH = 0.5
+# A set of which a fit leaves less than so many times the noise is not doubted.
+_NOTHING = 1.05
+
+
+@dataclass(frozen=True, repr=False)
+class Fault(ShortRepr):
+    """What may be wrong with a set, and the set without it."""
+
+    name: str
+    words: str  #: what seems to be wrong
+    check: str  #: what to look at
+    put_right: Loaded[MeasurementSet]
+    price: float = 0.0  #: log-likelihood that its numbers cost which were fitted
+    expected: bool = False  #: within the tolerance of what is given, so that it is no fault
+
+    def summary(self) -> str:
+        return cut(f"{self.name}: {self.words}", 100)
+
+
+def suspects(loaded: Loaded[MeasurementSet], target: Target, fit: Fit) -> list[Fault]:
+    """The faults that a set gives reason to look for.
+
+    Args:
+      loaded: grasps of a gripper, as the set has them.
+      target: the same, lined up.
+      fit: of the base model.
+    """
+    measured, found = loaded.measured, []
+    if loaded.gripper.is_servo or rms_error(fit, target) < _NOTHING:
+        return []
+    if (factor := clock_factor(measured, loaded.gripper.period_s)) is not None:
+        words = f"time stamps are {times(factor)} for commands {loaded.gripper.period_s:g} s apart"
+        right = _changed(loaded, lambda _, g: _slower(g, 1 / factor))
+        found.append(Fault("time_scale", words, "the clock and unit of t_s", right))
+    if (tare := find_tare(measured)) is not None:
+        first = measured.grasps[tare.first].name
+        changed = [f"{n} by {x:+.3g} N" for n, x in zip(measured.columns.force, tare.change_n, strict=True) if x]
+        words = f"the zero changes at grasp {first}: {listed(changed)}"
+        right = _changed(loaded, lambda index, g: _levelled(g, tare) if index >= tare.first else g)
+        found.append(Fault("force_tare", words, "whether sensors were set to zero there", right))
+    early = _early_readings(target, fit)
+    if early:
+        words = f"{listed(early)} are what was read one row later"
+        check = "which row each column was written to, and its clock"
+        found.append(Fault("early_row", words, check, _changed(loaded, lambda _, g: _one_row_later(g, early))))
+    if not found and (moved := move_given(measured, target, fit)) is not None:
+        words = listed(moved.told or ["nothing by more than its standard deviation"])
+        right = _changed(loaded, lambda _, g: moved.put(g))
+        found.append(Fault("object_tolerance", words, "the objects, with a calliper", right, moved.price, True))
+    return found
+
+
+def _changed(
+    loaded: Loaded[MeasurementSet], change: Callable[[int, MeasuredGrasp], MeasuredGrasp]
+) -> Loaded[MeasurementSet]:
+    """The set with each grasp changed by a function of its index and itself."""
+    grasps = tuple(change(index, grasp) for index, grasp in enumerate(loaded.measured.grasps))
+    return dataclasses.replace(loaded, measured=dataclasses.replace(loaded.measured, grasps=grasps))
+
+
+def _slower(grasp: MeasuredGrasp, factor: float) -> MeasuredGrasp:
+    start = grasp.time_s[0]
+    return dataclasses.replace(grasp, time_s=start + factor * (grasp.time_s - start))
+
+
+def _levelled(grasp: MeasuredGrasp, tare: Tare) -> MeasuredGrasp:
+    return dataclasses.replace(grasp, force_n=grasp.force_n - tare.change_n)
+
+
+def _one_row_later(grasp: MeasuredGrasp, kinds: Sequence[str]) -> MeasuredGrasp:
+    """The grasp less its first row, with readings of these kinds from the row before."""
+
+    def moved(values: np.ndarray, kind: str) -> np.ndarray:
+        return values[:-1] if kind in kinds else values[1:]
+
+    return dataclasses.replace(
+        grasp,
+        time_s=grasp.time_s[1:],
+        command_m=grasp.command_m[1:],
+        position_m=moved(grasp.position_m, "positions"),
+        force_n=moved(grasp.force_n, "forces"),
+        object_m=None if grasp.object_m is None else grasp.object_m[1:],
+        rows=None if grasp.rows is None else grasp.rows[1:],
+    )
+
+
+def _early_readings(target: Target, fit: Fit) -> tuple[str, ...]:
+    """Which readings come before what makes them, and fit one row later; none if none do.
+
+    No effect makes a reading early. Where positions and forces both are, the commands may be late.
+    """
+    background = Background(fit, ())
+    clean = background.remove(fit.residual.ravel())
+    least, best = (1 - _WORTH) * max(0.0, float(clean @ clean) - target.readings), ()
+    for kinds in (("position",), ("force",), ("position", "force")):
+        signals = target.signals.copy()
+        for kind in kinds:
+            part = target.axis.kinds.get(kind, slice(0, 0))
+            signals[:, 1:, part] = target.signals[:, :-1, part]
+        shifted = dataclasses.replace(target, signals=signals).residual(fit.predicted)
+        clean = background.remove(shifted.ravel())
+        left = float(clean @ clean) - target.readings
+        if left < least:
+            least, best = left, tuple(f"{kind}s" for kind in kinds)
+    return best

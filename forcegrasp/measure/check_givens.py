@@ -1,0 +1,112 @@
+"""Is a set's clock that of the gripper, and is a force's zero the same in all its grasps?"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from forcegrasp.measure.check_liveness import force_noise
+from forcegrasp.measure.folder import show
+from forcegrasp.measure.samples import place, samples_file
+from forcegrasp.measure.schema import MeasurementSet
+
+# Commands that are further apart than this many times what a gripper takes, or closer, are no jitter.
+_OTHER_CLOCK = 1.2
+# Commands come at most that often if this share of them does, for steps are further apart. Fewer tell nothing.
+_OFTEN, _LEAST_COMMANDS = 0.05, 40
+# Rows at the start of a grasp, before anything is touched, that a zero is read from: seconds, and rows at least.
+_FREE_S, _LEAST_ROWS = 0.25, 5
+# A zero has changed if it differs by so many times what it scatters, with two grasps at least on either side.
+_CHANGED, _EITHER_SIDE = 10.0, 2
+# Two channels press on the same object: one that reads so many times the other is in another unit.
+_OTHER_UNIT, _SAMPLES = 5.0, 20
+
+
+@dataclass(frozen=True)
+class Tare:
+    """The zeros of forces change from one grasp to the next, and stay so."""
+
+    first: int  #: index of the first grasp that has the new ones
+    change_n: np.ndarray  #: by how much they are larger from there on, ``(channels,)``; 0 where they are the same
+
+
+def check_givens(measured: MeasurementSet, period_s: float) -> list[str]:
+    """Returns a warning for a clock, a zero or a unit that does not look right; a diagnosis tries to put them right.
+
+    Args:
+      measured: grasps of a gripper.
+      period_s: how often the gripper is commanded, by its description.
+    """
+    warnings = []
+    if (factor := clock_factor(measured, period_s)) is not None:
+        warnings.append(
+            f"{samples_file(measured.path)}: column t_s: commands are {factor * period_s:.3g} s apart where"
+            f" {show(measured.gripper)} takes one every {period_s:g} s: are time stamps {times(factor)}? else correct"
+            " the description's period_s"
+        )
+    if (tare := find_tare(measured)) is not None:
+        where = place(measured.path, measured.grasps[tare.first])
+        changed = zip(measured.columns.force, tare.change_n, strict=True)
+        told = ", ".join(f"{name} by {change:+.3g} N" for name, change in changed if change)
+        warnings.append(f"{where}: from here on forces are shifted ({told}); was the zero set anew between two grasps?")
+    return warnings + _units_apart(measured)
+
+
+def times(factor: float) -> str:
+    """How much too long or too short time stamps are, in words."""
+    return f"{factor:.3g} times too long" if factor > 1 else f"{1 / factor:.3g} times too short"
+
+
+def clock_factor(measured: MeasurementSet, period_s: float) -> float | None:
+    """How many times a gripper's period its commands are apart; None if that may be right, or too few changed."""
+    apart, rows = [], []
+    for grasp in measured.grasps:
+        changed = np.flatnonzero(np.any(np.diff(grasp.command_m, axis=0) != 0, axis=1)) + 1
+        rows.append(np.diff(changed))
+        apart.append(float(np.median(np.diff(grasp.time_s))))
+    gaps = np.concatenate(rows) if rows else np.array([])
+    if len(gaps) < _LEAST_COMMANDS:
+        return None
+    factor = float(np.quantile(gaps, _OFTEN, method="lower") * np.median(apart) / period_s)
+    return None if 1 / _OTHER_CLOCK < factor < _OTHER_CLOCK else factor
+
+
+def find_tare(measured: MeasurementSet) -> Tare | None:
+    """Where the zeros of the forces change for good; None if they scatter as much, or there are too few grasps."""
+    zeros = np.array([_zero(grasp.time_s, grasp.force_n) for grasp in measured.grasps])
+    if measured.columns.read_effort or not zeros.size or len(zeros) < 2 * _EITHER_SIDE:
+        return None
+    noise = np.median([[force_noise(f) for f in grasp.force_n.T] for grasp in measured.grasps], axis=0)
+    best, found = _CHANGED, None
+    for first in range(_EITHER_SIDE, len(zeros) - _EITHER_SIDE + 1):
+        before, after = zeros[:first], zeros[first:]
+        change = after.mean(axis=0) - before.mean(axis=0)
+        scatter = np.maximum.reduce([np.ptp(before, axis=0) / 2, np.ptp(after, axis=0) / 2, noise / 2])
+        size = np.abs(change) / np.maximum(scatter, 1e-9)
+        if size.max() > best:
+            best, found = float(size.max()), Tare(first, np.where(size > _CHANGED / 2, change, 0.0))
+    return found
+
+
+def _zero(time: np.ndarray, force: np.ndarray) -> np.ndarray:
+    """What the channels read at the start of a grasp, ``(channels,)``."""
+    rows = max(_LEAST_ROWS, int(np.searchsorted(time, time[0] + _FREE_S)))
+    return np.median(force[:rows], axis=0)
+
+
+def _units_apart(measured: MeasurementSet) -> list[str]:
+    """Warns where one of two force channels reads many times what the other does."""
+    names = measured.columns.force
+    if len(names) != 2:
+        return []
+    both = np.concatenate([g.force_n - _zero(g.time_s, g.force_n) for g in measured.grasps])
+    pressed = np.all(both > 0.2 * both.max(axis=0), axis=1)
+    if pressed.sum() < _SAMPLES:
+        return []
+    ratio = float(np.median(both[pressed, 1] / both[pressed, 0]))
+    if 1 / _OTHER_UNIT < ratio < _OTHER_UNIT:
+        return []
+    large, small, by = (*names[::-1], ratio) if ratio > 1 else (*names, 1 / ratio)
+    where = f"{samples_file(measured.path)}: column {large}"
+    return [f"{where}: reads {by:.3g} times what {small} does; are both in newtons?"]
