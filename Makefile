@@ -12,7 +12,7 @@ train: setup
 	$(VENV)/bin/forcegrasp evaluate 'policies=[$(RUN),force_pi,informed]' out=$(RUN)/evaluation
 
 test: setup
-	$(VENV)/bin/python -m pytest -q -n auto --dist loadgroup
+	$(VENV)/bin/python -m pytest -q -n auto --dist loadfile --no-loadscope-reorder
 
 check: $(VENV)/.docs
 	$(VENV)/bin/python tools/check.py

@@ -15,8 +15,20 @@ from not_tested import pytest_terminal_summary  # noqa: F401  (a hook: pytest ca
 
 from forcegrasp.config import GraspConfig
 from forcegrasp.physics import GraspParameters, GraspSampler
+from forcegrasp.replay import replay
 
+# A worker of xdist, and what tests start, has one core: threads that wait for one another would only take it.
+os.environ.setdefault("OMP_NUM_THREADS", "1")
 torch.set_num_threads(1)
+replay.THREADS = 1
+
+#: Folders of the longest files: they come first, lest one worker is still at such a file when the others have ended.
+LONGEST = ("diagnosis", "docs", "cli", "effects", "config", "importers", "reliability", "train")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Puts the tests in the order in which xdist hands their files to its workers."""
+    items.sort(key=lambda item: next((i for i, name in enumerate(LONGEST) if item.path.parent.name == name), 99))
 
 
 @pytest.fixture(scope="session")

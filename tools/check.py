@@ -23,7 +23,7 @@ PARTS = {
     "imports": [["lint-imports", "--no-logo"]],
     "types": [["pyright", "--pythonpath", sys.executable]],
     "docs": [["sphinx-build", "--quiet", "--fail-on-warning", "--keep-going", "--fresh-env", "docs", "build/docs"]],
-    "tests": [["python", "-m", "pytest", "-q", "-n", "auto", "--dist", "loadgroup"]],
+    "tests": [["python", "-m", "pytest", "-q", "-n", "auto", "--dist", "loadfile", "--no-loadscope-reorder"]],
 }
 
 

@@ -14,3 +14,5 @@ python="${PYTHON:-python3}"
 # torch alone first, by its exact version: a CPU build is taken where the package index offers one
 "$venv/bin/python" -m pip install --quiet --disable-pip-version-check "$(grep '^torch==' constraints.txt)"
 "$venv/bin/python" -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[dev,onnx]'
+# compiled once, here: where files may not be written later, each start would compile all that it imports
+"$venv/bin/python" -m compileall -q forcegrasp

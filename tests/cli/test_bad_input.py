@@ -363,10 +363,11 @@ def test_full_disk_while_training(folder, tiny, capsys, monkeypatch):
     assert re.fullmatch(r"forcegrasp: .*full.*No space left on device.*\n", err)
 
 
-@pytest.mark.parametrize("backend", ["nonsense", "osmesa"])
-def test_setting_of_mujocos_renderer_does_not_matter(backend, tiny, tmp_path):
-    """Training renders in a process of its own, if at all."""
-    command = [sys.executable, "-m", "forcegrasp.cli.main", "train", *tiny["train"], "hydra.run.dir=run"]
+@pytest.mark.parametrize(("backend", "verb"), [("nonsense", "train"), ("osmesa", "record")])
+def test_setting_of_mujocos_renderer_does_not_matter(backend, verb, tiny, tmp_path):
+    """Training renders in a process of its own, if at all. A recording starts sooner and imports MuJoCo alike."""
+    options = {"train": [*tiny["train"], "hydra.run.dir=run"], "record": ["grasps=1", "objects=1", "out=run"]}
+    command = [sys.executable, "-m", "forcegrasp.cli.main", verb, *options[verb]]
     environment = {**os.environ, "MUJOCO_GL": backend}
     done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr

@@ -7,10 +7,12 @@ import csv
 import io
 import json
 import warnings
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
+from mujoco.batch import Batch
 from PIL import Image
 from rich.console import Console
 
@@ -186,6 +188,20 @@ def tensorboard_tags(folder: Path) -> list[str]:
     return sorted(tag for kind in ("scalars", "histograms", "images") for tag in events[kind])
 
 
+@contextlib.contextmanager
+def threads_asked() -> Iterator[list[int]]:
+    """Yields with how many threads each simulation is begun."""
+    asked = []
+
+    def engine(model, n, nthread):
+        asked.append(nthread)
+        return Batch(model, n, nthread)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("forcegrasp.physics.plant.Batch", engine)
+        yield asked
+
+
 def _is_outcome(path: Path) -> bool:
     return "tfevents" not in path.name and path.name != "model.yaml"  # the copy of a model repeats the configuration
 
@@ -195,13 +211,13 @@ def trained(folder: Path, **values: Any) -> dict[str, Any]:
     config = with_options(TrainConfig(), TINY_TRAINING | values)
     config = complete(config, load_gripper(config.gripper))
     run = RunDir.create(folder, config, [])
-    assert train(config, run)
+    with threads_asked() as threads:
+        assert train(config, run)
     files = sorted(str(path.relative_to(folder)) for path in folder.rglob("*.*") if _is_outcome(path))
     tensors, _ = checkpoint.read(max(run.checkpoints.iterdir()))
     weights = {name: tensor.tolist() for name, tensor in tensors.items() if name.startswith(("policy", "value"))}
     with open(run.metrics_path, newline="") as file:
         rows = [{k: v for k, v in row.items() if not k.startswith("speed/")} for row in csv.DictReader(file)]
-    threads = Trainer(config).env.base_env.simulator.plant.batch.nthread
     tags = tensorboard_tags(run.tensorboard)
     return {"files": files, "weights": weights, "rows": rows, "threads": threads, "tags": tags}
 
@@ -339,17 +355,9 @@ def test_engine_and_device_reach_the_simulator(verb, tmp_path, monkeypatch):
     assert asked == ["cpu", "cuda"]
 
 
-def test_threads_of_evaluate_reach_the_engine(tmp_path, monkeypatch):
-    from mujoco.batch import Batch
-
-    asked = []
-
-    def recording(model, n, threads):
-        asked.append(threads)
-        return Batch(model, n, threads)
-
-    monkeypatch.setattr("forcegrasp.physics.plant.Batch", recording)
-    evaluated(tmp_path, **{"physics.threads": EVALUATE_CASES["physics.threads"]})
+def test_threads_of_evaluate_reach_the_engine(tmp_path):
+    with threads_asked() as asked:
+        evaluated(tmp_path, **{"physics.threads": EVALUATE_CASES["physics.threads"]})
     assert set(asked) == {2}
 
 
@@ -377,23 +385,16 @@ def test_every_option_of_render_has_a_case():
 
 def rendered(folder: Path, **values: Any) -> tuple:
     """What would be shown, what is said, where it is written, and with how many threads it was simulated."""
-    from mujoco.batch import Batch
-
-    shown, threads, said = [], [], io.StringIO()
+    shown, said = [], io.StringIO()
 
     def show(episodes, sensors, gripper):
         shown.extend(episode["next", "force"].tolist() for episode in episodes.values())
         return b"GIF"
 
-    def engine(model, n, nthread):
-        threads.append(nthread)
-        return Batch(model, n, nthread)
-
     tiny = {"steps": 45, "physics": "fast", "physics.threads": 1, "out": "plain.gif"}
-    with pytest.MonkeyPatch.context() as patch, contextlib.redirect_stdout(said):
+    with pytest.MonkeyPatch.context() as patch, contextlib.redirect_stdout(said), threads_asked() as threads:
         patch.chdir(folder)
         patch.setattr("forcegrasp.evaluate.render.grasp_video", show)
-        patch.setattr("forcegrasp.physics.plant.Batch", engine)
         assert main(["render", *(f"{name}={value}" for name, value in (tiny | values).items())]) == 0
     return shown, threads, said.getvalue()
 

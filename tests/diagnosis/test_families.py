@@ -16,12 +16,14 @@ from forcegrasp.diagnosis.study import Study
 from forcegrasp.effects import get_effect
 from forcegrasp.effects.for_gripper import effect_of, effects_of
 from forcegrasp.effects.setting import EffectSetting
-from forcegrasp.identify.fit import fit_exactly
+from forcegrasp.identify.base_fit import BaseFit
+from forcegrasp.identify.fit import Simulators, fit_exactly
 from forcegrasp.identify.fit_set import fit_model
 from forcegrasp.identify.fitted_model import model_of
 from forcegrasp.identify.loading import Loaded
 from forcegrasp.identify.predict import predict
 from forcegrasp.identify.problem import Problem
+from forcegrasp.identify.target import Target
 from forcegrasp.importers.example import example_set
 from forcegrasp.physics import load_gripper
 from forcegrasp.replay.replay import Replay
@@ -103,14 +105,20 @@ def sticking() -> Loaded:
     return jaw_with("stiction", breakaway_n=0.15)
 
 
+@pytest.fixture(scope="module")
+def fitted(sticking) -> tuple[Target, Simulators, BaseFit]:
+    """The base model of that jaw."""
+    return fit_model(sticking, 0, silent)
+
+
 def test_dry_friction_is_not_called_stiction():
     diagnosis, _ = diagnose_set(jaw_with("coulomb_friction", force_n=0.08), None, FRICTION, 0, silent)
     assert (diagnosis.verdict, diagnosis.effects) == ("effect", ("coulomb_friction",))
 
 
-def test_friction_in_the_model_gives_way_to_stiction(sticking):
+def test_friction_in_the_model_gives_way_to_stiction(sticking, fitted):
     """The step that found the simple one stays in the record; the answer has the richer one alone."""
-    target, _, base = fit_model(sticking, 0, silent)
+    target, _, base = fitted
     coulomb = effect_of("coulomb_friction", sticking.gripper)
     model = add_effect(sticking, model_of(base.fit, target, sticking, []), coulomb, silent).model
     diagnosis, _ = diagnose_set(sticking, model, FRICTION, 0, silent)
@@ -120,8 +128,8 @@ def test_friction_in_the_model_gives_way_to_stiction(sticking):
     assert diagnosis.error_after < 0.8 * diagnosis.error_before
 
 
-def test_a_fit_stuck_beside_the_effect_it_contains_is_fitted_again_from_there(sticking):
-    target, simulators, base = fit_model(sticking, 0, silent)
+def test_a_fit_stuck_beside_the_effect_it_contains_is_fitted_again_from_there(sticking, fitted):
+    target, simulators, base = fitted
     old, gripper = base.fit.problem, sticking.gripper
     problem = Problem(gripper, old.grasps, [EffectSetting.typical(effect_of("coulomb_friction", gripper))])
     member = fit_exactly(target, problem, simulators, np.r_[base.fit.vector, problem.start()[len(old) :]])

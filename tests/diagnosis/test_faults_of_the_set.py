@@ -18,8 +18,6 @@ from forcegrasp.models.model_file import Model
 from forcegrasp.reports.diagnosis import answer, diagnosis_json
 from tests.independent.rig import record
 
-pytestmark = pytest.mark.xdist_group("one fit for all")
-
 
 def silent(text: str) -> None:
     """Takes what a diagnosis tells about its progress."""

@@ -20,6 +20,7 @@ from forcegrasp.errors import MeasurementError
 from forcegrasp.measure import check_set, read_set, write_set
 from forcegrasp.physics.gripper_file import load_gripper
 from forcegrasp.replay.record import record
+from tests.one_fit import fit_each_set_once
 
 #: In the command that has the first → the second: a small set, few rivals, hardly any training.
 SMALLER = {
@@ -71,10 +72,10 @@ def shorten(folder: Path) -> None:
         csv.writer(file).writerows([head, *(row for row in rows if float(row[head.index("t_s")]) < SECONDS)])
 
 
-# the loop takes half a minute: one worker should run it
-@pytest.mark.xdist_group("tutorial")
 def test_the_loop_runs_as_written(text, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("forcegrasp.reports.html._svg", lambda figure: "")  # tests/cli/test_measuring_verbs.py draws
+    fit_each_set_once(monkeypatch)
     printed = {}
     for program, verb, *options in commands():
         assert program == "forcegrasp"

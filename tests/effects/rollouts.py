@@ -52,6 +52,10 @@ class Trace:
         """Every bit of one row."""
         return [np.ascontiguousarray(values[:, i]).tobytes() for values in vars(self).values()]
 
+    def rows(self, first: int, end: int) -> Trace:
+        """Some of the rows, as a trace of their own."""
+        return Trace(*(values[:, first:end] for values in vars(self).values()))
+
     def distance(self, other: Trace) -> float:
         """Root mean square difference of what was read, in units of sensor noise (27 µm, 13 mN)."""
         position, force = (self.position - other.position) / 27e-6, (self.force - other.force) / 0.013

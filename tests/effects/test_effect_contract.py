@@ -6,15 +6,17 @@ import functools
 import re
 import subprocess
 import sys
+from collections.abc import Sequence
 
 import numpy as np
 import pytest
 
 from forcegrasp.effects import STAGES, Effect, catalogue, get_effect
 
-from .rollouts import RICH, Trace, Use, make_plant, play, rollout, start
+from .rollouts import OFFSETS_M, RICH, Trace, Use, make_plant, play, rollout, start
 
-CASES = [pytest.param(e, v, id=f"{e.name}-{v}".rstrip("-")) for e in catalogue().values() for v in e.variants]
+KINDS = [(e, v) for e in catalogue().values() for v in e.variants]
+CASES = [pytest.param(e, v, id=f"{e.name}-{v}".rstrip("-")) for e, v in KINDS]
 SIZES = [
     pytest.param(e, v, p, id="-".join(filter(None, (e.name, v, p.name))))
     for e in catalogue().values()
@@ -31,14 +33,22 @@ def bare(tier: str) -> Trace:
     return rollout(3, tier=tier)
 
 
-def everything() -> list[Use]:
+def everything(rows: Sequence[int] = (0, 1)) -> list[Use]:
     """All effects at typical sizes."""
-    return [(e, e.typical_values(), "", (0, 1)) for e in catalogue().values()]
+    return [(e, e.typical_values(), "", rows) for e in catalogue().values()]
 
 
 @functools.cache
 def full() -> Trace:
     return rollout(2, everything())
+
+
+@functools.cache
+def null_among_others() -> Trace:
+    """All effects on all rows, and each kind once more at its null value, on two rows of its own."""
+    n = 2 * len(KINDS)
+    nulls = [(effect, effect.null_values(), variant, (2 * i, 2 * i + 1)) for i, (effect, variant) in enumerate(KINDS)]
+    return rollout(n, [*everything(range(n)), *nulls], offset_m=np.tile(OFFSETS_M[:2], len(KINDS)))
 
 
 def grown(effect: type[Effect], name: str, factor: float) -> np.ndarray:
@@ -66,8 +76,8 @@ def test_null_values_and_other_rows_change_no_bit(effect, variant, tier):
 
 @pytest.mark.parametrize(("effect", "variant"), CASES)
 def test_null_values_change_no_bit_among_other_effects(effect, variant):
-    trace = rollout(2, [*everything(), (effect, effect.null_values(), variant, [0, 1])])
-    assert all(trace.row(row) == full().row(row) for row in (0, 1))
+    first = 2 * KINDS.index((effect, variant))
+    assert all(null_among_others().row(first + row) == full().row(row) for row in (0, 1))
 
 
 @pytest.mark.parametrize("tier", TIERS)
@@ -101,12 +111,11 @@ def test_more_of_it_changes_more(effect, variant, parameter):
         return  # a shape, not a size
     others = np.array([p.null if p != parameter and p.typical != p.null else p.typical for p in effect.parameters])
     index = effect.parameters.index(parameter)
-    distances = []
-    for size in dict.fromkeys(
-        grown(effect, parameter.name, factor)[index] for factor in (1, 2, 4)
-    ):  # within its bounds
-        others[index] = size
-        distances.append(rollout(3, [(effect, others, variant, range(3))]).distance(bare("fast")))
+    sizes = list(dict.fromkeys(grown(effect, parameter.name, factor)[index] for factor in (1, 2, 4)))  # within bounds
+    values = np.repeat([others] * len(sizes), 3, axis=0)
+    values[:, index] = np.repeat(sizes, 3)
+    trace = rollout(len(values), [(effect, values, variant, range(len(values)))])
+    distances = [trace.rows(3 * i, 3 * i + 3).distance(bare("fast")) for i in range(len(sizes))]
     assert distances[0] > 0
     assert np.all(np.diff(distances) > 0), distances
 
