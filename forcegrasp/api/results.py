@@ -78,7 +78,7 @@ class CompareResult(Result):
     model: Model  #: what was judged
     given: str  #: what that model was given as; empty if it is the base model, fitted to this set
     notes: tuple[str, ...]  #: what to bear in mind
-    given_file: str = ""  #: the model's file, if it was given as one
+    given_file: str = ""  #: where that model lies, as it stands in commands; empty as above
 
     file = "compare"
 
@@ -183,7 +183,7 @@ class DiagnoseResult(Result):
     advice: Advice | None  #: which grasp to record next
     tried: tuple[type[Effect], ...]
     only: tuple[str, ...]  #: the effects that were asked for; empty if all were tried
-    given_file: str = ""  #: the file of the model to start from, if it was given as one
+    given_file: str = ""  #: where the model to start from lies, as it stands in commands; empty if none was given
 
     file = "diagnosis"
 
