@@ -27,6 +27,7 @@ from forcegrasp.reports import diagnosis as diagnosis_report
 from forcegrasp.reports import final_force as final_force_report
 from forcegrasp.reports import fit as fit_report
 from forcegrasp.reports import next_step
+from forcegrasp.reports.diagnosis_box import answer_box
 from forcegrasp.reports.html import Answer, Section
 from forcegrasp.short_repr import ShortRepr, counted, cut, some
 
@@ -240,7 +241,7 @@ class DiagnoseResult(Result):
     def box(self, folder: Path) -> Answer:
         known, found = self.given_file or folder / measuring.BASE_MODEL, folder / measuring.FOUND_MODEL
         commands = next_step.after_diagnosis(self.diagnosis, self.advice, self.data.measured.path, known, found)
-        return diagnosis_report.answer_box(self.diagnosis, self.advice, commands, self._note)
+        return answer_box(self.diagnosis, self.advice, commands, self._note)
 
     def models(self) -> dict[str, Model]:
         base = {} if self.given_file else {measuring.BASE_MODEL: self._base_model}
