@@ -136,6 +136,18 @@ def test_what_leaves_much_is_looked_at_before_it_is_used(made_up):
     assert box(labels).commands[0].purpose == "put the set right, and diagnose again"
 
 
+def test_of_rivals_of_which_one_is_a_fault_of_the_set_that_is_checked_first(made_up):
+    tie = made_up.diagnosis("one_of")
+    pair = zip(tie.steps[0].candidates, ("object_size", "backlash"), strict=True)
+    found = tuple(dataclasses.replace(c, setting=EffectSetting.typical(get_effect(name))) for c, name in pair)
+    step = dataclasses.replace(tie.steps[0], effects=("object_size", "backlash"), candidates=found)
+    (only,) = box(dataclasses.replace(tie, effects=step.effects, steps=(step,))).commands
+    assert only.purpose.startswith("check object_size in the set (a calliper")
+    assert only.purpose.endswith(
+        f"record what tells them apart (backlash: {get_effect('backlash').separates}), and diagnose again"
+    )
+
+
 def test_labels_that_are_wrong_are_put_right_before_anything_is_fitted(made_up):
     odd = (OddGrasp("g3", "thing 1", 9.0, "thing 0", 1.1),)
     labels = dataclasses.replace(
