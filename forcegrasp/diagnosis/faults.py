@@ -63,7 +63,8 @@ def suspects(loaded: Loaded[MeasurementSet], target: Target, fit: Fit) -> list[F
         found.append(Fault("force_tare", words, "whether sensors were set to zero there", right))
     early = _early_readings(target, fit)
     if early:
-        words = f"{listed(early)} are what was read one row later"
+        late = ", or commands stand one row late" if len(early) > 1 else ""
+        words = f"{listed(early)} are what was read one row later{late}"
         check = "which row each column was written to, and its clock"
         found.append(Fault("early_row", words, check, _changed(loaded, lambda _, g: _one_row_later(g, early))))
     if not found and (moved := move_given(measured, target, fit)) is not None:

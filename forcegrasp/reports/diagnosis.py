@@ -133,7 +133,7 @@ def _of_model(diagnosis: Diagnosis) -> str:
         told = " ".join(filter(None, (lacks(d), shares_sentence(d))))
         return f"{told} {fall} the sensor noise; up to {d.floor:.2f} is noise. {rest}".rstrip()
     if d.verdict is Verdict.EXPLAINED:
-        of_noise = f"the error on held-out {d.target.part}s is {d.error_before:.2f} × the sensor noise"
+        of_noise = f"the error on held-out {d.target.part}s is {d.error_after:.2f} × the sensor noise"
         if noise:
             return f"The model explains these data: they show no missing effect; {of_noise}. {noise}"
         unsure = "" if d.error_after < UNSURE * d.floor else (
