@@ -114,7 +114,7 @@ def run_job(job: Job) -> dict:
     replay.THREADS = 1
     folder = Path(tempfile.mkdtemp())
     try:
-        chosen = dict.fromkeys(job.hidden, job.size)
+        chosen: dict[str, str | dict] = dict.fromkeys(job.hidden, job.size)
         if job.is_servo:
             truth = slide.record(folder / "set", chosen, job.seed)
         else:

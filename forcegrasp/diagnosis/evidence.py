@@ -25,6 +25,7 @@ def is_significant(candidate: Candidate, least_gain: float) -> bool:
     return (
         candidate.p_family <= ALARM
         and is_beyond_chance(candidate.gains, 5.0)
+        and not candidate.harms
         and candidate.largest_fall >= least_gain
         and candidate.share >= LEAST_SHARE
     )
@@ -53,7 +54,7 @@ def add_nothing(candidates: Sequence[Candidate]) -> set[str]:
 
 def _leads(winner: Candidate, other: Candidate, least: float = 0.0) -> bool:
     """Whether the difference of what two effects gain is beyond its standard error, and beyond ``least``."""
-    return is_beyond_chance(winner.gains - other.gains, least)
+    return is_beyond_chance(winner.evidence - other.evidence, least)
 
 
 def is_beyond_chance(gains: np.ndarray, least: float) -> bool:

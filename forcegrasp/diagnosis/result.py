@@ -32,12 +32,15 @@ class Candidate(ShortRepr):
     setting: EffectSetting  #: the effect, as it was fitted
     fit: Fit
     p_family: float  #: probability that the best signature of sensor noise does as well
-    gains: np.ndarray  #: change of each held-out grasp's log-likelihood, ``(G,)``; of a servo's recordings each one's
+    gains: np.ndarray  #: change of each held-out grasp's log-likelihood, ``(G,)``
     error_after: float  #: held-out rms residual ÷ noise
     share: float  #: share of the mean square beyond the noise that it explains
     largest_fall: float  #: largest share by which the error of a signal in a phase falls
     signature: np.ndarray  #: unit vector, ``(N,)``
     replaces: str = ""  #: the effect that it contains and takes the place of, if one is in the model
+    #: the gains of each of a servo's recordings, ``(R,)``, for their windows err alike; None of grasps
+    of_recordings: np.ndarray | None = None
+    harms: bool = False  #: whether some recording is surely worse with it
 
     def summary(self) -> str:
         sizes = some(f"{name} {value:.3g}" for name, value in self.parameters().items())
@@ -51,6 +54,11 @@ class Candidate(ShortRepr):
     def parameters(self) -> dict[str, float]:
         """The effect's fitted parameters."""
         return self.setting.parameters
+
+    @property
+    def evidence(self) -> np.ndarray:
+        """Gains that are evidence apart: of grasps, or of recordings."""
+        return self.gains if self.of_recordings is None else self.of_recordings
 
     @property
     def heldout_gain(self) -> float:

@@ -7,7 +7,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from forcegrasp.diagnosis import families
-from forcegrasp.diagnosis.evidence import ALARM, LEAST_SHARE, add_nothing, indistinguishable, is_significant
+from forcegrasp.diagnosis.evidence import (
+    ALARM,
+    LEAST_SHARE,
+    add_nothing,
+    indistinguishable,
+    is_beyond_chance,
+    is_significant,
+)
 from forcegrasp.diagnosis.noise_check import unexpected_noise
 from forcegrasp.diagnosis.other_starts import other_starts
 from forcegrasp.diagnosis.refine import refine
@@ -194,8 +201,11 @@ class _Start:
         """What held-out grasps say of a fit with one more effect, its last one."""
         target, held, after = self._study.target, self.held, self._study.heldout(refit)
         gains = self._study.gains(held, after)
+        recordings = self._study.of_recordings(gains)
+        sums = np.array([one.sum() for one in recordings]) if recordings else None
+        harms = any(is_beyond_chance(-one, 5.0) for one in recordings)
         fall = max((1 - rms(after, target, w) / rms(held, target, w) for _, w in cells(target)), default=0.0)
         error = rms(after, target)
         share = explained_share(self.error, error)
         setting = refit.problem.case(refit.vector).effects[-1]
-        return Candidate(setting, refit, p_family, gains, error, share, fall, signature, replaces)
+        return Candidate(setting, refit, p_family, gains, error, share, fall, signature, replaces, sums, harms)

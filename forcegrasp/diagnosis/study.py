@@ -33,15 +33,17 @@ class Study:
     def gains(self, before: np.ndarray, after: np.ndarray) -> np.ndarray:
         """By how much each grasp's held-out log-likelihood rises, ``(G,)``; NaN of those that were not held out.
 
-        Windows of one recording err alike: of three recordings held out, and more, there is one figure each, ``(R,)``.
-
         Args:
           before: residuals of held-out grasps under one fit, ``(G, S, C)``.
           after: the same under another.
         """
-        weight, recordings = self.target.weight, self.target.recordings
+        weight = self.target.weight
         gains = log_likelihood(weight * after) - log_likelihood(weight * before)
         gains[~np.isfinite(before).any(axis=(1, 2))] = np.nan
-        held = [gains[members][np.isfinite(gains[members])] for members in recordings.values()]
-        sums = [one.sum() for one in held if len(one)]
-        return np.array(sums) if len(sums) >= _RECORDINGS else gains
+        return gains
+
+    def of_recordings(self, gains: np.ndarray) -> list[np.ndarray]:
+        """The gains ``(G,)`` of the windows of each recording that was held out; none if they are fewer than three."""
+        held = [gains[members][np.isfinite(gains[members])] for members in self.target.recordings.values()]
+        held = [one for one in held if len(one)]
+        return held if len(held) >= _RECORDINGS else []

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import dataclasses
 from types import SimpleNamespace
 
 import numpy as np
-import pytest
 
+from forcegrasp.diagnosis.evidence import indistinguishable, is_significant
 from forcegrasp.diagnosis.study import Study
 
 
@@ -19,18 +20,26 @@ def residuals(sizes: list[float]) -> np.ndarray:
     return np.array(sizes)[:, None, None] * np.ones((len(sizes), 2, 1))
 
 
-def test_recordings_are_evidence_apart_and_windows_are_not():
-    three = {"a": np.array([0, 1]), "b": np.array([2]), "c": np.array([3])}
-    weight = np.array([1.0, 1.0, 0.5, 1.0])[:, None, None]
-    before, after = residuals([3, 2, 4, 1]), residuals([1, 2, 2, 1])
-    assert study(three, weight).gains(before, after) == pytest.approx([9 - 1, (16 - 4) / 4, 0])
-    two = {"a": np.array([0, 1]), "b": np.array([2, 3])}  # too few to scatter
-    assert study(two, weight).gains(before, after) == pytest.approx([8, 0, 3, 0])
+def test_windows_of_a_recording_are_told_together_where_three_are_held_out():
+    weight = np.array([1.0, 1.0, 0.5, 1.0, 1.0])[:, None, None]
+    four = {"a": np.array([0, 1]), "b": np.array([2]), "c": np.array([3]), "not held out": np.array([4])}
+    before, after = residuals([3, 2, 4, 1, np.nan]), residuals([1, 2, 2, 1, np.nan])
+    gains = study(four, weight).gains(before, after)
+    np.testing.assert_allclose(gains, [8, 0, 3, 0, np.nan])
+    assert [one.tolist() for one in study(four, weight).of_recordings(gains)] == [[8, 0], [3], [0]]
+    del four["c"]  # two are too few to scatter
+    assert study(four, weight).of_recordings(gains) == []
+    assert study({}, weight).of_recordings(gains) == []
 
 
-def test_what_is_not_held_out_is_no_evidence():
-    before, after = residuals([3, np.nan, 2, 1]), residuals([1, np.nan, 1, 1])
-    ones = np.ones((4, 1, 1))
-    np.testing.assert_allclose(study({}, ones).gains(before, after), [8, np.nan, 3, 0])
-    four = {name: np.array([k]) for k, name in enumerate("abcd")}
-    assert study(four, ones).gains(before, after) == pytest.approx([8, 3, 0])
+def test_recordings_decide_between_effects_and_none_may_be_harmed(made_up):
+    good = made_up.diagnosis("effect").steps[0].candidates[0]
+    good = dataclasses.replace(good, p_family=0.002, share=0.9, largest_fall=0.5)
+    one, other = np.array([1.0, 0.0]), np.array([0.0, 1.0])
+    many = np.ones(40)  # windows that all agree, of three recordings that do not
+    winner = dataclasses.replace(good, gains=10 * many, of_recordings=np.array([390.0, 5, 5]), signature=one)
+    rival = dataclasses.replace(good, gains=9 * many, of_recordings=np.array([0.0, 180, 180]), signature=other)
+    assert indistinguishable(winner, rival)
+    assert not indistinguishable(*(dataclasses.replace(c, of_recordings=None) for c in (winner, rival)))
+    assert is_significant(winner, 0.02)
+    assert not is_significant(dataclasses.replace(winner, harms=True), 0.02)
