@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from forcegrasp.identify.cross_validation import rms
-from forcegrasp.identify.fit import Fit, Simulators, fit_exactly, fit_once
+from forcegrasp.identify.fit import LARGE_STEP, STEP, Fit, Simulators, fit_exactly, fit_once
 from forcegrasp.identify.initial_guess import guess
 from forcegrasp.identify.problem import Problem
 from forcegrasp.identify.progress import Progress, silent
@@ -45,12 +45,10 @@ def fit_base(
     progress: Progress = silent,
 ) -> BaseFit:
     """Fits from the nominal parameters, and then looks from random places inside the bounds for a better optimum."""
-    start = guess(target, problem)
-    simulators.choose_step(target, problem, start)
-    first = fit_once(target, problem, simulators, start)
+    first = fit_once(target, problem, simulators, guess(target, problem))
     progress(f"base model, start 1 of {STARTS}: {rms_error(first, target):.2f} × noise")
     few = _few_grasps(target)
-    small = _Subset(target, problem, few, first, simulators.step)
+    small = _Subset(target, problem, few, first)
     ends = [small.fit(small.known)]
     while len(ends) < STARTS or (len(ends) < MOST_STARTS and not _ends_agree(ends, small.target)):
         ends.append(small.fit(_random_start(small.problem, guess(small.target, small.problem), rng)))
@@ -68,11 +66,18 @@ def fit_base(
         return checked
     # the cheap model's slopes may lead no further where the model itself still falls
     further = check_gradient(fit_exactly(target, problem, simulators, first.vector), target, errors)
-    if further.converged or simulators.cheap is simulators.exact:
+    if not further.converged and simulators.cheap is not simulators.exact:
+        exact = Simulators(problem, exact=True)
+        further = check_gradient(fit_exactly(target, problem, exact, first.vector), target, errors)
+    if further.converged:
         return further
-    exact = Simulators(problem, exact=True)
-    exact.step = simulators.step
-    return check_gradient(fit_exactly(target, problem, exact, first.vector), target, errors)
+    # nor may slopes over small steps, where a finger sticks and slips
+    simulators.step = LARGE_STEP
+    smooth = check_gradient(fit_exactly(target, problem, simulators, further.fit.vector), target, errors)
+    if smooth.converged or further.fit.cost - smooth.fit.cost > _cost_tolerance(smooth.fit, target):
+        return smooth
+    simulators.step = STEP
+    return further
 
 
 def _cost_tolerance(best: Fit, target: Target) -> float:
@@ -121,11 +126,10 @@ def _few_grasps(target: Target) -> np.ndarray:
 class _Subset:
     """The same problem on some of its grasps, with the cheap model corrected as in a fit of all of them."""
 
-    def __init__(self, target: Target, problem: Problem, keep: np.ndarray, fitted: Fit, step: float) -> None:
+    def __init__(self, target: Target, problem: Problem, keep: np.ndarray, fitted: Fit) -> None:
         self.target = target.subset(keep)
         self.problem = Problem(problem.gripper, self.target.grasps, problem.effects)
         self._simulators = Simulators(self.problem)
-        self._simulators.step = step
         self._correction = fitted.correction[keep][:, : self._simulators.exact.mask.shape[1]]
         self._full, self._fitted = problem, fitted
         names = [e.name for e in problem.entries]

@@ -16,9 +16,9 @@ from forcegrasp.short_repr import ShortRepr, counted
 
 # Slopes are measured anew after so many steps; in between they follow the values (Broyden 1965), if they are few.
 _SLOPES_LAST, _FEW = 3, 16
-# Step of the finite differences in a problem's coordinates: above contact noise, within the linear range. Where slopes
-# over three times as much differ by this share, in the median, the signals are rough, and the larger step smooths them.
-_STEP, _LARGER, _ROUGHNESS = 0.02, 3.0, 0.2
+#: Step of the finite differences in a problem's coordinates: above contact noise, within the linear range; and one that
+#: smooths the signals of a finger that sticks and slips.
+STEP, LARGE_STEP = 0.02, 0.06
 # Relative change of the cost at which a fit ends, one that only ranks, and the most evaluations until then.
 _TOLERANCE, _ROUGH, _EVALUATIONS = 1e-4, 1e-3, 15
 
@@ -38,20 +38,7 @@ class Simulators:
         gripper, grasps = problem.gripper, problem.grasps
         self.exact = Replay(gripper, grasps)
         self.cheap = self.exact if exact or gripper.fast == "none" else Replay(gripper, grasps, tier="fitting")
-        self.step = _STEP  #: of the finite differences, in coordinates
-
-    def choose_step(self, target: Target, problem: Problem, at: np.ndarray) -> None:
-        """Takes larger differences where signals are rough, as those of a finger that sticks and slips are.
-
-        Args:
-          target: the measurements.
-          problem: whose slopes are compared.
-          at: coordinates at which they are, ``(p,)``.
-        """
-        steps = _STEP, _LARGER * _STEP
-        small, large = (_Local(target, problem, self.cheap, self.cheap, None, step).slopes(at) for step in steps)
-        change, size = (np.linalg.norm(one.reshape(-1, len(problem)), axis=0) for one in (large - small, large))
-        self.step = steps[bool(np.median(change / np.maximum(size, 1e-12)) > _ROUGHNESS)]
+        self.step = STEP  #: of the finite differences, in coordinates
 
 
 @dataclass(frozen=True, repr=False)
