@@ -24,11 +24,15 @@ def is_significant(candidate: Candidate, least_gain: float) -> bool:
     """Whether noise would hardly do as well: ``least_gain`` is the share by which some signal's error must fall."""
     return (
         candidate.p_family <= ALARM
-        and is_beyond_chance(candidate.gains, 5.0)
-        and not candidate.harms
+        and (is_beyond_chance(candidate.evidence, 5.0) or _shows_in_some(candidate))
         and candidate.largest_fall >= least_gain
         and candidate.share >= LEAST_SHARE
     )
+
+
+def _shows_in_some(candidate: Candidate) -> bool:
+    """Whether the windows of some recordings are surely better with an effect, and no recording surely worse."""
+    return is_beyond_chance(candidate.gains, 5.0) and not candidate.harms
 
 
 def indistinguishable(winner: Candidate, other: Candidate) -> bool:

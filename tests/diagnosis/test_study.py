@@ -41,5 +41,6 @@ def test_recordings_decide_between_effects_and_none_may_be_harmed(made_up):
     rival = dataclasses.replace(good, gains=9 * many, of_recordings=np.array([0.0, 180, 180]), signature=other)
     assert indistinguishable(winner, rival)
     assert not indistinguishable(*(dataclasses.replace(c, of_recordings=None) for c in (winner, rival)))
-    assert is_significant(winner, 0.02)
+    assert is_significant(winner, 0.02)  # it shows in one motion alone, and does no harm
     assert not is_significant(dataclasses.replace(winner, harms=True), 0.02)
+    assert is_significant(dataclasses.replace(winner, harms=True, of_recordings=np.array([200.0, 150, 50])), 0.02)
