@@ -37,7 +37,7 @@ def test_recordings_decide_between_effects_and_none_may_be_harmed(made_up):
     good = dataclasses.replace(good, p_family=0.002, share=0.9, largest_fall=0.5)
     one, other = np.array([1.0, 0.0]), np.array([0.0, 1.0])
     many = np.ones(40)  # windows that all agree, of three recordings that do not
-    winner = dataclasses.replace(good, gains=10 * many, of_recordings=np.array([390.0, 5, 5]), signature=one)
+    winner = dataclasses.replace(good, gains=10 * many, of_recordings=np.array([405.0, -2, -3]), signature=one)
     rival = dataclasses.replace(good, gains=9 * many, of_recordings=np.array([0.0, 180, 180]), signature=other)
     assert indistinguishable(winner, rival)
     assert not indistinguishable(*(dataclasses.replace(c, of_recordings=None) for c in (winner, rival)))
