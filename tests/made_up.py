@@ -25,6 +25,7 @@ from forcegrasp.identify.target import make_target
 from forcegrasp.identify.verdict import Verdict
 from forcegrasp.measure import MeasuredGrasp, MeasurementSet
 from forcegrasp.physics.gripper_file import load_gripper
+from forcegrasp.replay.next_grasp import NextGrasp
 
 #: A name that does harm wherever it is not escaped.
 NASTY = "<script>alert(1)</script> $\\frac{1}{0}$ & [red]"
@@ -110,9 +111,12 @@ def made_up() -> SimpleNamespace:
 
     time, command = grasps[0].time_s, grasps[0].command_m
     predicted = np.stack([target.signals[0], target.signals[0] + 3 * SIGMA])
+    next_grasp = NextGrasp(
+        grasp="slow ramp", object="thing 0", gripper="tiago", radius_m=0.02, offset_m=0.0, contact=0.02, squeeze=0.003
+    )
     advice = Advice(
-        "slow ramp", ("force_bias", "force_drift"), {"slow ramp": 3.0, "long hold": 1.0}, "thing 0", time, command,
-        predicted,
+        next_grasp, ("force_bias", "force_drift"), {"slow ramp": 3.0, "long hold": 1.0},
+        {"slow ramp": 0.9, "long hold": 0.2}, time, command, predicted,
     )  # fmt: skip
     after_model = model_of(candidates[0].fit, target, loaded, [])
     return SimpleNamespace(

@@ -88,10 +88,10 @@ def diagnosis_json(diagnosis: Diagnosis, advice: Advice | None, tried: Sequence[
         "floor_ratio": diagnosis.error_after,
         "floor": diagnosis.floor,
         "next_grasp": None if advice is None else {
-            "grasp": advice.grasp,
+            **advice.next_grasp.model_dump(),
             "tells_apart": list(advice.rivals),
             "differences": dict(advice.differences),
-            "object": advice.object,
+            "bits": advice.bits[advice.grasp],
         },
         "where": where(diagnosis),
         "reason": diagnosis.base.reason,
@@ -286,7 +286,7 @@ def _candidates_table(step: Step, diagnosis: Diagnosis) -> Table:
 
 
 def _advice_section(diagnosis: Diagnosis, advice: Advice) -> Section:
-    ordered = sorted(advice.differences.items(), key=lambda item: -item[1])
+    ordered = sorted(advice.differences.items(), key=lambda item: (item[0] != advice.grasp, -item[1]))
     one, other = advice.rivals
     return Section(
         "What to record next",
@@ -294,11 +294,11 @@ def _advice_section(diagnosis: Diagnosis, advice: Advice) -> Section:
             Text(f"{advice.sentence()[0].upper()}{advice.sentence()[1:]}.", strong=True),
             Picture(
                 figures.rivals(diagnosis.target, advice.time_s, advice.command_m, advice.predicted, advice.rivals),
-                f"What {one} and {other} predict of the grasp “{advice.grasp}” on {advice.object}.",
+                f"What {one} and {other} predict of the grasp “{advice.grasp}” on {advice.next_grasp.object}.",
             ),
             Table(
-                ("grasp", f"difference of {one} and {other} ÷ noise, rms"),
-                [(grasp, f"{apart:.2f}") for grasp, apart in ordered],
+                ("grasp", f"difference of {one} and {other} ÷ noise, rms", "expected to tell, bits of 1"),
+                [(grasp, f"{apart:.2f}", f"{advice.bits[grasp]:.2f}") for grasp, apart in ordered],
                 frozenset({0}),
             ),
         ],

@@ -20,6 +20,7 @@ from forcegrasp.effects import get_effect
 from forcegrasp.identify.base_fit import BaseFit
 from forcegrasp.identify.fit import Fit
 from forcegrasp.identify.fitted_model import model_of
+from forcegrasp.replay.next_grasp import NextGrasp
 from forcegrasp.reports import comparison as comparison_report
 from forcegrasp.reports import diagnosis as diagnosis_report
 from forcegrasp.reports import figures
@@ -245,6 +246,8 @@ def test_diagnosis_json(made_up, verdict, tmp_path):
     if advice:
         assert found["next_grasp"]["tells_apart"] == ["force_bias", "force_drift"]
         assert (found["next_grasp"]["grasp"], found["next_grasp"]["differences"]["slow ramp"]) == ("slow ramp", 3.0)
+        assert found["next_grasp"]["bits"] == 0.9
+        assert {key: found["next_grasp"][key] for key in NextGrasp.model_fields} == advice.next_grasp.model_dump()
     else:
         assert found["next_grasp"] is None
     place = found["where"]
