@@ -29,23 +29,23 @@ from forcegrasp.models.model_file import Model, read_model, write_model
 from forcegrasp.short_repr import cut
 
 Writable = TypeVar("Writable", FitResult, AddResult)
-AnySet = Loaded[MeasurementSet] | Loaded[FinalForceTable] | str | Path
+AnySet = Loaded[MeasurementSet] | Loaded[FinalForceTable] | str | Path | Sequence[str | Path]
 AnyModel = Model | ModelResult | str | Path
 
 
-def load(path: str | Path) -> Loaded[MeasurementSet] | Loaded[FinalForceTable]:
-    """Reads and checks a measurement set.
+def load(path: str | Path | Sequence[str | Path]) -> Loaded[MeasurementSet] | Loaded[FinalForceTable]:
+    """Reads and checks a measurement set, or several of one gripper and kind, which are joined.
 
     Args:
-      path: a folder with ``meta.yaml``, ``grasps.csv`` and ``samples.csv`` (or ``samples.parquet``); or, for a table of
-        final forces, with ``meta.yaml`` and ``table.csv``.
+      path: a folder, or a list of several, with ``meta.yaml``, ``grasps.csv`` and ``samples.csv`` (or
+        ``samples.parquet``); or, for a table of final forces, with ``meta.yaml`` and ``table.csv``.
 
     Returns:
       The set in ``measured``, its gripper, and in ``warnings`` what looks wrong with it.
 
     Raises:
-      MeasurementError: if the set can't be right: file, row, column and what to do.
-      ConfigError: if its gripper is unknown.
+      MeasurementError: if the set can't be right: file, row, column and what to do; or if sets can't be joined.
+      ConfigError: if its gripper is unknown, or sets are of several.
     """
     return loading.load(path)
 
@@ -56,7 +56,7 @@ def compare(
     """Finds out where a model fails on measured grasps.
 
     Args:
-      data: what :func:`load` returns, or the set's folder.
+      data: what :func:`load` returns, or what it takes.
       model: what :func:`fit`, :func:`diagnose` or :func:`add` returned, or a model's file; a model that was fitted to
         other grasps is tested on all of these. Without one, the base model is fitted to these grasps first.
       seed: of the fit's starts.
@@ -80,7 +80,7 @@ def fit(data: AnySet, *, out: str | Path | None = None, seed: int = 0, progress:
     """Fits a gripper's base model to measured grasps, from several starts.
 
     Args:
-      data: what :func:`load` returns, or the set's folder.
+      data: what :func:`load` returns, or what it takes.
       out: the file to write the model to; none by default.
       seed: of the fit's starts.
       progress: takes lines about what is done, such as ``print``; silent by default.
@@ -108,7 +108,7 @@ def diagnose(
     """Finds out which physical effects a model lacks, and which grasp to record next.
 
     Args:
-      data: what :func:`load` returns, or the set's folder; six grasps at least.
+      data: what :func:`load` returns, or what it takes; six grasps at least.
       model: what to start from, as for :func:`compare`; its parameters are fitted again. The base model by default.
       effects: names of the effects to try; the whole catalogue by default.
       seed: of the fit's starts and of the null distribution.
@@ -142,7 +142,7 @@ def add(
     """Adds an effect to a model and fits it again, if the error on held-out grasps falls by that.
 
     Args:
-      data: what :func:`load` returns, or the set's folder; two grasps at least.
+      data: what :func:`load` returns, or what it takes; two grasps at least.
       model: the model to add to, as for :func:`compare`.
       effect: its name; :func:`diagnose` tells which.
       out: the file to write the model to; none by default.
@@ -182,6 +182,8 @@ def report(result: ModelResult | TableResult, out: str | Path | None = None) -> 
     folder = measuring.check_folder(default_out(verb, str(out or "")))
     for name, model in result.models().items():
         write_model(model, folder / name)
+    if isinstance(result, DiagnoseResult) and result.advice is not None:
+        result.advice.next_grasp.write_commands(folder / measuring.NEXT_GRASP, result.data.gripper)
     return measuring.write_files(
         folder, result.file, result.to_dict(), result.title, result.box(folder), result.sections(), result.data
     )

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from forcegrasp.cli.results import default_out, need, print_table, progress_printer
+import shlex
+
+from forcegrasp.cli.results import default_out, need, need_sets, print_table, progress_printer
 from forcegrasp.cli.verb import Verb
 from forcegrasp.config.verbs import AddConfig
 
 NOTES = """
-  SET              the same as data=SET
+  SET ...          the same as data=SET; several of one gripper are joined: 'data=[A,B]'
   data=my_set      the grasps to fit to
   model=FILE       what forcegrasp fit or add wrote
   effect=NAME      see forcegrasp effects; forcegrasp diagnose tells which
@@ -17,7 +19,7 @@ NOTES = """
 
 def run(config: AddConfig) -> None:
     """Runs the verb."""
-    data = need(config.data, "data", "my_set")
+    folders = need_sets(config.data)
     old = need(config.model, "model", "model.yaml")
     need(config.effect, "effect", "backlash")
 
@@ -41,13 +43,14 @@ def run(config: AddConfig) -> None:
     check_effects("effect", [config.effect])
     folder = check_folder(default_out("add", ""))
     path = check_file(folder / "model.yaml" if not config.out else need(config.out, "out", "better.yaml"))
-    loaded = refuse_table(loading.load(data), "add")
+    loaded = refuse_table(loading.load(folders), "add")
+    data = loaded.measured.path
     refuse_one_grasp(loaded)
     (effect,) = diagnose_set.chosen_effects(loaded.gripper, [config.effect])
     model, loaded = take_model(old, loaded)
     tell_warnings(loaded)
     added = add_effect.add_effect(loaded, model, effect, progress_printer())
-    refuse_useless(added, effect, f"forcegrasp diagnose data={data} model={old}")
+    refuse_useless(added, effect, shlex.join(["forcegrasp", "diagnose", f"data={data}", f"model={old}"]))
     lead = fit_report.add_answer(added, effect)
     print_table(fit_report.printed_fall(added, effect))
     print_table(fit_report.printed_parameters(added.model))

@@ -5,12 +5,12 @@ from __future__ import annotations
 import dataclasses
 from pathlib import Path
 
-from forcegrasp.cli.results import default_out, need, print_table, progress_printer
+from forcegrasp.cli.results import default_out, need_sets, print_table, progress_printer
 from forcegrasp.cli.verb import Verb
 from forcegrasp.config.verbs import CompareConfig
 
 NOTES = """
-  SET              the same as data=SET
+  SET ...          the same as data=SET; several of one gripper are joined: 'data=[A,B]'
   data=my_set      a folder with meta.yaml, grasps.csv and samples.csv (or samples.parquet); or, for a table of final
                    forces, with meta.yaml and table.csv
   model=FILE       what forcegrasp fit or add wrote; a model that was fitted to other grasps is tested on all of these
@@ -19,7 +19,7 @@ NOTES = """
 
 def run(config: CompareConfig) -> None:
     """Runs the verb."""
-    data = need(config.data, "data", "my_set")
+    folders = need_sets(config.data)
 
     from forcegrasp.cli.measuring import (
         BASE_MODEL,
@@ -36,7 +36,8 @@ def run(config: CompareConfig) -> None:
     from forcegrasp.reports.next_step import after_comparison
 
     out = check_folder(default_out("compare", config.out))
-    loaded = loading.load(data)
+    loaded = loading.load(folders)
+    data = loaded.measured.path
     if is_table(loaded):
         report_table(loaded, "compare", out, model=config.model)
         return

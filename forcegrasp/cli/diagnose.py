@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from forcegrasp.cli.results import default_out, need, print_table, progress_printer
+from forcegrasp.cli.results import default_out, need_sets, print_table, progress_printer
 from forcegrasp.cli.verb import Verb
 from forcegrasp.config.verbs import DiagnoseConfig
 
 NOTES = """
-  SET              the same as data=SET
+  SET ...          the same as data=SET; several of one gripper are joined: 'data=[A,B]'
   data=my_set      a folder with meta.yaml, grasps.csv and samples.csv (or samples.parquet); or, for a table of final
                    forces, with meta.yaml and table.csv
   model=FILE       what forcegrasp fit or add wrote; its parameters are fitted again
@@ -19,17 +19,19 @@ NOTES = """
   set seems to be wrong, not the model), explained (nothing is missing), unknown (none of the effects), not_fitted (the
   base model can't be fitted to these data).
   Beside the report, base_model.yaml holds the base model that was fitted, if none is given; if effects are found,
-  model.yaml holds the model with all of them (with one_of: with the first).
+  model.yaml holds the model with all of them (with one_of: with the first); if another grasp would tell effects
+  apart, next_grasp.csv holds its commands.
 """
 
 
 def run(config: DiagnoseConfig) -> None:
     """Runs the verb."""
-    data = need(config.data, "data", "my_set")
+    folders = need_sets(config.data)
 
     from forcegrasp.cli.measuring import (
         BASE_MODEL,
         FOUND_MODEL,
+        NEXT_GRASP,
         base_model,
         check_effects,
         check_folder,
@@ -46,11 +48,12 @@ def run(config: DiagnoseConfig) -> None:
     from forcegrasp.models.model_file import write_model
     from forcegrasp.reports import diagnosis as diagnosis_report
     from forcegrasp.reports.diagnosis_box import answer_box
-    from forcegrasp.reports.next_step import after_diagnosis
+    from forcegrasp.reports.next_step import after_diagnosis, next_grasp_words
 
     check_effects("effects", config.effects)
     out = check_folder(default_out("diagnose", config.out))
-    loaded = loading.load(data)
+    loaded = loading.load(folders)
+    data = loaded.measured.path
     if is_table(loaded):
         report_table(loaded, "diagnosis", out, model=config.model, effects=config.effects)
         return
@@ -74,6 +77,9 @@ def run(config: DiagnoseConfig) -> None:
         better = model_of(diagnosis.fit, diagnosis.target, loaded, diagnosis.numerical)
         write_model(better, found)
         print(f"wrote {found}: the model with {', '.join(e.effect.name for e in better.effects)}")
+    if advice is not None:
+        advice.next_grasp.write_commands(out / NEXT_GRASP, loaded.gripper)
+        print(f"wrote {out / NEXT_GRASP}: {next_grasp_words(loaded.measured, out / 'diagnosis.json')}")
     print("\n".join(f"{'or' if k else 'next'}: {command}" for k, command in enumerate(commands)))
     write_results(
         out,

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from forcegrasp.cli.results import default_out, need, print_table, progress_printer
+from forcegrasp.cli.results import default_out, need, need_sets, print_table, progress_printer
 from forcegrasp.cli.verb import Verb
 from forcegrasp.config.verbs import FitConfig
 
 NOTES = """
-  SET              the same as data=SET
+  SET ...          the same as data=SET; several of one gripper are joined: 'data=[A,B]'
   data=my_set      a folder with meta.yaml, grasps.csv and samples.csv (or samples.parquet)
   out=model.yaml   text that may be edited: values with 95 % intervals; the report goes into runs/fit_TIME
 """
@@ -15,7 +15,7 @@ NOTES = """
 
 def run(config: FitConfig) -> None:
     """Runs the verb."""
-    data = need(config.data, "data", "my_set")
+    folders = need_sets(config.data)
 
     from forcegrasp.cli.measuring import (
         base_model,
@@ -32,7 +32,8 @@ def run(config: FitConfig) -> None:
 
     folder = check_folder(default_out("fit", ""))
     path = check_file(folder / "model.yaml" if not config.out else need(config.out, "out", "model.yaml"))
-    loaded = refuse_table(loading.load(data), "fit")
+    loaded = refuse_table(loading.load(folders), "fit")
+    data = loaded.measured.path
     tell_warnings(loaded)
     target, _, base = fit_set.fit_model(loaded, config.seed, progress_printer())
     model = base_model(base, target, loaded)

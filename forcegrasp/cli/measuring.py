@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 BASE_MODEL = "base_model.yaml"
 #: The model with all effects that a diagnosis found, beside its report.
 FOUND_MODEL = "model.yaml"
+#: The commands of the grasp that a diagnosis proposes, beside its report.
+NEXT_GRASP = "next_grasp.csv"
 #: With an effect added, the error must fall to less than this share.
 LEAST_FALL = 0.995
 

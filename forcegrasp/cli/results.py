@@ -34,6 +34,15 @@ def need(value: str, option: str, example: str) -> Path:
     return Path(value)
 
 
+def need_sets(data: list[str]) -> list[Path]:
+    """The folders of the measurement sets.
+
+    Raises:
+      ConfigError: if there are none.
+    """
+    return [need(one, "data", "my_set") for one in data or [""]]
+
+
 def progress_printer() -> Callable[[str], None]:
     """Prints what is going on, with the seconds since the start."""
     start = time.monotonic()

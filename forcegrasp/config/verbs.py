@@ -73,6 +73,10 @@ class RecordConfig:
     )
     out: str = option("", "folder for the set; must not exist or be empty; runs/record_TIME if empty")
     effects: list[str] = option([], "effects to record with, each 'NAME [VARIANT] [PARAMETER=VALUE ...]'")
+    next: str = option(
+        "",
+        "diagnosis.json: record the grasp that it proposes instead of a plan; all else as the set was recorded with",
+    )
     gripper: str = option(DEFAULT_GRIPPER, "gripper by name, or the path of a description")
     model: str = option("", "model file whose base parameters and effects to record with")
     grasps: int = option(24, "grasps in the set", low=1, high=10_000)
@@ -112,7 +116,9 @@ class ImportConfig:
 class CompareConfig:
     """`forcegrasp compare`."""
 
-    data: str = option("", "folder of the measurement set; also given without data=")
+    data: list[str] = option(
+        [], "folder of the measurement set, or of several of one gripper to join; also given without data="
+    )
     model: str = option("", "model file; the gripper's base model, fitted to the set, if empty")
     out: str = option("", "where to write report.html, compare.json and base_model.yaml; runs/compare_TIME if empty")
     seed: int = option(0, "seed of the fit's starts", low=0, high=2**31 - 1)
@@ -122,7 +128,9 @@ class CompareConfig:
 class FitConfig:
     """`forcegrasp fit`."""
 
-    data: str = option("", "folder of the measurement set; also given without data=")
+    data: list[str] = option(
+        [], "folder of the measurement set, or of several of one gripper to join; also given without data="
+    )
     out: str = option("", "model file to write; runs/fit_TIME/model.yaml if empty")
     seed: int = option(0, "seed of the fit's starts", low=0, high=2**31 - 1)
 
@@ -131,7 +139,9 @@ class FitConfig:
 class DiagnoseConfig:
     """`forcegrasp diagnose`."""
 
-    data: str = option("", "folder of the measurement set; also given without data=")
+    data: list[str] = option(
+        [], "folder of the measurement set, or of several of one gripper to join; also given without data="
+    )
     model: str = option("", "model file to start from; the base model is fitted to the set if empty")
     out: str = option("", "where to write report.html, diagnosis.json and models; runs/diagnose_TIME if empty")
     effects: list[str] = option([], "effects to consider; all of the catalogue if empty")
@@ -142,7 +152,9 @@ class DiagnoseConfig:
 class AddConfig:
     """`forcegrasp add`."""
 
-    data: str = option("", "folder of the measurement set; also given without data=")
+    data: list[str] = option(
+        [], "folder of the measurement set, or of several of one gripper to join; also given without data="
+    )
     model: str = option("", "model file to add to")
     effect: str = option("", "effect to add, see forcegrasp effects")
     out: str = option("", "model file to write; runs/add_TIME/model.yaml if empty")

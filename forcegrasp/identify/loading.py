@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
+from forcegrasp.errors import ConfigError
 from forcegrasp.identify.sensor_noise import check_given_noise
 from forcegrasp.identify.windows import cut
 from forcegrasp.measure import FinalForceTable, MeasurementSet, check_servo, check_set, check_table, read_set
 from forcegrasp.measure.check_givens import check_givens
+from forcegrasp.measure.checks import ALONE
+from forcegrasp.measure.join import join
 from forcegrasp.models.model_file import Model
 from forcegrasp.physics.gripper import SKEW, Gripper
 from forcegrasp.physics.gripper_file import load_gripper
@@ -39,13 +43,21 @@ class Loaded(ShortRepr, Generic[Measured]):
         return f"{self.measured.summary()}; {counted(len(self.warnings), 'warning')}"
 
 
-def load(path: str | Path) -> Loaded[MeasurementSet] | Loaded[FinalForceTable]:
-    """Reads and checks a set.
+def load(data: str | Path | Sequence[str | Path]) -> Loaded[MeasurementSet] | Loaded[FinalForceTable]:
+    """Reads and checks a set, or several of one gripper, which are joined.
 
     Raises:
-      MeasurementError: if the set can't be right.
-      ConfigError: if its gripper is unknown.
+      MeasurementError: if the set can't be right, or the sets can't be joined.
+      ConfigError: if its gripper is unknown, or the sets are of several.
     """
+    paths = [data] if isinstance(data, (str, Path)) else list(data)
+    if not paths:
+        raise ConfigError("data=[]: name a set")
+    loaded = [_load(path) for path in paths]
+    return _joined(loaded) if len(loaded) > 1 else loaded[0]
+
+
+def _load(path: str | Path) -> Loaded[MeasurementSet] | Loaded[FinalForceTable]:
     measured = read_set(path)
     gripper = load_gripper(measured.gripper, measured.path)
     if isinstance(measured, FinalForceTable):
@@ -58,6 +70,22 @@ def load(path: str | Path) -> Loaded[MeasurementSet] | Loaded[FinalForceTable]:
     warnings = check_set(measured, gripper.stroke, half_opening_m=half_opening_m, pads_at=gripper.pads_at)
     warnings += check_givens(measured, gripper.period_s)
     return Loaded(measured, gripper, warnings + check_given_noise(measured, gripper.unit))
+
+
+def _joined(loaded: Sequence[Loaded[MeasurementSet] | Loaded[FinalForceTable]]) -> Loaded[Any]:
+    first = loaded[0]
+    for one in loaded[1:]:
+        if _files(one.gripper) != _files(first.gripper):
+            grippers = f"{one.gripper.name}, {first.measured.path} of {first.gripper.name}"
+            raise ConfigError(f"{one.measured.path}: is of gripper {grippers}; only sets of one gripper can be joined")
+    measured = join([one.measured for one in loaded], first.gripper.name_or_path)
+    warned = [f"{one.measured.name}: {w}" for one in loaded for w in one.warnings if not w.endswith(ALONE)]
+    return Loaded(measured, first.gripper, [*warned, *measured.notes])
+
+
+def _files(gripper: Gripper) -> tuple[bytes, bytes]:
+    """What a gripper is: each set may have a copy of its description."""
+    return gripper.path.read_bytes(), gripper.model.read_bytes()
 
 
 def warn_of_other_set(loaded: Loaded[MeasurementSet], model: Model, name: object) -> Loaded[MeasurementSet]:

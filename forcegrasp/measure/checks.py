@@ -17,6 +17,8 @@ from forcegrasp.measure.schema import FinalForceTable, MeasurementSet
 
 #: A pause this many times the median sample interval is worth a warning.
 _GAP = 5
+#: What is said of a set that has a single grasp, unless it is joined with others.
+ALONE = "one grasp only; nothing can be held out to test a finding on"
 
 
 def check_set(
@@ -63,7 +65,7 @@ def check_set(
         pads_at = np.asarray
     check_signs(measured, open_m, closed_m, pads_at, half_opening_m)
     if len(measured.grasps) == 1:
-        warnings.append(f"{show(measured.path)}: one grasp only; nothing can be held out to test a finding on")
+        warnings.append(f"{show(measured.path)}: {ALONE}")
     return [*measured.notes, *warnings, *_gaps(measured), *check_copies(measured)]
 
 

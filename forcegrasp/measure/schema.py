@@ -115,7 +115,7 @@ class MeasuredGrasp(ShortRepr):
 class MeasurementSet(ShortRepr):
     """Grasps that were recorded with one gripper."""
 
-    path: Path  #: the folder, or what the set was converted from
+    path: Path  #: the folder, or what the set was converted from; of joined sets all folders, [a,b]
     name: str
     gripper: str
     source: str
@@ -199,6 +199,13 @@ def fingerprint_of_table(
     columns = [objects, delta_q_m.tolist(), final_force_n.tolist(), *([sessions] if sessions else [])]
     for row in sorted(zip(*columns, strict=True)):
         digest.facts(*row)
+    return digest.hex()
+
+
+def fingerprint_of_parts(fingerprints: Iterable[str], names: Iterable[str]) -> str:
+    """Returns a sha256 in hex of joined sets, whatever their order: of theirs, and the names that results use."""
+    digest = _Digest("joined", *sorted(fingerprints))
+    digest.facts(*sorted(names))
     return digest.hex()
 
 

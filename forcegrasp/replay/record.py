@@ -11,17 +11,26 @@ import numpy as np
 from forcegrasp.effects.for_gripper import effect_of
 from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.errors import ConfigError, closest
-from forcegrasp.measure.schema import MeasuredGrasp, MeasurementSet, columns_of, fingerprint_of_set
+from forcegrasp.measure.schema import (
+    RADIUS_STD_M,
+    MeasuredGrasp,
+    MeasurementSet,
+    columns_of,
+    fingerprint_of_set,
+)
 from forcegrasp.physics.gripper import Gripper
 from forcegrasp.physics.gripper_file import default_gripper
 from forcegrasp.physics.gripper_parts import BaseParameter
 from forcegrasp.physics.sensors import rounding_steps, with_noise
-from forcegrasp.replay.plans import PERIOD_S, SAMPLES, make_plan
+from forcegrasp.replay.next_grasp import NextGrasp
+from forcegrasp.replay.plans import PERIOD_S, SAMPLES, PlannedGrasp, make_plan
 from forcegrasp.replay.replay import EffectOn, Replay
 from forcegrasp.short_repr import ShortRepr
 
 # Objects' radii, as shares of half the opening: both fingers reach them, and they fit in.
 _RADII = (0.4, 0.75)
+# The next grasp's object is the one that was drawn if radii differ by so many standard deviations at most.
+_SAME_RADIUS = 3.0
 # Objects differ from the nominal one by up to this factor, either way.
 _OBJECT_FACTOR = 2.0
 
@@ -46,6 +55,7 @@ def record(
     position_std_m: float,
     force_std_n: float,
     seed: int,
+    next_grasp: NextGrasp | None = None,
 ) -> Recorded:
     """Simulates a measurement set.
 
@@ -60,6 +70,10 @@ def record(
       position_std_m: noise of the positions, m or rad.
       force_std_n: noise of the forces.
       seed: of everything random.
+      next_grasp: recorded in place of the plan, with other noise, on the object that the rest draws.
+
+    Raises:
+      ConfigError: if the next grasp's object is not one of those drawn.
     """
     rng = np.random.default_rng(seed)
     parameters = gripper.parameters.values()
@@ -70,7 +84,11 @@ def record(
     }
     of_objects = {p.name: _draw(p, objects, rng) for p in parameters if p.scope == "object" and p.name != "radius_m"}
     radii = rng.uniform(*_RADII, objects) * (gripper.opening.opening_m[-1] / 2)
-    planned = make_plan(plan, radii, grasps, gripper, rng)
+    if next_grasp is None:
+        planned = make_plan(plan, radii, grasps, gripper, rng)
+    else:
+        planned, grasps = [_planned(next_grasp, radii, gripper)], 1
+        plan, rng = f"next grasp ({next_grasp.grasp})", np.random.default_rng((seed, 1))
     object_index = np.array([p.object for p in planned])
     base = {name: np.full(grasps, value) for name, value in of_gripper.items()}
     base |= {name: values[object_index] for name, values in of_objects.items()}
@@ -103,6 +121,21 @@ def record(
     source = f"simulated by forcegrasp record, plan {plan}, seed {seed}"
     measured = MeasurementSet(Path(), "recorded", name, source, "none: simulated", *noise, full, fingerprint)
     return Recorded(measured, base)
+
+
+def _planned(proposed: NextGrasp, radii_m: np.ndarray, gripper: Gripper) -> PlannedGrasp:
+    """The proposed grasp of one of the objects that were drawn."""
+    names = [f"object_{index + 1}" for index in range(len(radii_m))]
+    place = f"next: is a grasp of {proposed.object!r}"
+    if proposed.object not in names:
+        raise ConfigError(
+            f"{place}, here are {names[0]} to {names[-1]}; give the options that the set was recorded with"
+        )
+    index = names.index(proposed.object)
+    if abs(radii_m[index] - proposed.radius_m) > _SAME_RADIUS * RADIUS_STD_M:
+        radii = f"{1e3 * proposed.radius_m:.4g} mm, here it has {1e3 * radii_m[index]:.4g} mm"
+        raise ConfigError(f"{place} with a radius of {radii}; give objects, seed and all else as for the set")
+    return PlannedGrasp(index, proposed.grasp, proposed.offset_m, proposed.command(gripper))
 
 
 def parse_effect(text: str, gripper: Gripper | None = None) -> EffectSetting:

@@ -12,6 +12,7 @@ from forcegrasp.effects.for_gripper import effect_of
 from forcegrasp.identify.comparison import Comparison
 from forcegrasp.identify.intervals import listed
 from forcegrasp.identify.verdict import Verdict
+from forcegrasp.measure import MeasurementSet
 from forcegrasp.physics.gripper import Gripper
 from forcegrasp.reports.comparison import at_floor
 from forcegrasp.reports.diagnosis_words import is_not_all
@@ -55,10 +56,18 @@ def after_diagnosis(
     with_all = f"the model that has {listed(d.preferred)}"
     if d.verdict is Verdict.ONE_OF:
         preferred = Command(f"until then take {first}, which is preferred", added.line)
-        return [Command(_to_tell_apart(d, advice), again), *([] if effect_of(first, gripper).of_set else [preferred])]
+        joined = _line("diagnose", f"data=[{str(data).strip('[]')},next]") if advice is not None else again
+        return [Command(_to_tell_apart(d, advice), joined), *([] if effect_of(first, gripper).of_set else [preferred])]
     if is_not_all(d):
         return [Command(f"look at what {with_all} leaves", _line("compare", f"data={data}", f"model={found}")), added]
     return [_use(with_all, found, data, gripper), added]
+
+
+def next_grasp_words(measured: MeasurementSet, diagnosis: Path) -> str:
+    """What the file with the commands of the next grasp is for; ``diagnosis`` is the JSON file beside it."""
+    if measured.source.startswith("simulated by forcegrasp record"):
+        return f"its commands. Simulated, it takes the command that recorded the set, with next={diagnosis} out=next"
+    return "its commands, a row at each control period; play them, and log the readings as a set such as next"
 
 
 def _to_tell_apart(diagnosis: Diagnosis, advice: Advice | None) -> str:
@@ -66,9 +75,8 @@ def _to_tell_apart(diagnosis: Diagnosis, advice: Advice | None) -> str:
     rivals = [effect_of(name, diagnosis.target.gripper) for name in step.effects]
     faults = "".join(f"check {e.name} in the set ({e.separates}); " for e in rivals if e.of_set)
     if advice is not None:
-        return (
-            f"{faults}{advice.sentence().replace('record next:', 'record', 1)}. Put it into the set, and diagnose again"
-        )
+        said = advice.sentence().replace("record next:", "record", 1)
+        return f"{faults}{said}. Make a set of it, such as next, and diagnose both"
     telling = "; ".join(f"{effect.name}: {effect.separates}" for effect in rivals if not effect.of_set)
     return f"{faults}record what tells them apart ({telling}), and diagnose again"
 

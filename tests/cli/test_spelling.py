@@ -22,8 +22,9 @@ ALIKE = [
     ("add", "effect", "backlash", ["effect=backlash", "effects=backlash", "effects=[backlash]"]),
     ("train", "ppo.hidden", [8], ["ppo.hidden=[8]", "ppo.hidden=8"]),
     ("train", "observation.parts", ["force"], ["observation.parts=[force]", "observation.parts=force"]),
-    ("compare", "data", "my set's", ["data='my set\\'s'", "my set's"]),
-    ("fit", "data", "seed=0", ["data='seed=0'", "seed=0"]),
+    ("compare", "data", ["my set's"], ["data='my set\\'s'", "my set's"]),
+    ("fit", "data", ["seed=0"], ["data='seed=0'", "seed=0"]),
+    ("diagnose", "data", ["runs/a", "b"], ["data=[runs/a,b]", "data=['runs/a', b]"]),
     ("curves", "folders", ["seed=0", "b"], ["folders=['seed=0',b]", "seed=0 folders=b"]),
     ("export", "run", "a", ["run=a", "a"]),
 ]  # fmt: skip
@@ -54,7 +55,7 @@ def test_every_verb_that_takes_something_by_position_takes_it_by_its_name():
 
 
 def test_it_is_how_a_configuration_is_made():
-    assert compose("diagnose", ["a set", "effect=backlash"]) == DiagnoseConfig(data="a set", effects=["backlash"])
+    assert compose("diagnose", ["a set", "effect=backlash"]) == DiagnoseConfig(data=["a set"], effects=["backlash"])
 
 
 @pytest.mark.parametrize("text", ["a", "it's", "a\\'b", "\\", "a\\b\\\\", "[a], {b}=3, ü", " a ", "'", '"'])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+import json
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +35,7 @@ RECORD_CASES: dict[str, Any] = {
     "plan": "close_and_hold",
     "out": "elsewhere",
     "effects": "[backlash]",
+    "next": "diagnosis.json",
     "gripper": SECOND_GRIPPER,
     "model": "model.yaml",
     "grasps": 2,
@@ -87,6 +90,10 @@ def test_the_same_recording_leaves_the_same(tmp_path, plain_recording):
 def test_option_of_record(name, tmp_path, plain_recording, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("model.yaml").write_text(MODEL.replace("EFFECTS", "{}"))
+    grasp = next(csv.DictReader(bytes.fromhex(plain_recording["grasps.csv"]).decode().splitlines()))
+    proposed = {"grasp": "long hold", "object": grasp["object"], "gripper": "tiago", "offset_m": 0.0, "contact": 0.02}
+    proposed |= {"radius_m": float(grasp["object_radius_m"]), "squeeze": 0.003}
+    Path("diagnosis.json").write_text(json.dumps({"verdict": "one_of", "next_grasp": proposed}))
     different = recorded(tmp_path / "set", **{name: RECORD_CASES[name]})
     said = {"meta.yaml"} if name != "seed" else set()  # which repeats the options
     samples = [f for f in different if f not in said]

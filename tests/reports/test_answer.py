@@ -107,7 +107,7 @@ def test_an_effect_that_contains_what_was_found_is_no_runner_up(made_up):
         ("effect", "forcegrasp train model=out/model.yaml", "the model that has force_bias"),
         (
             "one_of",
-            "forcegrasp diagnose 'data=my set'",
+            "forcegrasp diagnose 'data=[my set,next]'",
             "record slow ramp (on thing 0); there force_bias and force_drift",
         ),
         ("explained", "forcegrasp train model=out/base_model.yaml", "the model"),

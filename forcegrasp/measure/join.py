@@ -1,0 +1,128 @@
+"""Joins sets of one gripper, so that they are compared and fitted as one."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
+
+from forcegrasp.errors import MeasurementError
+from forcegrasp.measure.folder import show
+from forcegrasp.measure.schema import FinalForceTable, MeasurementSet, fingerprint_of_parts
+
+Measured = TypeVar("Measured", bound=MeasurementSet | FinalForceTable)
+
+# What must be said alike of all sets, besides the gripper.
+_SAME = ("position_std_m", "force_std_n", "radius_std_m", "offset_std_m")
+# An object's radius may differ between sets by so many standard deviations of its difference.
+_TOLERANCE = 3 * 2**0.5
+
+
+def join(sets: Sequence[Measured], gripper: str) -> Measured:
+    """Several sets of one kind as one; an object that several have is the same object, and sessions are their own.
+
+    Names of grasps and sessions that several sets have are told apart by the set's name.
+
+    Args:
+      sets: two at least, each with its folder as ``path``; the result's is all of them, as ``data=`` takes it.
+      gripper: the name or path of theirs.
+
+    Raises:
+      MeasurementError: if a set is there twice, or they are of several kinds, give another noise, or another radius of
+        an object.
+    """
+    first, names = sets[0], [one.name for one in sets]
+    labels = [one.name if names.count(one.name) == 1 else str(one.path) for one in sets]
+    for index, one in enumerate(sets):
+        for other in sets[:index]:
+            if one.fingerprint == other.fingerprint:
+                raise MeasurementError(f"{show(one.path)}: holds the same as {show(other.path)}; give each set once")
+        if _kind(one) != _kind(first):
+            kinds = f"is of kind {_kind(one)}, {show(first.path)} of kind {_kind(first)}"
+            raise MeasurementError(f"{show(one.path)}: {kinds}; only sets of one kind can be joined")
+        for key in _SAME:
+            given, before = getattr(one, key, None), getattr(first, key, None)
+            if given != before:
+                values = f"{_told(given)}, in {show(first.path)} {_told(before)}"
+                raise MeasurementError(f"{show(one.path / 'meta.yaml')}: {key} is {values}; give the same to join them")
+    facts = {
+        "path": Path(f"[{','.join(str(one.path) for one in sets)}]"),
+        "name": " + ".join(labels),
+        "gripper": gripper,
+        "source": "; ".join(dict.fromkeys(one.source for one in sets)),
+        "license": "; ".join(dict.fromkeys(one.license for one in sets)),
+    }
+    if isinstance(first, FinalForceTable):
+        return dataclasses.replace(first, **facts, **_rows([s for s in sets if isinstance(s, FinalForceTable)], labels))
+    return dataclasses.replace(first, **facts, **_grasps([s for s in sets if isinstance(s, MeasurementSet)], labels))
+
+
+def _grasps(sets: Sequence[MeasurementSet], labels: Sequence[str]) -> dict[str, object]:
+    _check_radii(sets)
+    grasp_names = _told_apart([[g.name for g in one.grasps] for one in sets], labels)
+    sessions = _told_apart([[g.session for g in one.grasps] for one in sets], labels)
+    grasps = tuple(
+        dataclasses.replace(grasp, name=name, session=session)
+        for one, *new in zip(sets, grasp_names, sessions, strict=True)
+        for grasp, name, session in zip(one.grasps, *new, strict=True)
+    )
+    fingerprint = fingerprint_of_parts((one.fingerprint for one in sets), (grasp.name for grasp in grasps))
+    return {"grasps": grasps, "fingerprint": fingerprint, "notes": _notes([{g.object for g in s.grasps} for s in sets])}
+
+
+def _rows(tables: Sequence[FinalForceTable], labels: Sequence[str]) -> dict[str, object]:
+    named = [one.sessions or (label,) * len(one.objects) for one, label in zip(tables, labels, strict=True)]
+    sessions = [name for own in _told_apart(named, labels) for name in own]
+    return {
+        "objects": tuple(name for one in tables for name in one.objects),
+        "delta_q_m": np.concatenate([one.delta_q_m for one in tables]),
+        "final_force_n": np.concatenate([one.final_force_n for one in tables]),
+        "sessions": tuple(sessions),
+        "fingerprint": fingerprint_of_parts((one.fingerprint for one in tables), sessions),
+        "notes": _notes([set(one.objects) for one in tables]),
+    }
+
+
+def _check_radii(sets: Sequence[MeasurementSet]) -> None:
+    """Raises MeasurementError about objects of one name that can't be one object."""
+    known: dict[str, list[tuple[float, Path]]] = {}
+    for one in sets:
+        own: dict[str, list[float]] = {}
+        for grasp in one.grasps:
+            own.setdefault(grasp.object, []).extend([] if grasp.radius_m is None else [grasp.radius_m])
+        for name, radii in own.items():
+            before = known.get(name, [])
+            pairs = [(abs(r - other), r, other, path) for r in radii for other, path in before]
+            apart, radius, other, path = min(pairs, default=(0.0, 0.0, 0.0, one.path))
+            if apart > _TOLERANCE * one.radius_std_m:
+                place = f"{show(one.path / 'grasps.csv')}: {show(name)}"
+                sizes = f"a radius of {1e3 * radius:.4g} mm, in {show(path)} {1e3 * other:.4g} mm"
+                raise MeasurementError(f"{place} has {sizes}; give another object another name")
+        for name, radii in own.items():
+            known.setdefault(name, []).extend((radius, one.path) for radius in set(radii))
+
+
+def _told_apart(names: Sequence[Sequence[str]], labels: Sequence[str]) -> list[list[str]]:
+    """The names of each set, those that several sets have with the set's label."""
+    sets_with = Counter(name for own in names for name in set(own))
+    return [
+        [f"{name} of {label}" if sets_with[name] > 1 else name for name in own]
+        for own, label in zip(names, labels, strict=True)
+    ]
+
+
+def _notes(objects: Sequence[set[str]]) -> tuple[str, ...]:
+    common = sorted(name for name, sets in Counter(n for own in objects for n in own if n).items() if sets > 1)
+    return (f"taken for the same object where several sets have it: {', '.join(map(show, common))}",) if common else ()
+
+
+def _kind(one: MeasurementSet | FinalForceTable) -> str:
+    return one.kind if isinstance(one, MeasurementSet) else "final_force"
+
+
+def _told(value: float | None) -> str:
+    return "not given" if value is None else f"{value:g}"
