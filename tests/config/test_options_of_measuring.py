@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -137,7 +138,7 @@ def begun(monkeypatch, verb: str, **values: Any) -> dict[str, Any]:
         raise BegunError(told(list(arguments)))
 
     def fitted(loaded, seed_or_model, *_, **__):
-        return loaded, seed_or_model, None
+        return loaded, seed_or_model, SimpleNamespace(fit=None)
 
     reached: dict[str, Any] = {}
     monkeypatch.setattr("forcegrasp.cli.measuring.check_folder", lambda path: reached.setdefault("folder", path))
@@ -147,6 +148,7 @@ def begun(monkeypatch, verb: str, **values: Any) -> dict[str, Any]:
         monkeypatch.setattr(home, name, stop)
     if verb == "diagnose":
         monkeypatch.setattr(fit_set, "fit_model", fitted)
+        monkeypatch.setattr(diagnose_set, "suspects", lambda *_: [])
     if verb != "add":
         monkeypatch.setattr(fit_set, "apply_model", fitted if verb == "diagnose" else stop)
     with pytest.raises(BegunError) as caught:
