@@ -19,6 +19,7 @@ from forcegrasp.cli.results import default_out
 from forcegrasp.config import CompareConfig, DiagnoseConfig, FitConfig, validate
 from forcegrasp.diagnosis import add_effect, diagnose_set
 from forcegrasp.diagnosis.advice import advise
+from forcegrasp.effects.law import write_law
 from forcegrasp.errors import ConfigError
 from forcegrasp.final_force.analysis import analyse_table
 from forcegrasp.identify import comparison, fit_set, loading
@@ -144,7 +145,7 @@ def add(
     Args:
       data: what :func:`load` returns, or the set's folder; two grasps at least.
       model: the model to add to, as for :func:`compare`.
-      effect: its name; :func:`diagnose` tells which.
+      effect: its name, :func:`diagnose` tells which; or the path of a law's file.
       out: the file to write the model to; none by default.
       progress: takes lines about what is done, such as ``print``; silent by default.
 
@@ -158,7 +159,7 @@ def add(
     loaded, show = _open(data, progress)
     grasps = measuring.refuse_table(loaded, "add")
     measuring.refuse_one_grasp(grasps)
-    (chosen,) = diagnose_set.chosen_effects(grasps.gripper, [effect])
+    chosen = measuring.effect_to_add(effect, grasps.gripper)
     given, grasps = _beside(model, grasps, show)
     added = add_effect.add_effect(grasps, given, chosen, show)
     measuring.refuse_useless(added, chosen, "forcegrasp.diagnose")
@@ -182,6 +183,8 @@ def report(result: ModelResult | TableResult, out: str | Path | None = None) -> 
     folder = measuring.check_folder(default_out(verb, str(out or "")))
     for name, model in result.models().items():
         write_model(model, folder / name)
+    if isinstance(result, DiagnoseResult) and result.diagnosis.law is not None:
+        write_law(result.diagnosis.law.law, folder / measuring.PROPOSED_LAW)
     return measuring.write_files(
         folder, result.file, result.to_dict(), result.title, result.box(folder), result.sections(), result.data
     )

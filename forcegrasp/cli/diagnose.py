@@ -19,7 +19,8 @@ NOTES = """
   set seems to be wrong, not the model), explained (nothing is missing), unknown (none of the effects), not_fitted (the
   base model can't be fitted to these data).
   Beside the report, base_model.yaml holds the base model that was fitted, if none is given; if effects are found,
-  model.yaml holds the model with all of them (with one_of: with the first).
+  model.yaml holds the model with all of them (with one_of: with the first). Where something is left that no effect
+  explains and a formula does, law.yaml holds that: forcegrasp add takes it as an effect.
 """
 
 
@@ -30,6 +31,7 @@ def run(config: DiagnoseConfig) -> None:
     from forcegrasp.cli.measuring import (
         BASE_MODEL,
         FOUND_MODEL,
+        PROPOSED_LAW,
         base_model,
         check_effects,
         check_folder,
@@ -41,11 +43,12 @@ def run(config: DiagnoseConfig) -> None:
     )
     from forcegrasp.diagnosis import diagnose_set
     from forcegrasp.diagnosis.advice import advise
+    from forcegrasp.effects.law import write_law
     from forcegrasp.identify import loading
     from forcegrasp.identify.fitted_model import model_of
     from forcegrasp.models.model_file import write_model
     from forcegrasp.reports import diagnosis as diagnosis_report
-    from forcegrasp.reports.next_step import after_diagnosis
+    from forcegrasp.reports.next_step import added_law, after_diagnosis
 
     check_effects("effects", config.effects)
     out = check_folder(default_out("diagnose", config.out))
@@ -73,6 +76,10 @@ def run(config: DiagnoseConfig) -> None:
         better = model_of(diagnosis.fit, diagnosis.target, loaded, diagnosis.numerical)
         write_model(better, found)
         print(f"wrote {found}: the model with {', '.join(e.effect.name for e in better.effects)}")
+    if diagnosis.law is not None:
+        write_law(diagnosis.law.law, law := out / PROPOSED_LAW)
+        with_it = found if diagnosis.verdict.lacks_effects else known
+        print(f"wrote {law}: the law, to name, edit and add: {added_law(data, with_it, law)}")
     print("\n".join(f"{'or' if k else 'next'}: {command}" for k, command in enumerate(commands)))
     write_results(
         out,

@@ -144,7 +144,7 @@ class AddConfig:
 
     data: str = option("", "folder of the measurement set; also given without data=")
     model: str = option("", "model file to add to")
-    effect: str = option("", "effect to add, see forcegrasp effects")
+    effect: str = option("", "effect to add, see forcegrasp effects; or the file of a law")
     out: str = option("", "model file to write; runs/add_TIME/model.yaml if empty")
 
 

@@ -56,6 +56,7 @@ from forcegrasp.reports.findings import (
 )
 from forcegrasp.reports.fit import ADVICE, rounding_words, steps_picture, symptom_picture
 from forcegrasp.reports.html import Answer, Command, Picture, Section, Table, Text
+from forcegrasp.reports.law import law_json, law_section, law_words
 from forcegrasp.reports.symptom import symptom_of
 from forcegrasp.reports.view import view_section
 
@@ -78,6 +79,7 @@ def diagnosis_json(diagnosis: Diagnosis, advice: Advice | None, tried: Sequence[
         "fault": None if diagnosis.fault is None else {
             "name": diagnosis.fault.name, "words": diagnosis.fault.words, "check": diagnosis.fault.check
         },
+        "law": law_json(diagnosis.law),
         "odd_grasps": [dataclasses.asdict(grasp) for grasp in diagnosis.odd],
         "steps": [_step_json(step, diagnosis) for step in diagnosis.steps],
         "ranking": ranking(diagnosis),
@@ -178,6 +180,7 @@ def answer_box(diagnosis: Diagnosis, advice: Advice | None, commands: Sequence[C
         ("How sure", certainty(d)),
         ("Runner-up", runner_up(d) if d.verdict.lacks_effects else ""),
         ("What is left", f"{left[:1].upper()}{left[1:]}{'.' if left else ''}"),
+        ("A law", f"{law_words(d.law)}." if d.law is not None else ""),
         ("Noise", noise_words(d) if d.verdict.names_effects else ""),
         ("Look first at", f"{odd_words(d)}." if d.odd and d.steps else ""),
         (
@@ -244,6 +247,8 @@ def lines(diagnosis: Diagnosis, advice: Advice | None) -> list[str]:
         text.append(row)
     if diagnosis.verdict is Verdict.UNKNOWN or diagnosis.verdict.names_effects:
         text.append(left_sentence(diagnosis))
+    if diagnosis.law is not None:
+        text.append(law_words(diagnosis.law))
     if advice is not None:
         text.append(advice.sentence())
     return [*text, noise_sentence(diagnosis.target), *(f"warning: {warning}" for warning in final_warnings(diagnosis))]
@@ -275,6 +280,7 @@ def sections(diagnosis: Diagnosis, advice: Advice | None, tried: Sequence[type[E
         found.append(_advice_section(diagnosis, advice))
     attempts = [_tried_section(diagnosis, tried)] if diagnosis.steps else []
     left, view = _left_sections(diagnosis), _view(diagnosis)
+    left += [law_section(diagnosis.law, diagnosis.target)] if diagnosis.law is not None else []
     return [view, *found, *attempts, *left] if diagnosis.effects else [view, *left, *found, *attempts]
 
 

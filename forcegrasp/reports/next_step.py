@@ -70,6 +70,11 @@ def _to_tell_apart(diagnosis: Diagnosis, advice: Advice | None) -> str:
     return f"record what tells them apart ({telling}), and diagnose again"
 
 
+def added_law(data: str | Path, model: str | Path, law: str | Path) -> str:
+    """The command that adds a law to the model that it was found with."""
+    return _line("add", f"data={data}", f"model={model}", f"effect={law}", "out=better.yaml")
+
+
 def after_comparison(comparison: Comparison, data: str | Path, model: str | Path) -> list[Command]:
     """What to do after a comparison with this model."""
     if at_floor(comparison.floor_ratio(), comparison.floor):
