@@ -209,8 +209,9 @@ def _beside(model: AnyModel, loaded: Loaded[MeasurementSet], show: Progress) -> 
 
 
 def _file_of(model: AnyModel | None) -> str:
-    """The path of a model that was given as a file; empty otherwise."""
-    return str(model) if isinstance(model, (str, Path)) else ""
+    """Where a model that was given lies, for commands to type; FILE if it lies nowhere, empty if there is none."""
+    path = model if isinstance(model, (str, Path)) else getattr(model, "path", None)
+    return "" if model is None else str(path or "FILE")
 
 
 def _name(model: AnyModel) -> str:

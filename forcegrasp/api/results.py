@@ -27,6 +27,7 @@ from forcegrasp.reports import diagnosis as diagnosis_report
 from forcegrasp.reports import final_force as final_force_report
 from forcegrasp.reports import fit as fit_report
 from forcegrasp.reports import next_step
+from forcegrasp.reports.diagnosis_box import answer_box
 from forcegrasp.reports.html import Answer, Section
 from forcegrasp.short_repr import ShortRepr, counted, cut, some
 
@@ -78,7 +79,7 @@ class CompareResult(Result):
     model: Model  #: what was judged
     given: str  #: what that model was given as; empty if it is the base model, fitted to this set
     notes: tuple[str, ...]  #: what to bear in mind
-    given_file: str = ""  #: the model's file, if it was given as one
+    given_file: str = ""  #: where that model lies, as it stands in commands; empty as above
 
     file = "compare"
 
@@ -183,7 +184,7 @@ class DiagnoseResult(Result):
     advice: Advice | None  #: which grasp to record next
     tried: tuple[type[Effect], ...]
     only: tuple[str, ...]  #: the effects that were asked for; empty if all were tried
-    given_file: str = ""  #: the file of the model to start from, if it was given as one
+    given_file: str = ""  #: where the model to start from lies, as it stands in commands; empty if none was given
 
     file = "diagnosis"
 
@@ -240,7 +241,7 @@ class DiagnoseResult(Result):
     def box(self, folder: Path) -> Answer:
         known, found = self.given_file or folder / measuring.BASE_MODEL, folder / measuring.FOUND_MODEL
         commands = next_step.after_diagnosis(self.diagnosis, self.advice, self.data.measured.path, known, found)
-        return diagnosis_report.answer_box(self.diagnosis, self.advice, commands, self._note)
+        return answer_box(self.diagnosis, self.advice, commands, self._note)
 
     def models(self) -> dict[str, Model]:
         base = {} if self.given_file else {measuring.BASE_MODEL: self._base_model}

@@ -48,6 +48,7 @@ def run(config: DiagnoseConfig) -> None:
     from forcegrasp.identify.fitted_model import model_of
     from forcegrasp.models.model_file import write_model
     from forcegrasp.reports import diagnosis as diagnosis_report
+    from forcegrasp.reports.diagnosis_box import answer_box
     from forcegrasp.reports.next_step import added_law, after_diagnosis
 
     check_effects("effects", config.effects)
@@ -86,7 +87,7 @@ def run(config: DiagnoseConfig) -> None:
         "diagnosis",
         diagnosis_report.diagnosis_json(diagnosis, advice, tried, loaded.measured.name),
         f"What the model lacks: {loaded.measured.name}",
-        diagnosis_report.answer_box(diagnosis, advice, commands, note),
+        answer_box(diagnosis, advice, commands, note),
         diagnosis_report.sections(diagnosis, advice, tried),
         loaded,
     )

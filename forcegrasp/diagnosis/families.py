@@ -82,11 +82,23 @@ def refit_as_richer(container: type[Effect], fit: Fit, without: str, study: Stud
     return _refit(richer(known, container), fit, without, study)
 
 
-def _refit(settings: Sequence[EffectSetting], fit: Fit, without: str, study: Study) -> Fit:
+def refit_without(name: str, fit: Fit, study: Study) -> Fit:
+    """Fits a model that lacks one of the effects, from where the model stands."""
+    kept, start = _without(name, fit)
+    problem = Problem(fit.problem.gripper, fit.problem.grasps, kept)
+    return fit_exactly(study.target, problem, study.simulators, np.array(start))
+
+
+def _without(name: str, fit: Fit) -> tuple[list[EffectSetting], list[float]]:
+    """The other effects of a fit, and the coordinates of all but this one."""
     case = fit.problem.case(fit.vector)
-    kept = [one for one in case.effects if one.effect.name != without]
-    gone = [i for i, one in enumerate(case.effects) if one.effect.name == without]
-    base = [x for x, entry in zip(fit.vector, fit.problem.entries, strict=True) if entry.effect not in gone]
+    gone = [i for i, one in enumerate(case.effects) if one.effect.name == name]
+    start = [x for x, entry in zip(fit.vector, fit.problem.entries, strict=True) if entry.effect not in gone]
+    return [one for one in case.effects if one.effect.name != name], start
+
+
+def _refit(settings: Sequence[EffectSetting], fit: Fit, without: str, study: Study) -> Fit:
+    kept, base = _without(without, fit)
     problems = [Problem(fit.problem.gripper, fit.problem.grasps, [*kept, setting]) for setting in settings]
     starts = [np.r_[base, problem.start()[len(base) :]] for problem in problems]
     if len(starts) > 1:

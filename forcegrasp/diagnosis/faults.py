@@ -22,7 +22,7 @@ from forcegrasp.short_repr import ShortRepr, cut
 # A row's shift is worth a fit if it takes this share off the squares that a fit leaves beyond the noise.
 _WORTH = 0.5
 # A set of which a fit leaves less than so many times the noise is not doubted.
-_NOTHING = 1.05
+_NOTHING = 1.03
 
 
 @dataclass(frozen=True, repr=False)
@@ -63,12 +63,12 @@ def suspects(loaded: Loaded[MeasurementSet], target: Target, fit: Fit) -> list[F
         found.append(Fault("force_tare", words, "whether sensors were set to zero there", right))
     early = _early_readings(target, fit)
     if early:
-        words = f"{listed(early)} are what was read one row later"
+        late = ", or commands stand one row late" if len(early) > 1 else ""
+        words = f"{listed(early)} are what was read one row later{late}"
         check = "which row each column was written to, and its clock"
         found.append(Fault("early_row", words, check, _changed(loaded, lambda _, g: _one_row_later(g, early))))
     if not found and (moved := move_given(measured, target, fit)) is not None:
-        words = listed(moved.told or ["nothing by more than its standard deviation"])
-        right = _changed(loaded, lambda _, g: moved.put(g))
+        words, right = moved.words(measured), _changed(loaded, lambda _, g: moved.put(g))
         found.append(Fault("object_tolerance", words, "the objects, with a calliper", right, moved.price, True))
     return found
 

@@ -33,7 +33,7 @@ class Candidate(ShortRepr):
     setting: EffectSetting  #: the effect, as it was fitted
     fit: Fit
     p_family: float  #: probability that the best signature of sensor noise does as well
-    gains: np.ndarray  #: change of each held-out grasp's log-likelihood, ``(G,)``
+    gains: np.ndarray  #: change of each held-out grasp's log-likelihood, ``(G,)``; of a servo's recordings each one's
     error_after: float  #: held-out rms residual ÷ noise
     share: float  #: share of the mean square beyond the noise that it explains
     largest_fall: float  #: largest share by which the error of a signal in a phase falls

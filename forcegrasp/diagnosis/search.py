@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from forcegrasp.diagnosis import families
+from forcegrasp.diagnosis.needless import drop_needless
 from forcegrasp.diagnosis.noise_check import Noise, unexpected_noise
 from forcegrasp.diagnosis.odd_grasps import odd_grasps
 from forcegrasp.diagnosis.result import Diagnosis, Step, kept_steps
@@ -64,18 +65,23 @@ def diagnose(
         steps.append(Step((rounding.effect.name,), (), (), error_before, rms(study.heldout(fit), target)))
     signatures = Signatures(effects, study)
     for _ in range(MOST_EFFECTS):
-        known = {setting.effect for setting in fit.problem.effects}
-        untried = [e for e in effects if e not in known and not any(families.contain(e, other) for other in known)]
+        known, dropped = {setting.effect for setting in fit.problem.effects}, {step.replaces for step in steps}
+        untried = [
+            e for e in effects
+            if e not in known and e.name not in dropped and not any(families.contain(e, other) for other in known)
+        ]  # fmt: skip
         richer = list(families.extensions(fit, effects))
         if not untried and not richer:
             break
         step = look_further(study, fit, signatures, untried, rng, richer)
-        steps.append(step)
         if not step.effects:
+            steps.append(step)
             break
         progress(f"found {step.effects[0]}: held-out error {step.error_before:.2f} → {step.error_after:.2f} × noise")
         target, fit = reweigh(target, step.candidates[0].fit, simulators)
         study = dataclasses.replace(study, target=target)
+        step, fit = drop_needless(study, step, fit, len(base.fit.problem.effects))
+        steps.append(step)
         if not _left(study, fit)[0]:
             break
     error_after, (left, noise) = rms(study.heldout(fit), target), _left(study, fit)

@@ -17,7 +17,7 @@ from forcegrasp.diagnosis.study import Study
 from forcegrasp.diagnosis.verdict import explained_share
 from forcegrasp.effects import Effect
 from forcegrasp.identify.base_fit import rms_error
-from forcegrasp.identify.cross_validation import log_likelihood, rms
+from forcegrasp.identify.cross_validation import rms
 from forcegrasp.identify.fit import Fit, fit_exactly
 from forcegrasp.identify.noise_floor import cells, excess
 
@@ -193,7 +193,7 @@ class _Start:
     def _judge(self, refit: Fit, p_family: float, signature: np.ndarray, replaces: str = "") -> Candidate:
         """What held-out grasps say of a fit with one more effect, its last one."""
         target, held, after = self._study.target, self.held, self._study.heldout(refit)
-        gains = log_likelihood(target.weight * after) - log_likelihood(target.weight * held)
+        gains = self._study.gains(held, after)
         fall = max((1 - rms(after, target, w) / rms(held, target, w) for _, w in cells(target)), default=0.0)
         error = rms(after, target)
         share = explained_share(self.error, error)

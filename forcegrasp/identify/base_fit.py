@@ -45,10 +45,12 @@ def fit_base(
     progress: Progress = silent,
 ) -> BaseFit:
     """Fits from the nominal parameters, and then looks from random places inside the bounds for a better optimum."""
-    first = fit_once(target, problem, simulators, guess(target, problem))
+    start = guess(target, problem)
+    simulators.choose_step(target, problem, start)
+    first = fit_once(target, problem, simulators, start)
     progress(f"base model, start 1 of {STARTS}: {rms_error(first, target):.2f} × noise")
     few = _few_grasps(target)
-    small = _Subset(target, problem, few, first)
+    small = _Subset(target, problem, few, first, simulators.step)
     ends = [small.fit(small.known)]
     while len(ends) < STARTS or (len(ends) < MOST_STARTS and not _ends_agree(ends, small.target)):
         ends.append(small.fit(_random_start(small.problem, guess(small.target, small.problem), rng)))
@@ -68,7 +70,9 @@ def fit_base(
     further = check_gradient(fit_exactly(target, problem, simulators, first.vector), target, errors)
     if further.converged or simulators.cheap is simulators.exact:
         return further
-    return check_gradient(fit_exactly(target, problem, Simulators(problem, exact=True), first.vector), target, errors)
+    exact = Simulators(problem, exact=True)
+    exact.step = simulators.step
+    return check_gradient(fit_exactly(target, problem, exact, first.vector), target, errors)
 
 
 def _cost_tolerance(best: Fit, target: Target) -> float:
@@ -117,10 +121,11 @@ def _few_grasps(target: Target) -> np.ndarray:
 class _Subset:
     """The same problem on some of its grasps, with the cheap model corrected as in a fit of all of them."""
 
-    def __init__(self, target: Target, problem: Problem, keep: np.ndarray, fitted: Fit) -> None:
+    def __init__(self, target: Target, problem: Problem, keep: np.ndarray, fitted: Fit, step: float) -> None:
         self.target = target.subset(keep)
         self.problem = Problem(problem.gripper, self.target.grasps, problem.effects)
         self._simulators = Simulators(self.problem)
+        self._simulators.step = step
         self._correction = fitted.correction[keep][:, : self._simulators.exact.mask.shape[1]]
         self._full, self._fitted = problem, fitted
         names = [e.name for e in problem.entries]

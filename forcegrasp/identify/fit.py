@@ -16,8 +16,9 @@ from forcegrasp.short_repr import ShortRepr, counted
 
 # Slopes are measured anew after so many steps; in between they follow the values (Broyden 1965), if they are few.
 _SLOPES_LAST, _FEW = 3, 16
-# Step of the finite differences in a problem's coordinates: above contact noise, within the linear range.
-_STEP = 0.02
+# Step of the finite differences in a problem's coordinates: above contact noise, within the linear range. Where slopes
+# over three times as much differ by this share, in the median, the signals are rough, and the larger step smooths them.
+_STEP, _LARGER, _ROUGHNESS = 0.02, 3.0, 0.2
 # Relative change of the cost at which a fit ends, one that only ranks, and the most evaluations until then.
 _TOLERANCE, _ROUGH, _EVALUATIONS = 1e-4, 1e-3, 15
 
@@ -37,6 +38,20 @@ class Simulators:
         gripper, grasps = problem.gripper, problem.grasps
         self.exact = Replay(gripper, grasps)
         self.cheap = self.exact if exact or gripper.fast == "none" else Replay(gripper, grasps, tier="fitting")
+        self.step = _STEP  #: of the finite differences, in coordinates
+
+    def choose_step(self, target: Target, problem: Problem, at: np.ndarray) -> None:
+        """Takes larger differences where signals are rough, as those of a finger that sticks and slips are.
+
+        Args:
+          target: the measurements.
+          problem: whose slopes are compared.
+          at: coordinates at which they are, ``(p,)``.
+        """
+        steps = _STEP, _LARGER * _STEP
+        small, large = (_Local(target, problem, self.cheap, self.cheap, None, step).slopes(at) for step in steps)
+        change, size = (np.linalg.norm(one.reshape(-1, len(problem)), axis=0) for one in (large - small, large))
+        self.step = steps[bool(np.median(change / np.maximum(size, 1e-12)) > _ROUGHNESS)]
 
 
 @dataclass(frozen=True, repr=False)
@@ -99,7 +114,7 @@ def fit_once(
       known_slopes: of the first k coordinates from an earlier fit nearby, ``(G, S, C, k)``; they are kept, which spares
         most of the simulations.
     """
-    local = _Local(target, problem, simulators.cheap, simulators.cheap, known_slopes)
+    local = _Local(target, problem, simulators.cheap, simulators.cheap, known_slopes, simulators.step)
     vector = np.clip(start, problem.low + 1e-9, problem.high - 1e-9)
     free = np.ones(len(problem), bool) if free is None else free
     one_model = simulators.exact is simulators.cheap
@@ -124,7 +139,7 @@ def fit_exactly(target: Target, problem: Problem, simulators: Simulators, start:
 
     For effects with memory, such as play: where the two models differ, no correction makes up for it.
     """
-    local = _Local(target, problem, simulators.exact, simulators.cheap, None)
+    local = _Local(target, problem, simulators.exact, simulators.cheap, None, simulators.step)
     free = np.ones(len(problem), bool)
     start = np.clip(start, problem.low + 1e-9, problem.high - 1e-9)
     vector, total = _descend(local, start, 0.0, free, _TOLERANCE)
@@ -185,13 +200,14 @@ class _Local:
       values: simulates the values.
       slopes: simulates the slopes.
       known: slopes of the first coordinates, which are not to be found again, ``(G, S, C, k)``.
+      step: of the finite differences, in coordinates.
     """
 
     def __init__(
-        self, target: Target, problem: Problem, values: Replay, slopes: Replay, known: np.ndarray | None
+        self, target: Target, problem: Problem, values: Replay, slopes: Replay, known: np.ndarray | None, step: float
     ) -> None:
         self.target, self.problem = target, problem
-        self._values, self._slopes, self._known = values, slopes, known
+        self._values, self._slopes, self._known, self._step = values, slopes, known, step
         self._value: tuple[np.ndarray, np.ndarray] | None = None  # the last point, and the signals there
         self._slope: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None  # point, signals, slopes
         self._age = 0
@@ -223,8 +239,9 @@ class _Local:
         problem, target = self.problem, self.target
         count = 0 if self._known is None else self._known.shape[-1]
         groups = [group for group in problem.columns() if min(group) >= count]
-        step = np.where(x + _STEP > problem.high, -_STEP, _STEP)
-        step = np.where(np.abs(problem.high - problem.low) < 2 * _STEP, (problem.high - problem.low) / 4, step)
+        width = problem.high - problem.low
+        step = np.where(x + self._step > problem.high, -self._step, self._step)
+        step = np.where(width < 2 * self._step, width / 4, step)
         moved = [x + step * np.isin(np.arange(len(x)), group) for group in groups]
         same = self._values is self._slopes
         signals = predict(self._slopes, [problem.case(v) for v in (moved if same else [x, *moved])])

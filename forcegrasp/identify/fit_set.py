@@ -48,6 +48,8 @@ def apply_model(
         names = ", ".join(e.name for e, u in zip(problem.entries, unknown, strict=True) if u)
         progress(f"the model does not say {names}: fitted")
     free = np.ones(len(problem), bool) if refit else unknown
+    if refit:
+        simulators.choose_step(target, problem, vector)
     base = check_gradient(fit_once(target, problem, simulators, vector, free=free), target)
     return _weighed(target, simulators, base) if refit else (target, simulators, base)
 

@@ -29,17 +29,14 @@ from forcegrasp.reports.comparison import (
     worst_cell,
 )
 from forcegrasp.reports.diagnosis_words import (
-    certainty,
     fault_words,
     lacks,
     left_sentence,
     left_share,
     noise_words,
     odd_words,
-    percent,
     preference,
     row_sentence,
-    runner_up,
     shares_sentence,
 )
 from forcegrasp.reports.findings import (
@@ -55,7 +52,7 @@ from forcegrasp.reports.findings import (
     where,
 )
 from forcegrasp.reports.fit import ADVICE, rounding_words, steps_picture, symptom_picture
-from forcegrasp.reports.html import Answer, Command, Picture, Section, Table, Text
+from forcegrasp.reports.html import Picture, Section, Table, Text
 from forcegrasp.reports.law import law_json, law_section, law_words
 from forcegrasp.reports.symptom import symptom_of
 from forcegrasp.reports.view import view_section
@@ -138,7 +135,7 @@ def _of_model(diagnosis: Diagnosis) -> str:
         told = " ".join(filter(None, (lacks(d), shares_sentence(d))))
         return f"{told} {fall} the sensor noise; up to {d.floor:.2f} is noise. {rest}".rstrip()
     if d.verdict is Verdict.EXPLAINED:
-        of_noise = f"the error on held-out {d.target.part}s is {d.error_before:.2f} × the sensor noise"
+        of_noise = f"the error on held-out {d.target.part}s is {d.error_after:.2f} × the sensor noise"
         if noise:
             return f"The model explains these data: they show no missing effect; {of_noise}. {noise}"
         unsure = "" if d.error_after < UNSURE * d.floor else (
@@ -156,45 +153,6 @@ def _of_model(diagnosis: Diagnosis) -> str:
             f" {d.error_before:.2f} × the sensor noise, and {best}. Look at {place}."
         )
     return f"No diagnosis, for the base model is not fitted: {d.base.reason}. To do: {ADVICE}."
-
-
-def answer_box(diagnosis: Diagnosis, advice: Advice | None, commands: Sequence[Command], note: str = "") -> Answer:
-    """The answer as a box: what, how sure, the runner-up, what is left, and what to do next.
-
-    Args:
-      diagnosis: what was found.
-      advice: the next grasp, if there is one.
-      commands: what to do next, the best first.
-      note: what else to bear in mind.
-    """
-    d = diagnosis
-    fall = f"{d.error_before:.2f} → {d.error_after:.2f} × the sensor noise on held-out {d.target.part}s"
-    what = answer(d)
-    if d.verdict.names_effects:
-        what, left = lacks(d), left_sentence(d).removeprefix("what is left is ")
-        rows = [("Explains", shares_sentence(d)), ("Error", f"{fall}; up to {d.floor:.2f} is noise.")]
-    else:
-        left = left_sentence(d).removeprefix("what is left is ") if d.verdict is Verdict.UNKNOWN else ""
-        rows = []
-    rows += [
-        ("How sure", certainty(d)),
-        ("Runner-up", runner_up(d) if d.verdict.lacks_effects else ""),
-        ("What is left", f"{left[:1].upper()}{left[1:]}{'.' if left else ''}"),
-        ("A law", f"{law_words(d.law)}." if d.law is not None else ""),
-        ("Noise", noise_words(d) if d.verdict.names_effects else ""),
-        ("Look first at", f"{odd_words(d)}." if d.odd and d.steps else ""),
-        (
-            "Record next",
-            f"{advice.sentence().removeprefix('record next: ')}."
-            if advice is not None and d.verdict is not Verdict.ONE_OF
-            else "",
-        ),
-        ("Note", note),
-    ]
-    shares = d.shares() if d.verdict.names_effects else {}
-    shares |= {"left": left_share(d)} if shares else {}
-    parts = [(f"{name} {percent(share)}", share) for name, share in shares.items()]
-    return Answer(what, [(name, text) for name, text in rows if text], parts, commands)
 
 
 def printed(diagnosis: Diagnosis) -> Printed | None:

@@ -55,19 +55,22 @@ def after_diagnosis(
     with_all = f"the model that has {listed(d.preferred)}"
     if d.verdict is Verdict.ONE_OF:
         preferred = Command(f"until then take {first}, which is preferred", added.line)
-        return [Command(_to_tell_apart(d, advice), again), preferred]
+        return [Command(_to_tell_apart(d, advice), again), *([] if effect_of(first, gripper).of_set else [preferred])]
     if is_not_all(d):
         return [Command(f"look at what {with_all} leaves", _line("compare", f"data={data}", f"model={found}")), added]
     return [_use(with_all, found, data, gripper), added]
 
 
 def _to_tell_apart(diagnosis: Diagnosis, advice: Advice | None) -> str:
-    if advice is not None:
-        return f"{advice.sentence().replace('record next:', 'record', 1)}. Put it into the set, and diagnose again"
     step = next(step for step in kept_steps(diagnosis.steps) if len(step.effects) > 1)
     rivals = [effect_of(name, diagnosis.target.gripper) for name in step.effects]
-    telling = "; ".join(f"{effect.name}: {effect.separates}" for effect in rivals)
-    return f"record what tells them apart ({telling}), and diagnose again"
+    faults = "".join(f"check {e.name} in the set ({e.separates}); " for e in rivals if e.of_set)
+    if advice is not None:
+        return (
+            f"{faults}{advice.sentence().replace('record next:', 'record', 1)}. Put it into the set, and diagnose again"
+        )
+    telling = "; ".join(f"{effect.name}: {effect.separates}" for effect in rivals if not effect.of_set)
+    return f"{faults}record what tells them apart ({telling}), and diagnose again"
 
 
 def added_law(data: str | Path, model: str | Path, law: str | Path) -> str:

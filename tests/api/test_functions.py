@@ -47,9 +47,12 @@ def no_drawing(monkeypatch) -> None:
 
 
 def parts(folder: Path) -> tuple[str, dict]:
-    """Text of the report, and the figures but for the model's path."""
+    """Text of the report, and the figures, but for paths to type."""
     (file,) = folder.glob("*.json")
-    return (folder / "report.html").read_text("utf-8"), {**json.loads(file.read_text("utf-8")), "model": ""}
+    return re.sub(r"<code>(forcegrasp \w+) .*</code>", r"\1", (folder / "report.html").read_text("utf-8")), {
+        **json.loads(file.read_text("utf-8")),
+        "model": "",
+    }
 
 
 @pytest.mark.parametrize("line", CALLS)
@@ -82,12 +85,17 @@ def test_report_lies_where_the_verb_would_put_it_and_holds_the_models(work, mode
     assert effect.effect.name == "force_bias"
     assert not read_model(path.parent / "base_model.yaml").effects
     unknown = dataclasses.replace(fg.diagnose("my_set", model), diagnosis=work.made_up.diagnosis("unknown"))
+    assert unknown.box(Path("o")).commands[0].line.endswith(" model=model.yaml")
     given, fitted = fg.compare("my_set", model), fg.compare("my_set")
     made = [list(result.models()) for result in (fitted, given, fg.diagnose("my_set", model), unknown)]
     assert made == [["base_model.yaml"], [], ["model.yaml"], []]
     assert not unknown.model.effects
     assert given.to_dict()["model"] == "model.yaml"
-    assert fg.compare("my_set", given).to_dict()["model"] == repr(given)
+    again = fg.compare("my_set", given)
+    assert again.to_dict()["model"] == repr(given)
+    # what lies nowhere has no name to type
+    assert again.box(Path("o")).commands[0].line.endswith(" model=FILE")
+    assert fitted.box(Path("o")).commands[0].line.endswith(" model=o/base_model.yaml")
 
 
 @pytest.mark.parametrize(("kind", "call"), [("fit_model", fg.fit), ("diagnose_set", fg.diagnose)])

@@ -93,7 +93,7 @@ def test_the_hidden_effect_is_found(loop):
     assert found["ranking"][0]["p_family"] <= 0.01
     assert found["error_before"] > 2 > 1.1 > found["error_after"] == found["floor_ratio"]
     assert "lacks force_bias" in loop.printed["diagnose"]
-    assert "force is not zero in free air" in loop.printed["diagnose"]
+    assert "force_bias: without it the model misses force left by " in loop.printed["diagnose"]
     if found["next_grasp"]:
         assert f"record next: {found['next_grasp']['grasp']}" in loop.printed["diagnose"]
 

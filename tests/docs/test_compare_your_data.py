@@ -75,7 +75,9 @@ def shorten(folder: Path) -> None:
 
 def test_the_loop_runs_as_written(text, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("forcegrasp.reports.html._svg", lambda figure: "")  # tests/cli/test_measuring_verbs.py draws
+    # reports are drawn in tests/cli/test_measuring_verbs.py, evaluations in tests/evaluate
+    monkeypatch.setattr("forcegrasp.reports.html._svg", lambda figure: "")
+    monkeypatch.setattr("matplotlib.figure.Figure.savefig", lambda self, path, **kwargs: Path(path).touch())
     fit_each_set_once(monkeypatch)
     printed = {}
     for program, verb, *options in commands():

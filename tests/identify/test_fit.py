@@ -164,7 +164,7 @@ def test_slopes(fitted):
 def test_slopes_follow_the_values_between_measurements(fitted, monkeypatch):
     """Broyden's update (1965): along a step the new slopes give what was seen, across it they stay."""
     fit, target = fitted.fit, fitted.target
-    local = fit_module._Local(target, fit.problem, fitted.simulators.cheap, fitted.simulators.cheap, None)
+    local = fit_module._Local(target, fit.problem, fitted.simulators.cheap, fitted.simulators.cheap, None, 0.02)
     start, rng = fit.vector, np.random.default_rng(0)
     before, value = local.slopes(start), local.value(start)
     step = 0.2 * rng.standard_normal(len(start))

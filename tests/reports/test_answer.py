@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import yaml
 
+from forcegrasp.diagnosis.odd_grasps import OddGrasp
 from forcegrasp.diagnosis.result import Diagnosis
 from forcegrasp.effects import get_effect
 from forcegrasp.effects.setting import EffectSetting
@@ -16,7 +17,8 @@ from forcegrasp.identify.verdict import Verdict
 from forcegrasp.models.model_file import write_model
 from forcegrasp.reports import comparison as comparison_report
 from forcegrasp.reports import diagnosis as diagnosis_report
-from forcegrasp.reports.diagnosis_words import percent, place_of_rest, shares_sentence, weakest_step
+from forcegrasp.reports.diagnosis_box import answer_box, weakest_step
+from forcegrasp.reports.diagnosis_words import percent, place_of_rest, shares_sentence
 from forcegrasp.reports.html import Answer
 from forcegrasp.reports.next_step import after_comparison, after_diagnosis
 from forcegrasp.reports.symptom import symptom_of
@@ -38,7 +40,7 @@ def two_effects(made_up, **changed) -> Diagnosis:
 
 def box(diagnosis: Diagnosis, advice=None) -> Answer:
     commands = after_diagnosis(diagnosis, advice, "my set", "out/base_model.yaml", "out/model.yaml")
-    return diagnosis_report.answer_box(diagnosis, advice, commands, "Only some were tried.")
+    return answer_box(diagnosis, advice, commands, "Only some were tried.")
 
 
 def test_the_headline_says_how_much_each_effect_explains(made_up):
@@ -132,6 +134,31 @@ def test_what_leaves_much_is_looked_at_before_it_is_used(made_up):
     assert first.line == "forcegrasp compare 'data=my set' model=out/model.yaml"
     labels = dataclasses.replace(made_up.diagnosis("effect"), verdict=Verdict.DATA)
     assert box(labels).commands[0].purpose == "put the set right, and diagnose again"
+
+
+def test_of_rivals_of_which_one_is_a_fault_of_the_set_that_is_checked_first(made_up):
+    tie = made_up.diagnosis("one_of")
+    pair = zip(tie.steps[0].candidates, ("object_size", "backlash"), strict=True)
+    found = tuple(dataclasses.replace(c, setting=EffectSetting.typical(get_effect(name))) for c, name in pair)
+    step = dataclasses.replace(tie.steps[0], effects=("object_size", "backlash"), candidates=found)
+    (only,) = box(dataclasses.replace(tie, effects=step.effects, steps=(step,))).commands
+    assert only.purpose.startswith("check object_size in the set (a calliper")
+    assert only.purpose.endswith(
+        f"record what tells them apart (backlash: {get_effect('backlash').separates}), and diagnose again"
+    )
+
+
+def test_labels_that_are_wrong_are_put_right_before_anything_is_fitted(made_up):
+    odd = (OddGrasp("g3", "thing 1", 9.0, "thing 0", 1.1),)
+    labels = dataclasses.replace(
+        made_up.diagnosis("unknown"), verdict=Verdict.DATA, steps=(), effects=("object_labels",), odd=odd
+    )
+    answer = box(labels)
+    assert "grasp g3 of thing 1 (9.0 × noise; 1.1 as one of thing 0)" in answer.what
+    told = dict(answer.rows)
+    assert told["How sure"] == "Judged by a fit of all other grasps."
+    assert not {"Explains", "Error", "Runner-up"} & set(told)
+    assert [c.purpose for c in answer.commands] == ["put the set right, and diagnose again"]
 
 
 def test_a_comparison_says_where_and_what_to_do(made_up):

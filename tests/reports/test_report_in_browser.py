@@ -16,6 +16,7 @@ import pytest
 from forcegrasp.cli.measuring import write_results
 from forcegrasp.reports import comparison as comparison_report
 from forcegrasp.reports import diagnosis as diagnosis_report
+from forcegrasp.reports.diagnosis_box import answer_box
 from forcegrasp.reports.next_step import after_comparison, after_diagnosis
 
 DRIVER, BROWSER = shutil.which("chromedriver"), shutil.which("chromium") or shutil.which("google-chrome")
@@ -119,7 +120,7 @@ def write(verb: str, made_up: Any, folder: Path) -> Path:
     else:
         diagnosis = made_up.diagnosis(verb)
         advice = made_up.advice if verb == "one_of" else None
-        box = diagnosis_report.answer_box(diagnosis, advice, after_diagnosis(diagnosis, advice, name, name, name), name)
+        box = answer_box(diagnosis, advice, after_diagnosis(diagnosis, advice, name, name, name), name)
         sections = diagnosis_report.sections(diagnosis, advice, made_up.tried)
     write_results(folder, "x", {}, f"Report of {name}", box, sections, made_up.loaded)
     return folder / "report.html"

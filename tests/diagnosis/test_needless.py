@@ -1,0 +1,57 @@
+"""A look-alike that was found first goes, once what was hidden is in the model; what is true stays."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from forcegrasp.diagnosis.needless import drop_needless
+from forcegrasp.diagnosis.result import Candidate, Step, kept_steps
+from forcegrasp.diagnosis.study import Study
+from forcegrasp.effects.for_gripper import effect_of
+from forcegrasp.effects.setting import EffectSetting
+from forcegrasp.identify.cross_validation import make_folds, rms
+from forcegrasp.identify.fit import Simulators, fit_exactly
+from forcegrasp.identify.fit_set import fit_model
+from forcegrasp.identify.problem import Problem
+from tests.diagnosis.test_families import jaw_with, silent
+
+
+@pytest.fixture(scope="module")
+def rubbing():
+    """A jaw with dry friction, and its base model."""
+    loaded = jaw_with("coulomb_friction", force_n=0.08)
+    return loaded, *fit_model(loaded, 0, silent)
+
+
+def step_with(rubbing, *names: str):
+    """A study, a step that found the last of these effects, and its fit."""
+    loaded, target, simulators, base = rubbing
+    effects = [EffectSetting.typical(effect_of(name, loaded.gripper)) for name in names]
+    problem = Problem(loaded.gripper, target.grasps, effects)
+    start = np.r_[base.fit.vector, problem.start()[len(base.fit.vector) :]]
+    fit = fit_exactly(target, problem, Simulators(problem), start)
+    study = Study(target, simulators, make_folds(target.grasps))
+    last, error = fit.problem.case(fit.vector).effects[-1], rms(study.heldout(fit), target)
+    found = Candidate(last, fit, 0.002, np.ones(4), error, 0.9, 0.5, np.ones(1))
+    return study, Step((names[-1],), (found,), (), 5.0, error), fit
+
+
+def test_a_look_alike_goes_once_what_was_hidden_is_there(rubbing):
+    study, step, fit = step_with(rubbing, "motor_offset", "coulomb_friction")
+    left, less = drop_needless(study, step, fit, 0)
+    assert left.replaces == "motor_offset"
+    assert [one.effect.name for one in less.problem.effects] == ["coulomb_friction"]
+    assert left.candidates[0].fit is less
+    assert left.error_after < 1.05 * step.error_after
+    first = dataclasses.replace(step, effects=("motor_offset",))
+    assert kept_steps([first, left]) == [left]
+
+
+def test_what_is_needed_or_was_given_stays(rubbing):
+    study, step, fit = step_with(rubbing, "coulomb_friction", "motor_offset")
+    assert drop_needless(study, step, fit, 0) == (step, fit)
+    study, step, fit = step_with(rubbing, "motor_offset", "coulomb_friction")
+    assert drop_needless(study, step, fit, 1) == (step, fit)

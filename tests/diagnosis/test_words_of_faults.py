@@ -1,0 +1,61 @@
+"""What a diagnosis says of a set that may be wrong, of delays of whole rows, and of grasps that no others tell of."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from forcegrasp.diagnosis.faults import Fault
+from forcegrasp.effects import get_effect
+from forcegrasp.effects.setting import EffectSetting
+from forcegrasp.identify.problem import Problem
+from forcegrasp.identify.verdict import Verdict
+from forcegrasp.reports.diagnosis import answer, diagnosis_json, lines
+from forcegrasp.reports.diagnosis_words import row_sentence
+
+
+@pytest.fixture
+def fault(made_up) -> Fault:
+    return Fault("time_scale", "stamps are too long", "the clock", made_up.loaded)
+
+
+def test_a_fault_that_an_effect_could_be_is_told_last(made_up, fault):
+    rivals = dataclasses.replace(
+        made_up.diagnosis("effect"), verdict=Verdict.ONE_OF, effects=("force_bias", "time_scale"), fault=fault
+    )
+    text = answer(rivals)
+    assert text.startswith("The model lacks force_bias")
+    told = "Or the set is wrong, and nothing is missing: time_scale (stamps are too long; to check: the clock);"
+    assert told in text
+
+
+def test_a_fault_besides_an_effect_is_told_first(made_up, fault):
+    both = dataclasses.replace(made_up.diagnosis("effect"), effects=("time_scale", "force_bias"), fault=fault)
+    assert answer(both).startswith("The set seems to be wrong: time_scale (stamps are too long; to check: the clock).")
+    assert "The model lacks force_bias" in answer(both)
+    assert diagnosis_json(both, None, made_up.tried, "s")["fault"] == {
+        "name": "time_scale", "words": "stamps are too long", "check": "the clock"
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(("delay_s", "told"), [(0.04, "1 row"), (0.0802, "2 rows"), (0.06, ""), (0.003, "")])
+def test_a_delay_of_whole_rows_may_be_the_log(made_up, delay_s, told):
+    found = made_up.diagnosis("effect")
+    setting = EffectSetting(get_effect("command_delay"), "", np.array([delay_s]))
+    problem = Problem(made_up.loaded.gripper, found.fit.problem.grasps, [setting])
+    start, slopes = problem.start(), found.fit.jacobian[..., : len(problem)]
+    late = dataclasses.replace(
+        found, fit=dataclasses.replace(found.fit, problem=problem, vector=start, jacobian=slopes)
+    )
+    sentence = row_sentence(late)
+    assert (f"command_delay is {told} of the set" in sentence) if told else (sentence == "")
+    at_start = dataclasses.replace(late, steps=())
+    assert (sentence in lines(at_start, None)) == bool(told)
+
+
+def test_a_heldout_error_that_the_fit_does_not_have_gets_its_reason(made_up):
+    found = made_up.diagnosis("explained")
+    assert "those held out are missed" in answer(dataclasses.replace(found, error_after=1.5))
+    assert "those held out are missed" not in answer(dataclasses.replace(found, error_after=1.0))
