@@ -26,7 +26,7 @@ _MOTOR = (
     ("sign(force) * velocity", "L/T"), ("{e} * velocity", "E·L/T"),
     ("force", "F"), ("force**2", "F²"), ("sign(force)", ""), ("position * force", "L·F"),
     ("time_since_contact", "T"), ("time", "T"), ("memory(force, tau)", "F"),
-    ("abs({e})", "E"), ("{e} * abs({e})", "E²"), ("{e} * position", "E·L"), ("{e} * memory(({e})**2, tau)", "E³"),
+    ("abs({e})", "E"), ("{e} * abs({e})", "E²"), ("{e} * position", "E·L"), ("{e} * memory(abs({e}), tau)", "E²"),
     ("sign(force) * {e}", "E"), ("memory(velocity, tau)", "L/T"),
     ("velocity * exp(-((position - centre) / width)**2)", "L/T"),
 )  # fmt: skip
@@ -75,7 +75,8 @@ def terms(fit: Fit, target: Target) -> Iterator[type[Law]]:
             term = text.format(e=f"({drive})", v=slow)
             expression = ast.unparse(ast.parse("c1" if text == "1" else f"c1 * {term}"))  # without spare parentheses
             per = of_term.translate(str.maketrans(units))
-            law = _scaled(place, expression, amount, f"{unit}/({per})" if per else unit, fit, target)
+            divided = f"({per})" if "·" in per or "/" in per else per
+            law = _scaled(place, expression, amount, f"{unit}/{divided}" if per else unit, fit, target)
             if law is not None:
                 yield law
 
