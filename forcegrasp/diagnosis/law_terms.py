@@ -86,7 +86,7 @@ def _scaled(place: str, expression: str, amount: float, unit: str, fit: Fit, tar
     inner = {n: size for n, size in _inner(fit, target).items() if re.search(rf"\b{n}\b", expression)}
 
     def make(size: float) -> type[Law]:
-        most = float(f"{_RANGE * size:.6g}")
+        most = float(f"{_RANGE * abs(size):.6g}")
         sizes = {"c1": Size(value=size, low=-most, high=most, unit=unit)}
         sizes |= {name: numbers for name, (numbers, _) in inner.items()}
         formula = Formula(place=place, expression=expression, parameters=sizes)  # pyright: ignore[reportArgumentType]
@@ -99,7 +99,10 @@ def _scaled(place: str, expression: str, amount: float, unit: str, fit: Fit, tar
     except ConfigError:
         return None
     size = float(np.quantile(np.abs(inside), _NEARLY_LARGEST))
-    return make(float(f"{amount / size:.2g}")) if np.isfinite(size) and size > 0 < amount else None
+    if not (np.isfinite(size) and size > 0 < amount):
+        return None
+    brakes = place == "motor" and "velocity" in expression  # what drives a motion on runs away
+    return make((-1 if brakes else 1) * float(f"{amount / size:.2g}"))
 
 
 def _inner(fit: Fit, target: Target) -> dict[str, tuple[Size, tuple[float, ...]]]:
