@@ -19,6 +19,7 @@ from forcegrasp.cli.results import default_out
 from forcegrasp.config import CompareConfig, DiagnoseConfig, FitConfig, validate
 from forcegrasp.diagnosis import add_effect, diagnose_set
 from forcegrasp.diagnosis.advice import advise
+from forcegrasp.effects.law import write_law
 from forcegrasp.errors import ConfigError
 from forcegrasp.final_force.analysis import analyse_table
 from forcegrasp.identify import comparison, fit_set, loading
@@ -102,6 +103,7 @@ def diagnose(
     model: AnyModel | None = None,
     *,
     effects: str | Sequence[str] = (),
+    law: bool = False,
     seed: int = 0,
     progress: Progress | None = None,
 ) -> DiagnoseResult | TableResult:
@@ -111,6 +113,7 @@ def diagnose(
       data: what :func:`load` returns, or what it takes; six grasps at least.
       model: what to start from, as for :func:`compare`; its parameters are fitted again. The base model by default.
       effects: names of the effects to try; the whole catalogue by default.
+      law: look for a formula where no effect explains what is left; takes minutes.
       seed: of the fit's starts and of the null distribution.
       progress: takes lines about what is done, such as ``print``; silent by default.
 
@@ -127,7 +130,7 @@ def diagnose(
         return _analyse(loaded, "diagnosis", model=model, effects=only)
     tried = diagnose_set.chosen_effects(loaded.gripper, only)
     given, loaded = (None, loaded) if model is None else _beside(model, loaded, show)
-    diagnosis, _ = diagnose_set.diagnose_set(loaded, given, [effect.name for effect in tried], seed, show)
+    diagnosis, _ = diagnose_set.diagnose_set(loaded, given, [effect.name for effect in tried], seed, show, law=law)
     return DiagnoseResult(loaded, diagnosis, advise(diagnosis), tuple(tried), only, _file_of(model))
 
 
@@ -144,7 +147,7 @@ def add(
     Args:
       data: what :func:`load` returns, or what it takes; two grasps at least.
       model: the model to add to, as for :func:`compare`.
-      effect: its name; :func:`diagnose` tells which.
+      effect: its name, :func:`diagnose` tells which; or the path of a law's file.
       out: the file to write the model to; none by default.
       progress: takes lines about what is done, such as ``print``; silent by default.
 
@@ -158,7 +161,7 @@ def add(
     loaded, show = _open(data, progress)
     grasps = measuring.refuse_table(loaded, "add")
     measuring.refuse_one_grasp(grasps)
-    (chosen,) = diagnose_set.chosen_effects(grasps.gripper, [effect])
+    chosen = measuring.effect_to_add(effect, grasps.gripper)
     given, grasps = _beside(model, grasps, show)
     added = add_effect.add_effect(grasps, given, chosen, show)
     measuring.refuse_useless(added, chosen, "forcegrasp.diagnose")
@@ -184,6 +187,8 @@ def report(result: ModelResult | TableResult, out: str | Path | None = None) -> 
         write_model(model, folder / name)
     if isinstance(result, DiagnoseResult) and result.advice is not None:
         result.advice.next_grasp.write_commands(folder / measuring.NEXT_GRASP, result.data.gripper)
+    if isinstance(result, DiagnoseResult) and result.diagnosis.law is not None:
+        write_law(result.diagnosis.law.law, folder / measuring.PROPOSED_LAW)
     return measuring.write_files(
         folder, result.file, result.to_dict(), result.title, result.box(folder), result.sections(), result.data
     )

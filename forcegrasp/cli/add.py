@@ -13,6 +13,7 @@ NOTES = """
   data=my_set      the grasps to fit to
   model=FILE       what forcegrasp fit or add wrote
   effect=NAME      see forcegrasp effects; forcegrasp diagnose tells which
+  effect=law.yaml  a formula: one that forcegrasp diagnose proposes, or your own
   out=better.yaml  is written if the error on held-out grasps falls; the report goes into runs/add_TIME
 """
 
@@ -27,6 +28,7 @@ def run(config: AddConfig) -> None:
         check_effects,
         check_file,
         check_folder,
+        effect_to_add,
         refuse_one_grasp,
         refuse_table,
         refuse_useless,
@@ -34,7 +36,7 @@ def run(config: AddConfig) -> None:
         tell_warnings,
         write_results,
     )
-    from forcegrasp.diagnosis import add_effect, diagnose_set
+    from forcegrasp.diagnosis import add_effect
     from forcegrasp.identify import loading
     from forcegrasp.models.model_file import write_model
     from forcegrasp.reports import fit as fit_report
@@ -46,7 +48,7 @@ def run(config: AddConfig) -> None:
     loaded = refuse_table(loading.load(folders), "add")
     data = loaded.measured.path
     refuse_one_grasp(loaded)
-    (effect,) = diagnose_set.chosen_effects(loaded.gripper, [config.effect])
+    effect = effect_to_add(config.effect, loaded.gripper)
     model, loaded = take_model(old, loaded)
     tell_warnings(loaded)
     added = add_effect.add_effect(loaded, model, effect, progress_printer())

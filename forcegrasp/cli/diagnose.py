@@ -20,7 +20,8 @@ NOTES = """
   base model can't be fitted to these data).
   Beside the report, base_model.yaml holds the base model that was fitted, if none is given; if effects are found,
   model.yaml holds the model with all of them (with one_of: with the first); if another grasp would tell effects
-  apart, next_grasp.csv holds its commands.
+  apart, next_grasp.csv holds its commands. With law=true, and where a formula explains what no effect does, law.yaml
+  holds that: forcegrasp add takes it as an effect.
 """
 
 
@@ -32,6 +33,7 @@ def run(config: DiagnoseConfig) -> None:
         BASE_MODEL,
         FOUND_MODEL,
         NEXT_GRASP,
+        PROPOSED_LAW,
         base_model,
         check_effects,
         check_folder,
@@ -43,12 +45,13 @@ def run(config: DiagnoseConfig) -> None:
     )
     from forcegrasp.diagnosis import diagnose_set
     from forcegrasp.diagnosis.advice import advise
+    from forcegrasp.effects.law import write_law
     from forcegrasp.identify import loading
     from forcegrasp.identify.fitted_model import model_of
     from forcegrasp.models.model_file import write_model
     from forcegrasp.reports import diagnosis as diagnosis_report
     from forcegrasp.reports.diagnosis_box import answer_box
-    from forcegrasp.reports.next_step import after_diagnosis, next_grasp_words
+    from forcegrasp.reports.next_step import added_law, after_diagnosis, next_grasp_words
 
     check_effects("effects", config.effects)
     out = check_folder(default_out("diagnose", config.out))
@@ -60,7 +63,8 @@ def run(config: DiagnoseConfig) -> None:
     tried = diagnose_set.chosen_effects(loaded.gripper, config.effects)
     model, loaded = take_model(Path(config.model), loaded) if config.model else (None, loaded)
     tell_warnings(loaded)
-    diagnosis, _ = diagnose_set.diagnose_set(loaded, model, [e.name for e in tried], config.seed, progress_printer())
+    names, progress = [e.name for e in tried], progress_printer()
+    diagnosis, _ = diagnose_set.diagnose_set(loaded, model, names, config.seed, progress, law=config.law)
     advice = advise(diagnosis)
     lead, table = diagnosis_report.answer(diagnosis), diagnosis_report.printed(diagnosis)
     note = f"Only {', '.join(config.effects)} were tried." if config.effects else ""
@@ -80,6 +84,10 @@ def run(config: DiagnoseConfig) -> None:
     if advice is not None:
         advice.next_grasp.write_commands(out / NEXT_GRASP, loaded.gripper)
         print(f"wrote {out / NEXT_GRASP}: {next_grasp_words(loaded.measured, out / 'diagnosis.json')}")
+    if diagnosis.law is not None:
+        write_law(diagnosis.law.law, law := out / PROPOSED_LAW)
+        with_it = found if diagnosis.verdict.lacks_effects else known
+        print(f"wrote {law}: the law, to name, edit and add: {added_law(data, with_it, law)}")
     print("\n".join(f"{'or' if k else 'next'}: {command}" for k, command in enumerate(commands)))
     write_results(
         out,

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from forcegrasp.identify.target import Target
     from forcegrasp.measure import FinalForceTable, MeasurementSet
     from forcegrasp.models.model_file import Model
+    from forcegrasp.physics.gripper import Gripper
     from forcegrasp.reports.html import Answer, Section
 
 
@@ -31,6 +32,8 @@ BASE_MODEL = "base_model.yaml"
 FOUND_MODEL = "model.yaml"
 #: The commands of the grasp that a diagnosis proposes, beside its report.
 NEXT_GRASP = "next_grasp.csv"
+#: The law that a diagnosis proposes, beside its report.
+PROPOSED_LAW = "law.yaml"
 #: With an effect added, the error must fall to less than this share.
 LEAST_FALL = 0.995
 
@@ -210,11 +213,24 @@ def refuse_useless(added: Added, effect: type[Effect], way: str) -> None:
         )
 
 
+def effect_to_add(name: str, gripper: Gripper) -> type[Effect]:
+    """The effect of this name as a gripper has it, or the one that a file describes.
+
+    Raises:
+      ConfigError: if it is unknown, can't be read, or can't show on this gripper.
+    """
+    from forcegrasp.effects.for_gripper import effect_of
+    from forcegrasp.effects.law import SUFFIXES, read_law
+
+    return read_law(name, gripper) if name.endswith(SUFFIXES) else effect_of(name, gripper)
+
+
 def check_effects(option: str, names: Sequence[str]) -> None:
     """Raises ConfigError about a name that no effect of the catalogue has, before anything is read."""
     from forcegrasp.effects import catalogue
+    from forcegrasp.effects.law import SUFFIXES
 
     known = catalogue()
     for name in names:
-        if name not in known:
+        if name not in known and not (option == "effect" and name.endswith(SUFFIXES)):
             raise ConfigError(f"{option}={name}: no such effect{closest(name, known)}")

@@ -145,6 +145,7 @@ class DiagnoseConfig:
     model: str = option("", "model file to start from; the base model is fitted to the set if empty")
     out: str = option("", "where to write report.html, diagnosis.json and models; runs/diagnose_TIME if empty")
     effects: list[str] = option([], "effects to consider; all of the catalogue if empty")
+    law: bool = option(False, "look for a formula where no effect explains what is left; takes minutes")
     seed: int = option(0, "seed of the fit's starts and of the null distribution", low=0, high=2**31 - 1)
 
 
@@ -156,7 +157,7 @@ class AddConfig:
         [], "folder of the measurement set, or of several of one gripper to join; also given without data="
     )
     model: str = option("", "model file to add to")
-    effect: str = option("", "effect to add, see forcegrasp effects")
+    effect: str = option("", "effect to add, see forcegrasp effects; or the file of a law")
     out: str = option("", "model file to write; runs/add_TIME/model.yaml if empty")
 
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
 
 from forcegrasp.diagnosis.doubt import leaves_less, more_likely, with_fault
 from forcegrasp.diagnosis.faults import suspects
+from forcegrasp.diagnosis.law import find_law
 from forcegrasp.diagnosis.result import Diagnosis
 from forcegrasp.diagnosis.search import diagnose
 from forcegrasp.effects import Effect
@@ -33,8 +35,9 @@ def diagnose_set(
     names: list[str],
     seed: int,
     progress: Progress,
+    law: bool = False,
 ) -> tuple[Diagnosis, Simulators]:
-    """Which effects are missing, or what is wrong with the set.
+    """Which effects are missing, or what is wrong with the set; with ``law`` also a formula for what no effect tells.
 
     Raises:
       MeasurementError: if there are too few grasps to hold any out.
@@ -56,14 +59,21 @@ def diagnose_set(
         return diagnose(target, base, simulators, chosen, np.random.default_rng(seed + 1), progress)
 
     said = fitted(loaded)
+
+    def with_law(diagnosis: Diagnosis, simulators: Simulators) -> tuple[Diagnosis, Simulators]:
+        rng = np.random.default_rng(seed + 2)
+        found = find_law(diagnosis, simulators, rng, progress) if law else None
+        return dataclasses.replace(diagnosis, law=found), simulators
+
     for fault in suspects(loaded, said[0], said[2].fit):
         progress(f"fitting the set with {fault.name} put right")
         right = fitted(fault.put_right)
         if leaves_less(fault, (right[0], right[2].fit), (said[0], said[2].fit)):
             found = with_fault(search(*right), fault, (said[0], said[2].fit))
             certain = not found.left and not fault.expected  # else an effect may do as well
-            return (found if certain else more_likely(found, search(*said))), right[1]
-    return search(*said), said[1]
+            likely = found if certain else more_likely(found, search(*said))
+            return with_law(likely, right[1] if likely.target.grasps is right[0].grasps else said[1])
+    return with_law(search(*said), said[1])
 
 
 def chosen_effects(gripper: Gripper, names: Sequence[str]) -> list[type[Effect]]:

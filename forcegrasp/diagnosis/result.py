@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from forcegrasp.diagnosis.faults import Fault
+from forcegrasp.diagnosis.found_law import FoundLaw
 from forcegrasp.diagnosis.noise_check import Noise
 from forcegrasp.diagnosis.odd_grasps import OddGrasp
 from forcegrasp.diagnosis.signatures import Score
@@ -124,6 +125,7 @@ class Diagnosis(ShortRepr):
     left: str = ""  #: where there is more than that, in words; empty if nowhere
     odd: tuple[OddGrasp, ...] = ()  #: grasps that a fit of all others misses by far
     noise: Noise | None = None  #: what the noise is, if the residuals show that it is not as assumed
+    law: FoundLaw | None = None  #: that explains what no effect does, if one was looked for and found
     fault: Fault | None = None  #: of the set: put right in all of the above; or else the last of the rivals
 
     @property

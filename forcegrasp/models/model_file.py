@@ -17,6 +17,7 @@ from pydantic import ConfigDict, Field, model_validator
 from forcegrasp.effects import Effect
 from forcegrasp.effects.base import Parameter
 from forcegrasp.effects.for_gripper import effect_of
+from forcegrasp.effects.law import Formula, Law, formula_as_data, make_law
 from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.errors import ConfigError, closest
 from forcegrasp.files import plain_yaml
@@ -110,6 +111,7 @@ def write_model(model: Model, path: str | Path) -> None:
     content["effects"] = {
         e.effect.name: {
             **({"variant": e.variant} if e.variant else {}),
+            **({"law": formula_as_data(e.effect)} if issubclass(e.effect, Law) else {}),
             **{name: _dump(value) for name, value in e.parameters.items()},
         }
         for e in model.effects
@@ -187,11 +189,12 @@ class _Interval(Record):
 
 
 class _Effect(Record):
-    """Every other key is one of its parameters."""
+    """Every other key is one of its parameters; ``law`` is what a file said that the effect is, if one did."""
 
     model_config = ConfigDict(extra="allow")
     __pydantic_extra__: dict[str, _Interval]  # pyright: ignore[reportIncompatibleVariableOverride]
     variant: str = ""
+    law: Formula | None = None
 
 
 class _ReadingNoise(Record):
@@ -214,7 +217,8 @@ class _File(Record):
 
 def _found(path: Path, name: str, entry: _Effect, gripper: Gripper) -> FoundEffect:
     where = f"effects.{name}"
-    effect = _renamed(path, "effects", lambda: effect_of(name, gripper))
+    law = entry.law
+    effect = _renamed(path, "effects", lambda: make_law(name, law, gripper) if law else effect_of(name, gripper))
     variant = entry.variant if "variant" in entry.model_fields_set else effect.variants[0]
     if variant not in effect.variants:
         known = " or ".join(filter(None, effect.variants)) or "left out"

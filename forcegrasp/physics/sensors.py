@@ -47,10 +47,10 @@ class ReadingEffects:
 
     def apply(self, position: np.ndarray, force: np.ndarray) -> None:
         """Changes what was transduced at one instant, in place: ``(n, motors)`` and ``(n, channels)``."""
-        for effect in self._force:
-            force[effect.rows] = effect.read_force(force[effect.rows])
         for effect in self._position:
             position[effect.rows] = effect.read_position(position[effect.rows])
+        for effect in self._force:
+            force[effect.rows] = effect.read_force(force[effect.rows])
 
 
 def with_noise(value: Any, std: float, normal: Any, step: float = 0.0) -> Any:

@@ -53,6 +53,7 @@ from forcegrasp.reports.findings import (
 )
 from forcegrasp.reports.fit import ADVICE, rounding_words, steps_picture, symptom_picture
 from forcegrasp.reports.html import Picture, Section, Table, Text
+from forcegrasp.reports.law import law_json, law_section, law_words
 from forcegrasp.reports.symptom import symptom_of
 from forcegrasp.reports.view import view_section
 
@@ -75,6 +76,7 @@ def diagnosis_json(diagnosis: Diagnosis, advice: Advice | None, tried: Sequence[
         "fault": None if diagnosis.fault is None else {
             "name": diagnosis.fault.name, "words": diagnosis.fault.words, "check": diagnosis.fault.check
         },
+        "law": law_json(diagnosis.law),
         "odd_grasps": [dataclasses.asdict(grasp) for grasp in diagnosis.odd],
         "steps": [_step_json(step, diagnosis) for step in diagnosis.steps],
         "ranking": ranking(diagnosis),
@@ -203,6 +205,8 @@ def lines(diagnosis: Diagnosis, advice: Advice | None) -> list[str]:
         text.append(row)
     if diagnosis.verdict is Verdict.UNKNOWN or diagnosis.verdict.names_effects:
         text.append(left_sentence(diagnosis))
+    if diagnosis.law is not None:
+        text.append(law_words(diagnosis.law))
     if advice is not None:
         text.append(advice.sentence())
     return [*text, noise_sentence(diagnosis.target), *(f"warning: {warning}" for warning in final_warnings(diagnosis))]
@@ -234,6 +238,7 @@ def sections(diagnosis: Diagnosis, advice: Advice | None, tried: Sequence[type[E
         found.append(_advice_section(diagnosis, advice))
     attempts = [_tried_section(diagnosis, tried)] if diagnosis.steps else []
     left, view = _left_sections(diagnosis), _view(diagnosis)
+    left += [law_section(diagnosis.law, diagnosis.target)] if diagnosis.law is not None else []
     return [view, *found, *attempts, *left] if diagnosis.effects else [view, *left, *found, *attempts]
 
 

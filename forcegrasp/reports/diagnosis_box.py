@@ -20,6 +20,7 @@ from forcegrasp.reports.diagnosis_words import (
     shares_sentence,
 )
 from forcegrasp.reports.html import Answer, Command
+from forcegrasp.reports.law import law_words
 
 
 def answer_box(diagnosis: Diagnosis, advice: Advice | None, commands: Sequence[Command], note: str = "") -> Answer:
@@ -44,6 +45,7 @@ def answer_box(diagnosis: Diagnosis, advice: Advice | None, commands: Sequence[C
         ("How sure", certainty(d)),
         ("Runner-up", runner_up(d) if d.verdict.lacks_effects else ""),
         ("What is left", f"{left[0].upper()}{left[1:]}." if found or d.verdict is Verdict.UNKNOWN else ""),
+        ("A law", f"{law_words(d.law)}." if d.law is not None else ""),
         ("Noise", noise_words(d) if found else ""),
         ("Look first at", f"{odd_words(d)}." if d.odd and d.steps else ""),
         ("Record next", f"{record}." if record else ""),

@@ -176,6 +176,31 @@ def symptom(target: Target, index: int, signal: int, without: np.ndarray, having
     return figure
 
 
+def law(added: np.ndarray, before: np.ndarray, after: np.ndarray, target: Target, equation: str) -> Figure:
+    """Residuals ÷ noise of positions and forces over what a law adds, and what it changes of the predictions.
+
+    Args:
+      added: what the law adds at the samples, ``(G, S, motors or channels)``.
+      before: residuals without it, ``(G, S, C)``.
+      after: residuals with it, ``(G, S, C)``.
+      target: the measurements.
+      equation: the law.
+    """
+    figure = Figure(figsize=(4.2 * len(target.axis.kinds), 3.4), layout="constrained")
+    row = figure.subplots(1, len(target.axis.kinds), squeeze=False)[0]
+    for axes, (kind, part) in zip(row, target.axis.kinds.items(), strict=True):
+        residual, changed = before[..., part], (before - after)[..., part]
+        x = of_width(added, residual.shape[-1])[target.mask].ravel()
+        _binned(axes, x, residual[target.mask].ravel())
+        parts = np.array_split(np.argsort(x, kind="stable"), _BINS)
+        y = changed[target.mask].ravel()
+        axes.plot([np.median(x[p]) for p in parts], [np.median(y[p]) for p in parts], color=WITH, lw=1.6)
+        axes.axhline(0, color="0.5", lw=0.6)
+        axes.set_xlabel(equation if len(equation) < 50 else "what the law adds", fontsize=8)
+        _finish(axes, f"{kind} residual ÷ noise")
+    return figure
+
+
 def rivals(
     target: Target, time_s: np.ndarray, command_m: np.ndarray, predicted: np.ndarray, names: Sequence[str]
 ) -> Figure:

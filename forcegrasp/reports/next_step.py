@@ -44,7 +44,8 @@ def after_diagnosis(
     if d.verdict is Verdict.DATA:
         return [Command("put the set right, and diagnose again", again)]
     if d.verdict is Verdict.UNKNOWN:
-        return [Command("look at where the model fails", compared)]
+        look = Command("look at where the model fails", compared)
+        return [look, *([] if d.law else [_for_a_law(data)])]
     if d.verdict is Verdict.EXPLAINED:
         noise = [Command("give the noise as it is, and diagnose again", again)] if d.noise is not None else []
         return [*noise, _use("the model", known, data, gripper)]
@@ -59,8 +60,15 @@ def after_diagnosis(
         joined = _line("diagnose", f"data=[{str(data).strip('[]')},next]") if advice is not None else again
         return [Command(_to_tell_apart(d, advice), joined), *([] if effect_of(first, gripper).of_set else [preferred])]
     if is_not_all(d):
-        return [Command(f"look at what {with_all} leaves", _line("compare", f"data={data}", f"model={found}")), added]
+        look = Command(f"look at what {with_all} leaves", _line("compare", f"data={data}", f"model={found}"))
+        return [look, *([] if d.law else [_for_a_law(data)]), added]
     return [_use(with_all, found, data, gripper), added]
+
+
+def _for_a_law(data: str | Path) -> Command:
+    return Command(
+        "look for a formula of what is left; it takes minutes", _line("diagnose", f"data={data}", "law=true")
+    )
 
 
 def next_grasp_words(measured: MeasurementSet, diagnosis: Path) -> str:
@@ -79,6 +87,11 @@ def _to_tell_apart(diagnosis: Diagnosis, advice: Advice | None) -> str:
         return f"{faults}{said}. Make a set of it, such as next, and diagnose both"
     telling = "; ".join(f"{effect.name}: {effect.separates}" for effect in rivals if not effect.of_set)
     return f"{faults}record what tells them apart ({telling}), and diagnose again"
+
+
+def added_law(data: str | Path, model: str | Path, law: str | Path) -> str:
+    """The command that adds a law to the model that it was found with."""
+    return _line("add", f"data={data}", f"model={model}", f"effect={law}", "out=better.yaml")
 
 
 def after_comparison(comparison: Comparison, data: str | Path, model: str | Path) -> list[Command]:

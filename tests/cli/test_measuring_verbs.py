@@ -106,6 +106,27 @@ def test_the_error_falls_when_it_is_added(loop):
     assert "no failure" in loop.printed["compare"]
 
 
+def test_a_law_of_a_file_is_added(folder, capsys):
+    sizes = {"c": {"value": 0.05, "low": -1, "high": 1, "unit": "N"}}
+    law = {"name": "offset", "place": "force", "expression": "c", "parameters": sizes}
+    Path("law.yaml").write_text(yaml.safe_dump(law))
+    assert main(["add", "my_set", "model=model.yaml", "effect=law.yaml", "out=with.yaml"]) == 0
+    added = yaml.safe_load(Path("with.yaml").read_text())["effects"]["offset"]
+    assert added["law"]["expression"] == "c"
+    assert 0.04 < added["c"]["value"] < 0.06  # of the two biases the mean
+    capsys.readouterr()
+    assert main(["add", "my_set", "model=with.yaml", "effect=law.yaml", "out=new.yaml"]) == 2
+    assert "has it already" in capsys.readouterr().err
+    for text, problem in (("c * open(force)", "open: no such function"), ("c * nothing", "nothing: unknown")):
+        Path("law.yaml").write_text(yaml.safe_dump(law | {"expression": text}))
+        assert main(["add", "my_set", "model=model.yaml", "effect=law.yaml"]) == 2
+        refusal = capsys.readouterr().err
+        assert f"law.yaml: expression: {problem}" in refusal
+        assert refusal.count("\n") == 1
+    assert main(["add", "my_set", "model=model.yaml", "effect=missing.yaml"]) == 2
+    assert "missing.yaml: could not read the law" in capsys.readouterr().err
+
+
 def test_diagnose_writes_the_base_model_beside_the_report_and_suggests_it(loop):
     paths = (loop.folder / "diagnosis" / "base_model.yaml", loop.folder / "model.yaml")
     beside, fitted = (yaml.safe_load(path.read_text()) for path in paths)

@@ -57,6 +57,7 @@ MEASURED_CASES: dict[type, dict[str, Any]] = {
         "model": "model.yaml",
         "out": "elsewhere",
         "effects": "[backlash]",
+        "law": True,
         "seed": 1,
     },
     AddConfig: {"data": "other", "model": "lagging.yaml", "effect": "adhesion", "out": "elsewhere"},
@@ -149,6 +150,13 @@ def begun(monkeypatch, verb: str, **values: Any) -> dict[str, Any]:
     if verb == "diagnose":
         monkeypatch.setattr(fit_set, "fit_model", fitted)
         monkeypatch.setattr(diagnose_set, "suspects", lambda *_: [])
+        whole = diagnose_set.diagnose_set
+
+        def noted(*arguments, law):
+            reached["law"] = law
+            return whole(*arguments, law=law)
+
+        monkeypatch.setattr(diagnose_set, "diagnose_set", noted)
     if verb != "add":
         monkeypatch.setattr(fit_set, "apply_model", fitted if verb == "diagnose" else stop)
     with pytest.raises(BegunError) as caught:

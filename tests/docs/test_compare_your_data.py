@@ -16,6 +16,7 @@ import yaml
 from doc_pages import PAGES, blocks, unpack
 
 from forcegrasp.cli.main import main
+from forcegrasp.effects.law import read_law
 from forcegrasp.errors import MeasurementError
 from forcegrasp.measure import check_set, read_set, write_set
 from forcegrasp.physics.gripper_file import load_gripper
@@ -156,6 +157,11 @@ def test_bag_is_converted_as_the_page_says(files):
     for grasp, original in zip(converted.grasps, measured.grasps, strict=True):
         assert grasp.position_m == pytest.approx(original.position_m, abs=1e-9)
         assert grasp.force_n == pytest.approx(original.force_n, abs=1e-9)
+
+
+def test_law_of_the_page_can_be_read(files):
+    law = read_law(files / "quadratic_drag.yaml", load_gripper("tiago"))
+    assert law.formula == "F' = F + drag * abs(velocity) * velocity"
 
 
 def test_commands_of_the_page_can_be_played():

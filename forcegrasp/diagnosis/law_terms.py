@@ -1,0 +1,168 @@
+"""The terms of which a law for the unknown may be made, and what they come to along measured grasps."""
+
+from __future__ import annotations
+
+import ast
+import itertools
+import re
+from collections.abc import Iterator
+
+import numpy as np
+
+from forcegrasp.effects.for_gripper import effects_of
+from forcegrasp.effects.law import Formula, Law, Size, make_law
+from forcegrasp.effects.motor_offset import MotorOffset
+from forcegrasp.errors import ConfigError
+from forcegrasp.identify.comparison import of_width
+from forcegrasp.identify.fit import Fit
+from forcegrasp.identify.target import Target
+
+# {e} is what drives the motor: command − position, or the effort that is commanded. {v} is a slow speed.
+# Units: L of a position, T of time, F of a force, E of {e}.
+_MOTOR = (
+    ("1", ""), ("position", "L"), ("position**2", "L²"),
+    ("velocity", "L/T"), ("abs(velocity) * velocity", "L²/T²"), ("velocity**2", "L²/T²"), ("tanh(velocity / {v})", ""),
+    ("position * velocity", "L²/T"), ("position**2 * velocity", "L³/T"), ("force * velocity", "F·L/T"),
+    ("sign(force) * velocity", "L/T"), ("{e} * velocity", "E·L/T"),
+    ("force", "F"), ("force**2", "F²"), ("sign(force)", ""), ("position * force", "L·F"),
+    ("time_since_contact", "T"), ("time", "T"), ("memory(force, tau)", "F"),
+    ("abs({e})", "E"), ("{e} * abs({e})", "E²"), ("{e} * position", "E·L"), ("{e} * memory(abs({e}), tau)", "E²"),
+    ("sign(force) * {e}", "E"), ("memory(velocity, tau)", "L/T"),
+    ("velocity * exp(-((position - centre) / width)**2)", "L/T"),
+)  # fmt: skip
+_FORCE = (
+    ("sign(force)", ""), ("force * abs(force)", "F²"), ("force**3", "F³"), ("force * position", "F·L"),
+    ("force * time", "F·T"), ("force * velocity", "F·L/T"), ("memory(force, tau)", "F"), ("position", "L"),
+    ("position**2", "L²"), ("velocity", "L/T"), ("abs(velocity) * velocity", "L²/T²"), ("acceleration", "L/T²"),
+    ("time", "T"), ("time**2", "T²"),
+)  # fmt: skip
+_POSITION = (
+    ("position", "L"), ("position**2", "L²"), ("position**3", "L³"), ("velocity", "L/T"), ("force", "F"),
+    ("force * abs(force)", "F²"), ("sign(force)", ""), ("force * position", "F·L"), ("memory(force, tau)", "F"),
+    ("time", "T"), ("time**2", "T²"), ("time_since_contact", "T"),
+)  # fmt: skip
+#: Terms by the place where they act. A shift of a commanded position is a force on the motor, but for its limits.
+LIBRARY = {"motor": _MOTOR, "force": _FORCE, "position": _POSITION}
+# Numbers inside terms: those that are tried, and between what a fit may choose. Time constants, s; of a place on the
+# way of a motor, the shares of that way at which it may be, and how wide it is.
+_LAGS, _SHORTEST, _LONGEST = (0.1, 0.5, 2.0), 0.02, 10.0
+_PLACES, _WIDTHS, _NARROWEST = (0.1, 0.25, 0.4, 0.55, 0.7, 0.85), (0.12,), 0.02
+# A term of a reading is tried so large that it is so many times the noise; and between what a fit stays. Its size is
+# that of its largest values: a feedback must not run away.
+_READING, _RANGE, _NEARLY_LARGEST = 3.0, 50.0, 0.98
+# Of a fast motion's speed what is slow.
+_SLOW = 0.1
+
+
+def terms(fit: Fit, target: Target) -> Iterator[type[Law]]:
+    """Every term that a gripper can have, with a coefficient with which it is small along the grasps of a fit."""
+    gripper = target.gripper
+    drive = "command - position" if gripper.command == "position" else "command"
+    driven = gripper.unit if gripper.command == "position" else gripper.effort_unit
+    speeds = np.abs(sampled("position", fit, target)["velocity"])
+    slow = float(f"{max(_SLOW * np.nanquantile(speeds[target.mask], 0.9), 1e-9):.1g}")
+    units: dict[str, str] = {"L": gripper.unit, "T": "s", "F": target.axis.units[-1], "E": driven}
+    offset = effects_of(gripper).get(MotorOffset.name, MotorOffset).parameters[0]
+    noise = float(target.sigma[target.axis.forces].max(initial=0.0))
+    amounts = {
+        "motor": (offset.typical, offset.unit),
+        "position": (_READING * float(target.sigma[target.axis.positions].max()), gripper.unit),
+        "force": (_READING * noise, units["F"]),
+    }
+    for place, library in LIBRARY.items():
+        amount, unit = amounts[place]
+        for text, of_term in library:
+            term = text.format(e=f"({drive})", v=slow)
+            expression = ast.unparse(ast.parse("c1" if text == "1" else f"c1 * {term}"))  # without spare parentheses
+            per = of_term.translate(str.maketrans(units))
+            divided = f"({per})" if "·" in per or "/" in per else per
+            law = _scaled(place, expression, amount, f"{unit}/{divided}" if per else unit, fit, target)
+            if law is not None:
+                yield law
+
+
+def _scaled(place: str, expression: str, amount: float, unit: str, fit: Fit, target: Target) -> type[Law] | None:
+    """A term that adds this amount where it is large; None if it does nothing here, or can't be on this gripper."""
+    inner = {n: size for n, size in _inner(fit, target).items() if re.search(rf"\b{n}\b", expression)}
+
+    def make(size: float) -> type[Law]:
+        most = float(f"{_RANGE * abs(size):.6g}")
+        sizes = {"c1": Size(value=size, low=-most, high=most, unit=unit)}
+        sizes |= {name: numbers for name, (numbers, _) in inner.items()}
+        formula = Formula(place=place, expression=expression, parameters=sizes)  # pyright: ignore[reportArgumentType]
+        law = make_law(f"{place} {expression}", formula, target.gripper)
+        tried = np.array(list(itertools.product([size], *(trials for _, trials in inner.values()))))
+        return type(law.__name__, (law,), {"trials": classmethod(lambda cls: tried.copy())})
+
+    try:
+        inside = along(make(1.0), None, fit, target)[target.mask]
+    except ConfigError:
+        return None
+    size = float(np.quantile(np.abs(inside), _NEARLY_LARGEST))
+    if not (np.isfinite(size) and size > 0 < amount):
+        return None
+    brakes = place == "motor" and "velocity" in expression  # what drives a motion on runs away
+    return make((-1 if brakes else 1) * float(f"{amount / size:.2g}"))
+
+
+def _inner(fit: Fit, target: Target) -> dict[str, tuple[Size, tuple[float, ...]]]:
+    """Numbers inside terms by name, and those of them that are tried."""
+    position, unit = fit.predicted[..., target.axis.positions][target.mask], target.gripper.unit
+    low, high = (float(f"{end:.3g}") for end in np.quantile(position, (0.0, 1.0)))
+    way = max(high - low, 1e-9)
+    places, widths = (tuple(float(f"{x:.2g}") for x in some) for some in (
+        [low + share * way for share in _PLACES], [share * way for share in _WIDTHS]
+    ))  # fmt: skip
+    return {
+        "tau": (Size(value=_LAGS[1], low=_SHORTEST, high=_LONGEST, unit="s"), _LAGS),
+        "centre": (Size(value=places[2], low=low - way, high=high + way, unit=unit), places),
+        "width": (Size(value=widths[0], low=_NARROWEST * way, high=way, unit=unit), widths),
+    }
+
+
+def along(law: type[Law], values: np.ndarray | None, fit: Fit, target: Target) -> np.ndarray:
+    """What a law adds at the samples of a fit's predictions, ``(G, S, motors or channels)``.
+
+    Args:
+      law: the law.
+      values: of its parameters, ``(parameters,)``; those of its file by default.
+      fit: whose predictions are taken for what the gripper did.
+      target: the measurements.
+    """
+    sizes = [one.value for one in law.formula_of.parameters.values()] if values is None else values
+    parameters = {p.name: np.full((1, 1), float(value)) for p, value in zip(law.parameters, sizes, strict=True)}
+    signals = sampled(law.formula_of.place, fit, target)
+    width = signals["time_since_contact"].shape[-1]
+    state = law.parsed.memory(len(target.grasps), width)
+    step = float(np.median(np.concatenate([np.diff(grasp.time_s) for grasp in target.grasps])))
+    found = np.empty((*target.mask.shape, width))
+    for sample in range(target.mask.shape[1]):
+        now = {name: values[:, sample] for name, values in signals.items()}
+        found[:, sample] = law.parsed.value(now, parameters, state, step)
+    return found
+
+
+def sampled(place: str, fit: Fit, target: Target) -> dict[str, np.ndarray]:
+    """The signals of a law at the samples, each ``(G, S, motors or channels)``; constant after a grasp's end."""
+    position, force = (fit.predicted[..., part].copy() for part in (target.axis.positions, target.axis.forces))
+    width = force.shape[-1] if place == "force" else position.shape[-1]
+    time, command = np.zeros(target.mask.shape), np.zeros(position.shape)
+    velocity, acceleration = np.zeros(position.shape), np.zeros(position.shape)
+    for index, grasp in enumerate(target.grasps):
+        n = len(grasp.time_s)
+        time[index, :n] = grasp.time_s - grasp.time_s[0]
+        time[index, n:], position[index, n:], force[index, n:] = time[index, n - 1], position[index, n - 1], 0.0
+        command[index, :n], command[index, n:] = grasp.command_m, grasp.command_m[-1]
+        if n > 1:
+            velocity[index, :n] = np.gradient(position[index, :n], time[index, :n], axis=0)
+            acceleration[index, :n] = np.gradient(velocity[index, :n], time[index, :n], axis=0)
+    force = of_width(force, width) if force.shape[-1] else np.zeros((*target.mask.shape, width))
+    noise = target.sigma[target.axis.forces].max(initial=0.0)
+    touched = np.maximum.accumulate(np.abs(force) > noise, axis=1)
+    first = np.take_along_axis(time[..., None], np.argmax(touched, axis=1)[:, None], axis=1)
+    since = np.where(touched, time[..., None] - first, 0.0)
+    return {
+        "position": of_width(position, width), "velocity": of_width(velocity, width), "force": force,
+        "acceleration": of_width(acceleration, width), "command": of_width(command, width),
+        "time": np.repeat(time[..., None], width, axis=-1), "time_since_contact": since,
+    }  # fmt: skip

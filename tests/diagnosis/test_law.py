@@ -1,0 +1,100 @@
+"""A law for what no effect of the catalogue explains: found where there is one, and none on noise."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from forcegrasp.diagnosis.diagnose_set import diagnose_set
+from forcegrasp.diagnosis.law import find_law
+from forcegrasp.diagnosis.law_terms import LIBRARY, along, terms
+from forcegrasp.effects.law import make_law
+from forcegrasp.errors import ConfigError
+from forcegrasp.identify.loading import load
+from forcegrasp.identify.verdict import Verdict
+from forcegrasp.models.model_file import Fitted, FoundEffect, read_model, write_model
+from forcegrasp.models.variation import ModelVariation
+from forcegrasp.physics.plant import Plant
+from forcegrasp.reports.law import law_json, law_section, law_words
+from tests.independent.rig import record
+
+
+def silent(text: str) -> None:
+    """Takes what a search tells about its progress."""
+
+
+@pytest.fixture(scope="module")
+def bent(tmp_path_factory):
+    """The diagnosis of a set whose force sensors read more and more as the force grows."""
+    folder = tmp_path_factory.mktemp("bent")
+    record(folder / "set", {"curved_force_gain": "large"}, 2, 6, samples=100)
+    return diagnose_set(load(folder / "set"), None, ["force_bias"], 0, silent, law=True)[0]
+
+
+def test_the_right_term_is_found(bent):
+    law = bent.law
+    assert bent.verdict is Verdict.UNKNOWN
+    assert (law.law.formula_of.place, law.law.formula_of.expression) == ("force", "c1 * force * abs(force)")
+    assert law.parameters["c1"].low < 0.4 < law.parameters["c1"].high
+    assert law.parameters["c1"].value == pytest.approx(0.4, rel=0.15)
+    assert law.error_after < 1.1 * bent.floor < law.error_before
+    assert law.share > 0.8
+
+
+def test_it_is_told_in_words_and_as_data(bent):
+    told = law_json(bent.law)
+    assert told is not None
+    assert told["equation"].startswith("f' = f + 0.4")
+    assert told["equation"] in law_words(bent.law)
+    section = law_section(bent.law, bent.target)
+    assert "law.yaml" in str(section.blocks[-1])
+    added = along(bent.law.law, None, bent.fit, bent.target)
+    force = bent.fit.predicted[..., 2:]
+    inside = bent.target.mask
+    size = bent.law.law.formula_of.parameters["c1"].value
+    np.testing.assert_allclose(added[inside], (size * force * abs(force))[inside], rtol=1e-9)
+
+
+def test_none_is_proposed_on_noise(tmp_path):
+    record(tmp_path / "set", {}, 2, 6, samples=100)
+    loaded = load(tmp_path / "set")
+    diagnosis, simulators = diagnose_set(loaded, None, ["force_bias"], 0, silent, law=True)
+    assert (diagnosis.verdict, diagnosis.law) == (Verdict.EXPLAINED, None)
+    # nor if it is looked for
+    doubted = dataclasses.replace(diagnosis, verdict=Verdict.UNKNOWN)
+    assert find_law(doubted, simulators, np.random.default_rng(1), silent) is None
+
+
+def test_every_term_does_something_and_is_small(made_up):
+    fit, target = made_up.base.fit, made_up.target
+    library = list(terms(fit, target))
+    assert len(library) > 0.9 * sum(map(len, LIBRARY.values()))
+    assert len({law.name for law in library}) == len(library)
+    for law in library:
+        added = np.abs(along(law, None, fit, target)[target.mask])
+        if law.formula_of.place == "force":
+            assert 0 < np.quantile(added, 0.98) < 5 * target.sigma[2]
+
+
+def test_a_model_file_holds_a_law_that_can_be_trained_with(made_up, tmp_path):
+    formula = next(iter(terms(made_up.base.fit, made_up.target))).formula_of
+    law = make_law("mine", formula, made_up.loaded.gripper)
+    size = formula.parameters["c1"].value
+    found = FoundEffect(law, "", {"c1": Fitted(size, 0.9 * size, 1.1 * size, law.parameters[0].unit)})
+    write_model(dataclasses.replace(made_up.model, effects=(found,)), tmp_path / "model.yaml")
+    (again,) = read_model(tmp_path / "model.yaml").effects
+    assert (again.effect.name, again.effect.formula, again.parameters) == ("mine", law.formula, found.parameters)
+    model = read_model(tmp_path / "model.yaml")
+    plant = Plant(model.gripper, 2, "fast", threads=1)
+    variation = ModelVariation(model)
+    variation.attach(plant)
+    variation.draw(np.random.default_rng(0), np.arange(2))
+    plant.reset(np.arange(2), np.zeros(2))
+    plant.advance(np.full((2, 2), 0.03), 5)
+    assert 0.9 * size < plant.motor_push[0, 0] < 1.1 * size
+    text = (tmp_path / "model.yaml").read_text()
+    (tmp_path / "model.yaml").write_text(text.replace("expression: c1", "expression: c1 * open(position)"))
+    with pytest.raises(ConfigError, match=r"effects.mine.law.expression: open: no such function"):
+        read_model(tmp_path / "model.yaml")
