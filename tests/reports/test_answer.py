@@ -121,7 +121,7 @@ def test_each_verdict_has_a_next_command(made_up, verdict, next_one, purpose):
     assert first.line == next_one
     assert purpose in first.purpose
     names = verdict in ("effect", "one_of")
-    assert [c.line.split()[1] for c in others] == ["add"] * names
+    assert [c.line.split()[1] for c in others] == ["add"] * names + ["diagnose"] * (verdict == "unknown")
     assert bool(answer.shares) == names
     told = dict(answer.rows)
     assert {"How sure", "Note"} <= set(told)
