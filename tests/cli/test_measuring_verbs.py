@@ -159,7 +159,7 @@ def test_a_model_of_other_measurements_is_used_with_a_warning(verb, other, folde
     from forcegrasp.errors import ConfigError
     from forcegrasp.identify import comparison
 
-    def stop(loaded, model, *rest):
+    def stop(loaded, model, *_, **__):
         raise ConfigError(f"with {model.data['set']} and {len(loaded.warnings)} warnings")
 
     for home, name in ((comparison, "compare"), (diagnose_set, "diagnose_set"), (add_effect, "add_effect")):

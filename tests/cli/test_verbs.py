@@ -38,7 +38,7 @@ def test_its_options_are_shown_to_change_something(verb):
 
 def test_usage_follows_from_what_a_verb_takes():
     lines = {name: verb.usage_line.removeprefix("usage: forcegrasp ") for name, verb in VERBS.items()}
-    assert lines["fit"] == "fit [SET] [key=value ...]"
+    assert lines["fit"] == "fit [SET ...] [key=value ...]"
     assert lines["curves"] == "curves [FOLDER ...] [key=value ...]"
     assert lines["record"] == "record [key=value ...]"
     assert lines["effects"] == "effects [NAME] [gripper=GRIPPER]"
