@@ -12,6 +12,8 @@ from forcegrasp.diagnosis.result import Candidate
 ALARM = 0.01
 #: An effect must explain this share of the mean square beyond the noise.
 LEAST_SHARE = 0.25
+#: A change of the held-out log-likelihood below this is no evidence, however even it is.
+LEAST_RISE = 5.0
 # Effects whose signatures are that parallel can't be told apart, whatever the likelihood says.
 _PARALLEL = 0.995
 # An effect with fewer parameters that gains this share of what the best one gains can't be ruled out.
@@ -24,7 +26,7 @@ def is_significant(candidate: Candidate, least_gain: float) -> bool:
     """Whether noise would hardly do as well: ``least_gain`` is the share by which some signal's error must fall."""
     return (
         candidate.p_family <= ALARM
-        and (is_beyond_chance(candidate.evidence, 5.0) or _shows_in_some(candidate))
+        and (is_beyond_chance(candidate.evidence, LEAST_RISE) or _shows_in_some(candidate))
         and candidate.largest_fall >= least_gain
         and candidate.share >= LEAST_SHARE
     )
@@ -32,7 +34,7 @@ def is_significant(candidate: Candidate, least_gain: float) -> bool:
 
 def _shows_in_some(candidate: Candidate) -> bool:
     """Whether the windows of some recordings are surely better with an effect, and no recording surely worse."""
-    return is_beyond_chance(candidate.gains, 5.0) and not candidate.harms
+    return is_beyond_chance(candidate.gains, LEAST_RISE) and not candidate.harms
 
 
 def indistinguishable(winner: Candidate, other: Candidate) -> bool:

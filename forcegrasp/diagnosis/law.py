@@ -13,7 +13,7 @@ from forcegrasp.diagnosis.result import Diagnosis
 from forcegrasp.diagnosis.signatures import Signatures
 from forcegrasp.diagnosis.step import look_further
 from forcegrasp.diagnosis.study import Study
-from forcegrasp.diagnosis.verdict import EXPLAINED, EXPLAINED_FAR, FAR, explained_share
+from forcegrasp.diagnosis.verdict import explained_share, explains_enough
 from forcegrasp.effects.law import Formula, Law, Size, make_law
 from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.errors import PhysicsError
@@ -58,8 +58,8 @@ def find_law(
         return None
     after, target, rivals = found
     before, error = rms(study.heldout(fit), diagnosis.target), rms(study.heldout(after), diagnosis.target)
-    share, far = explained_share(before, error), error > FAR * diagnosis.floor and len(target.recordings) <= 1
-    if share < (EXPLAINED_FAR if far else EXPLAINED):  # as of effects: a look-alike takes half
+    share = explained_share(before, error)
+    if not explains_enough(share, error, diagnosis.floor, whole_recordings=len(target.recordings) > 1):
         return None
     law, merged = _as_one(fit, after, target)
     sizes = effects_of_fit(merged, target, standard_errors(merged, numerical))[len(fit.problem.effects)]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 
-from forcegrasp.diagnosis.evidence import is_beyond_chance
+from forcegrasp.diagnosis.evidence import LEAST_RISE, is_beyond_chance
 from forcegrasp.diagnosis.families import refit_without
 from forcegrasp.diagnosis.result import Step
 from forcegrasp.diagnosis.study import Study
@@ -22,21 +22,22 @@ def drop_needless(study: Study, step: Step, fit: Fit, given: int) -> tuple[Step,
       given: number of effects that were in the model before the search; they stay.
     """
     held = study.heldout(fit)
-    without: dict[str, Fit] = {}
+    without: dict[str, tuple[Fit, float]] = {}
     for one in fit.problem.effects[given:-1]:
         study.progress(f"fitting without {one.effect.name}")
         less = refit_without(one.effect.name, fit, study)
-        if not is_beyond_chance(study.gains(study.heldout(less), held), 5.0):
-            without[one.effect.name] = less
+        left = study.heldout(less)
+        if not is_beyond_chance(study.gains(left, held), LEAST_RISE):
+            without[one.effect.name] = less, rms(left, study.target)
     if not without:
         return step, fit
-    name, less = min(without.items(), key=lambda item: item[1].cost)
+    name, (less, error) = min(without.items(), key=lambda item: item[1][0].cost)
     study.progress(f"{name} is needless with {step.effects[0]}")
     last = dataclasses.replace(
         step.candidates[0],
         setting=less.problem.case(less.vector).effects[-1],
         fit=less,
-        error_after=rms(study.heldout(less), study.target),
+        error_after=error,
         replaces=name,
     )
-    return dataclasses.replace(step, candidates=(last, *step.candidates[1:]), error_after=last.error_after), less
+    return dataclasses.replace(step, candidates=(last, *step.candidates[1:]), error_after=error), less

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from forcegrasp.identify.cross_validation import rms_of_grasps
 from forcegrasp.identify.fit import Fit, Simulators, fit_once
 from forcegrasp.identify.predict import predict
 from forcegrasp.identify.problem import Problem
@@ -50,7 +51,7 @@ def odd_grasps(target: Target, fit: Fit) -> tuple[OddGrasp, ...]:
     objects = target.objects
     if target.gripper.is_servo or len(objects) < 2:
         return ()
-    errors = _errors(fit.residual, target)
+    errors = rms_of_grasps(fit.residual, target)
     if errors.max() < _ODD:
         return ()
     labels = [grasp.object for grasp in target.grasps]
@@ -86,12 +87,6 @@ def odd_grasps(target: Target, fit: Fit) -> tuple[OddGrasp, ...]:
     return tuple(found)
 
 
-def _errors(residual: np.ndarray, target: Target) -> np.ndarray:
-    """rms residual ÷ noise of each grasp, ``(G,)``."""
-    samples = np.maximum(target.mask.sum(axis=1), 1) * residual.shape[-1]
-    return np.sqrt(np.sum(residual**2, axis=(1, 2)) / samples)
-
-
 def _fit_of(
     target: Target, fit: Fit, rest: np.ndarray, known: tuple[Problem, np.ndarray]
 ) -> tuple[Problem, np.ndarray]:
@@ -115,4 +110,4 @@ def _errors_as(
     own = Problem(problem.gripper, grasps, problem.effects)
     few = target.subset(which)
     case = own.case(_coordinates(own, (problem, vector)))
-    return _errors(few.residual(predict(Replay(problem.gripper, grasps), [case])[0]), few)
+    return rms_of_grasps(few.residual(predict(Replay(problem.gripper, grasps), [case])[0]), few)

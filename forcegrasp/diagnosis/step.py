@@ -9,6 +9,7 @@ import numpy as np
 from forcegrasp.diagnosis import families
 from forcegrasp.diagnosis.evidence import (
     ALARM,
+    LEAST_RISE,
     LEAST_SHARE,
     add_nothing,
     indistinguishable,
@@ -203,7 +204,7 @@ class _Start:
         gains = self._study.gains(held, after)
         recordings = self._study.of_recordings(gains)
         sums = np.array([one.sum() for one in recordings]) if recordings else None
-        harms = any(is_beyond_chance(-one, 5.0) for one in recordings)
+        harms = any(is_beyond_chance(-one, LEAST_RISE) for one in recordings)
         fall = max((1 - rms(after, target, w) / rms(held, target, w) for _, w in cells(target)), default=0.0)
         error = rms(after, target)
         share = explained_share(self.error, error)

@@ -25,6 +25,18 @@ def explained_share(before: float, after: float, noise: float = 1.0) -> float:
     return (before**2 - after**2) / max(before**2 - noise**2, 1e-9)
 
 
+def explains_enough(share: float, after: float, floor: float, whole_recordings: bool) -> bool:
+    """Whether what explains this share is an answer, and no look-alike.
+
+    Args:
+      share: of the mean square beyond the noise.
+      after: held-out error ÷ noise that is left.
+      floor: what noise and the simulation's own error leave.
+      whole_recordings: whether motions were held out as wholes, to which a look-alike carries over less.
+    """
+    return share >= (EXPLAINED_FAR if after > FAR * floor and not whole_recordings else EXPLAINED)
+
+
 def conclude(
     found: Sequence[Verdict],
     before: float,
@@ -43,12 +55,11 @@ def conclude(
       floor: what noise and the simulation's own error leave.
       left: whether something is left that is neither.
       only_of_set: whether all that was found is of the set, and not of the gripper.
-      whole_recordings: whether motions were held out as wholes, to which a look-alike carries over less.
+      whole_recordings: as for :func:`explains_enough`.
     """
     if not found:
         return Verdict.UNKNOWN if left else Verdict.EXPLAINED
-    enough = EXPLAINED_FAR if after > FAR * floor and not whole_recordings else EXPLAINED
-    if left and explained_share(before, after) < enough:
+    if left and not explains_enough(explained_share(before, after), after, floor, whole_recordings):
         return Verdict.UNKNOWN
     if Verdict.ONE_OF in found:
         return Verdict.ONE_OF

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from forcegrasp.identify import fit_set
-from forcegrasp.identify.cross_validation import heldout_residual, make_folds, rms
+from forcegrasp.identify.cross_validation import heldout_residual, make_folds, rms, rms_of_grasps
 from forcegrasp.identify.fitted_model import model_of
 from forcegrasp.identify.loading import Loaded
 from forcegrasp.identify.noise_floor import beyond_fit, numerical_error, numerical_floor
@@ -63,8 +63,7 @@ class Comparison(ShortRepr):
 
     def by_grasp(self) -> np.ndarray:
         """rms residual ÷ noise of each grasp, ``(G,)``."""
-        squares = np.sum(self.residual**2, axis=(1, 2))
-        return np.sqrt(squares / (self.residual.shape[-1] * self.target.mask.sum(axis=1)))
+        return rms_of_grasps(self.residual, self.target)
 
     def by_grasp_and_phase(self) -> tuple[np.ndarray, list[str]]:
         """rms residual ÷ noise, ``(rows, phases)``, and the names of the rows: grasps, or a servo's recordings.

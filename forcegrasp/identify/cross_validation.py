@@ -126,3 +126,14 @@ def rms(residual: np.ndarray, target: Target, where: np.ndarray | None = None) -
         return float("nan")
     counts, means = np.array(squares).T
     return float(np.exp(0.5 * np.average(np.log(np.maximum(means, 1e-12)), weights=counts)))
+
+
+def rms_of_grasps(residual: np.ndarray, target: Target) -> np.ndarray:
+    """Root mean square residual ÷ noise of each grasp, ``(G,)``.
+
+    Args:
+      residual: in units of the noise, 0 where there is no sample, ``(G, S, C)``.
+      target: the measurements.
+    """
+    readings = np.maximum(target.mask.sum(axis=1), 1) * residual.shape[-1]
+    return np.sqrt(np.sum(residual**2, axis=(1, 2)) / readings)

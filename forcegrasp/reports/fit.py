@@ -15,7 +15,7 @@ from rich.text import Text as Plain
 from forcegrasp.diagnosis.add_effect import Added
 from forcegrasp.effects import Effect
 from forcegrasp.identify.base_fit import BaseFit, rms_error
-from forcegrasp.identify.cross_validation import heldout_residual, make_folds, rms
+from forcegrasp.identify.cross_validation import heldout_residual, make_folds, rms, rms_of_grasps
 from forcegrasp.identify.fit import Fit
 from forcegrasp.identify.intervals import listed, reached_bound
 from forcegrasp.identify.target import Target
@@ -163,9 +163,7 @@ def fit_sections(base: BaseFit, target: Target, model: Model) -> list[Section]:
             f" {noise_sentence(target)[0].upper()}{noise_sentence(target)[1:]}."
         ),
     ]
-    errors = np.sqrt(
-        np.sum(base.fit.residual**2, axis=(1, 2)) / (base.fit.residual.shape[-1] * target.mask.sum(axis=1))
-    )
+    errors = rms_of_grasps(base.fit.residual, target)
     worst = int(np.argmax(errors))
     grasp = target.grasps[worst]
     picture = Picture(

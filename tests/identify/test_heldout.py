@@ -12,7 +12,7 @@ from scipy.stats import norm
 
 from forcegrasp.effects import get_effect
 from forcegrasp.effects.setting import EffectSetting
-from forcegrasp.identify.cross_validation import FOLDS, heldout_residual, log_likelihood, make_folds, rms
+from forcegrasp.identify.cross_validation import FOLDS, heldout_residual, log_likelihood, make_folds, rms, rms_of_grasps
 from forcegrasp.identify.fit import Fit
 from forcegrasp.identify.intervals import intervals, reached_bound, standard_errors, warnings
 from forcegrasp.identify.noise_floor import cells, excess, numerical_floor
@@ -302,6 +302,12 @@ def test_warning_of_two_that_do_the_same():
     slopes[..., 3] = -2 * slopes[..., 2] + 0.3 * slopes[..., 3]
     (line,) = warnings(fit_at(slopes, noise()), np.full(4, 0.01))
     assert re.match(r"rho_m of cup and force_scale of cup are confounded \(correlation 0\.9[89]\d\)", line)
+
+
+def test_error_of_each_grasp_is_over_its_own_readings():
+    target = make(3, (S, 50, 10))
+    residual = np.where(target.mask[..., None], np.array([1.0, 2.0, 5.0])[:, None, None], 0.0) * np.ones((3, S, 4))
+    assert rms_of_grasps(residual, target) == pytest.approx([1.0, 2.0, 5.0])
 
 
 def test_eleven_pairs_are_one_warning():
