@@ -14,6 +14,8 @@ from forcegrasp.replay.replay import Replay
 
 # Room for what the estimate of the floor misses: in all, and in a single signal and phase.
 _ROOM, _ROOM_IN_CELL = 1.03, 1.15
+# And for chance: so many standard errors of the rms of white noise.
+_CHANCE = 4.0
 # A residual beyond this many σ, and three times the numerical error there, is no noise; a few outliers are allowed.
 _OUTLIER, _MAX_OUTLIERS = 5.0, 3
 # Cells with fewer samples say nothing.
@@ -63,16 +65,22 @@ def excess(residual: np.ndarray, numerical: Sequence[np.ndarray], target: Target
       target: the measurements.
     """
     error, floor = rms(residual, target), numerical_floor(numerical, target)
-    if error > floor * _ROOM:
+    if error > floor * max(_ROOM, _by_chance(residual, target)):
         return f"{error:.2f} × noise in all, {floor:.2f} is the floor"
     for name, where in cells(target):
         error, floor = rms(residual, target, where), numerical_floor(numerical, target, where)
-        if error > floor * _ROOM_IN_CELL:
+        if error > floor * max(_ROOM_IN_CELL, _by_chance(residual, target, where)):
             return f"{name}: {error:.2f} × noise, {floor:.2f} is the floor"
     far = np.abs(residual) > _OUTLIER + 3 * (2 * np.abs(numerical[0]) + np.abs(numerical[1]))
     if far.sum() > max(_MAX_OUTLIERS, 2e-4 * target.readings):
         return f"{far.sum()} readings are more than {_OUTLIER:g} σ off"
     return ""
+
+
+def _by_chance(residual: np.ndarray, target: Target, where: np.ndarray | bool = True) -> float:
+    """How many times its expectation the rms of so few readings of noise may be; ``where`` is ``(G, S, C)``."""
+    readings = np.sum(target.mask[..., None] & np.isfinite(residual) & where)
+    return 1 + _CHANCE / np.sqrt(2 * max(readings, 1))
 
 
 def cells(target: Target) -> list[tuple[str, np.ndarray]]:

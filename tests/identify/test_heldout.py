@@ -167,6 +167,14 @@ def test_excess_in_all():
     assert "in all" in excess(1.06 * noise(), NOTHING, make())
 
 
+def test_few_readings_may_be_off_by_chance():
+    """Four standard errors of the rms, 1 / √(2 N): 0.08 of 1,200 readings, 0.05 of 3,600."""
+    many = np.full((6, S, 4), 1.06)
+    assert "in all" in excess(many, (0 * many, 0 * many), make(6))
+    few = many[:2]
+    assert excess(few, (0 * few, 0 * few), make(2)) == ""
+
+
 def test_excess_in_one_cell():
     residual = noise()
     residual[:, 60:90, 2:] *= 1.22
