@@ -18,7 +18,7 @@ from forcegrasp.diagnosis.study import Study
 from forcegrasp.diagnosis.verdict import conclude
 from forcegrasp.effects import Effect
 from forcegrasp.identify.base_fit import BaseFit
-from forcegrasp.identify.cross_validation import heldout_residual, make_folds, rms
+from forcegrasp.identify.cross_validation import make_folds, rms
 from forcegrasp.identify.fit import Fit, Simulators
 from forcegrasp.identify.noise_floor import beyond_fit, excess, numerical_error, numerical_floor
 from forcegrasp.identify.progress import Progress, silent
@@ -49,15 +49,15 @@ def diagnose(
       progress: told what is going on.
     """
     fit, folds = base.fit, tuple(make_folds(target.grasps))
-    error_before = rms(target.before_rounding(heldout_residual(fit, target, folds)), target)
     of_base = numerical_error(fit, target)
+    study = Study(target, simulators, folds, beyond_fit(fit, of_base), progress)
+    error_before = rms(target.before_rounding(study.heldout(fit)), target)
     odd = odd_grasps(target, fit)
     if any(grasp.like for grasp in odd):  # nothing can be learnt of the gripper until labels are right
         labels = ("object_labels",)
         return Diagnosis(
             Verdict.DATA, labels, (), base, fit, target, folds, error_before, error_before, left="labels", odd=odd
         )
-    study = Study(target, simulators, folds, beyond_fit(fit, of_base), progress)
     floor = numerical_floor(study.numerical, target)
     steps: list[Step] = []
     if (rounding := target.rounding) is not None:
@@ -78,8 +78,9 @@ def diagnose(
             steps.append(step)
             break
         progress(f"found {step.effects[0]}: held-out error {step.error_before:.2f} → {step.error_after:.2f} × noise")
-        target, fit = reweigh(target, step.candidates[0].fit, simulators)
-        study = dataclasses.replace(study, target=target)
+        weighed, fit = reweigh(target, step.candidates[0].fit, simulators)
+        if weighed is not target:
+            target, study = weighed, dataclasses.replace(study, target=weighed)
         step, fit = drop_needless(study, step, fit, len(base.fit.problem.effects))
         steps.append(step)
         if not _left(study, fit)[0]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -41,6 +41,8 @@ _MIN_GAIN_RATIO = 0.2
 _MAX_GAIN_FACTOR = 0.5
 # A signature of an earlier round is simulated anew if it gains this share of what makes its effect worth a fit.
 _RESIMULATE_RATIO = 0.3
+# A rough fit whose cost is no smaller share of another's is no better; rough ones end within a tenth of that.
+_NO_BETTER = 0.99
 # An error of so many times the noise leaves nothing to look for; beyond the other, no start will find it.
 _ALL_FITTED, _FAR = 1.05, 10.0
 
@@ -149,13 +151,14 @@ class _Start:
         near = [c for c in ordered if c is ordered[0] or indistinguishable(ordered[0], c)][:_REFINED]
         contained = {nested.effect for c in near for nested in c.effect.contains}
         near += [c for c in ordered if c.effect.name in contained and c not in near]
-        refined = []
-        for c in near:
+        rough = {c.effect.name: c.fit for c in near}
+        refined: list[Candidate] = []
+        for c in sorted(near, key=lambda c: c.effect.name not in contained):  # the simple ones first
             if c.replaces:  # fitted to the end already
                 refined.append(c)
-                continue
-            self._study.progress(f"fitting {c.effect.name} {c.setting.variant} to the end")
-            refined.append(self._judge(self._to_the_end(c.fit), c.p_family, c.signature))
+            elif not any(self._is_enough(simple, rough, c) for simple in refined):
+                self._study.progress(f"fitting {c.effect.name} {c.setting.variant} to the end")
+                refined.append(self._judge(self._to_the_end(c.fit), c.p_family, c.signature))
         refined = self._compare_with_contained(refined)
         names = {c.effect.name for c in refined}
         every = [*refined, *(c for c in ordered if c.effect.name not in names)]
@@ -169,6 +172,14 @@ class _Start:
             names.add(first.effect.name)
             self._study.progress(f"fitting {first.effect.name} {first.setting.variant} to the end")
             every[0] = self._judge(self._to_the_end(first.fit), first.p_family, first.signature)
+
+    def _is_enough(self, simple: Candidate, rough: Mapping[str, Fit], richer: Candidate) -> bool:
+        """Whether a richer effect promises nothing beyond one that it contains, which leaves only noise."""
+        return (
+            any(nested.effect == simple.effect.name for nested in richer.effect.contains)
+            and richer.fit.cost > _NO_BETTER * rough[simple.effect.name].cost
+            and not excess(self._study.heldout(simple.fit), self._study.numerical, self._study.target)
+        )
 
     def _compare_with_contained(self, candidates: Sequence[Candidate]) -> list[Candidate]:
         """Refits effects that fit worse than one that they contain, and the one that they have become."""

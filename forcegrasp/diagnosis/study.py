@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -25,10 +25,16 @@ class Study:
     folds: Sequence[np.ndarray]  #: indices of the grasps that are held out together
     numerical: Sequence[np.ndarray] = ()  #: the model's own numerical errors, which no effect gets credit for
     progress: Progress = silent
+    # fits and what they leave of held-out grasps: several parts of a search ask for the same, and some is simulated
+    _known: list[tuple[Fit, np.ndarray]] = field(default_factory=list, init=False, repr=False)
 
     def heldout(self, fit: Fit) -> np.ndarray:
         """Residuals of held-out grasps, ``(G, S, C)``."""
-        return heldout_residual(fit, self.target, self.folds)
+        known = next((held for one, held in self._known if one is fit), None)
+        if known is None:
+            known = heldout_residual(fit, self.target, self.folds)
+            self._known.append((fit, known))
+        return known
 
     def gains(self, before: np.ndarray, after: np.ndarray) -> np.ndarray:
         """By how much each grasp's held-out log-likelihood rises, ``(G,)``; NaN of those that were not held out.
