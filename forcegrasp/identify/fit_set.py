@@ -66,7 +66,11 @@ def _coordinates(problem: Problem, model: Model) -> tuple[np.ndarray, np.ndarray
         if entry.effect is not None:  # effects start from the model's values
             continue
         first = problem.grasps[int(np.flatnonzero(entry.members)[0])]
-        places = [model.base, model.objects.get(first.object, {}), model.grasps.get(first.name, {})]
+        places = [
+            model.base,
+            model.objects.get(first.object, {}),
+            *(model.grasps.get(n, {}) for n in (first.name, first.session)),
+        ]
         fitted = next((place[entry.parameter] for place in places if entry.parameter in place), None)
         if fitted is None:
             unknown[index] = True

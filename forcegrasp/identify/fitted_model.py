@@ -30,7 +30,8 @@ def model_of(fit: Fit, target: Target, loaded: Loaded, numerical: Sequence[np.nd
         elif scope == "object":
             objects.setdefault(first.object, {})[entry.parameter] = fitted
         else:
-            grasps.setdefault(first.name, {})[entry.parameter] = fitted
+            owner = first.session if scope == "recording" else first.name
+            grasps.setdefault(owner, {})[entry.parameter] = fitted
     data = {"set": loaded.measured.name, "fingerprint": loaded.measured.fingerprint}
     warned, found = tuple(warnings(fit, errors)), effects_of_fit(fit, target, errors)
     return Model(loaded.gripper, base, objects, grasps, found, data, warned, _noise_of(target))

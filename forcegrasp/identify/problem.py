@@ -80,14 +80,18 @@ class Problem:
         return len(self.entries)
 
     def _base_entries(self) -> list[Entry]:
-        objects = np.array([g.object for g in self.grasps])
+        owners = {
+            "object": np.array([g.object for g in self.grasps]),
+            "recording": np.array([g.session for g in self.grasps]),
+        }
         entries = []
         for parameter in self.gripper.parameters.values():
             free = np.isnan(self._given.get(parameter.name, np.full(len(self.grasps), np.nan)))
             if parameter.scope == "gripper":
                 groups = {parameter.name: free}
-            elif parameter.scope == "object":
-                groups = {f"{parameter.name} of {o}": free & (objects == o) for o in dict.fromkeys(objects)}
+            elif parameter.scope in owners:
+                owner = owners[parameter.scope]
+                groups = {f"{parameter.name} of {one}": free & (owner == one) for one in dict.fromkeys(owner)}
             else:
                 groups = {
                     f"{parameter.name} of grasp {g.name}": free & (np.arange(len(self.grasps)) == i)

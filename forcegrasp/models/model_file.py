@@ -77,7 +77,7 @@ class Model(ShortRepr):
     gripper: Gripper
     base: dict[str, Fitted]  #: of the gripper as a whole
     objects: dict[str, dict[str, Fitted]] = field(default_factory=dict)  #: per object
-    grasps: dict[str, dict[str, Fitted]] = field(default_factory=dict)  #: per grasp
+    grasps: dict[str, dict[str, Fitted]] = field(default_factory=dict)  #: per grasp, or per recording
     effects: tuple[FoundEffect, ...] = ()
     data: dict[str, str] = field(default_factory=dict)  #: set and fingerprint
     warnings: tuple[str, ...] = ()
@@ -151,7 +151,10 @@ def read_model(path: str | Path) -> Model:
         gripper,
         base=_fitted(path, "base", said.base, scopes["gripper"], required=True),
         objects={o: _fitted(path, f"objects.{o}", v, scopes["object"]) for o, v in (said.objects or {}).items()},
-        grasps={g: _fitted(path, f"grasps.{g}", v, scopes["grasp"]) for g, v in (said.grasps or {}).items()},
+        grasps={
+            g: _fitted(path, f"grasps.{g}", v, scopes["grasp"] | scopes["recording"])
+            for g, v in (said.grasps or {}).items()
+        },
         effects=tuple(_found(path, name, entry, gripper) for name, entry in (said.effects or {}).items()),
         data=said.data or {},
         warnings=tuple(said.warnings or ()),

@@ -10,7 +10,7 @@ import numpy as np
 from forcegrasp.short_repr import ShortRepr
 
 #: Of what a base parameter has one value each.
-SCOPES = ("gripper", "object", "grasp")
+SCOPES = ("gripper", "object", "recording", "grasp")
 Softness = TypeVar("Softness", float, np.ndarray)
 #: Stroke for which the sizes of effects in the catalogue are typical; metres, or as many radians.
 TYPICAL_STROKE = 0.05
@@ -37,7 +37,7 @@ class BaseParameter:
     low: float
     high: float
     unit: str
-    scope: str  #: one value for the "gripper", per "object" or per "grasp"
+    scope: str  #: one value for the "gripper", per "object", "recording" or "grasp"
     writes: tuple[FieldWrite, ...]
     times: str = ""  #: setting of a recording that multiplies the value; empty for none
 

@@ -88,7 +88,7 @@ class ParameterEntry(Record):
     low: float = Field(description="how far a fit may go down")
     high: float = Field(description="how far a fit may go up")
     unit: Name = Field(description="text for tables")
-    scope: Literal["gripper", "object", "grasp"] = Field(description="of what there is one value each")
+    scope: Literal["gripper", "object", "recording", "grasp"] = Field(description="of what there is one value each")
     writes: list[Annotated[FieldWrite, PlainValidator(_field_write)]] = Field(
         description="fields of MuJoCo's model that take the value", examples=["[dof_damping]"]
     )

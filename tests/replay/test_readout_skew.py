@@ -9,10 +9,15 @@ import pytest
 
 from forcegrasp.errors import ConfigError
 from forcegrasp.identify.fit import Simulators, fit_once
+from forcegrasp.identify.fit_set import apply_model
+from forcegrasp.identify.fitted_model import model_of
+from forcegrasp.identify.loading import Loaded
 from forcegrasp.identify.problem import Problem
+from forcegrasp.identify.progress import silent
 from forcegrasp.identify.target import make_target
 from forcegrasp.importers.example import example_set
 from forcegrasp.measure.schema import MeasuredGrasp, columns_of
+from forcegrasp.models.model_file import read_model, write_model
 from forcegrasp.physics import load_gripper
 from forcegrasp.physics.gripper import SKEW
 from forcegrasp.replay.replay import Replay
@@ -47,12 +52,13 @@ def test_no_skew_reads_what_a_plain_replay_reads():
     np.testing.assert_array_equal(plain, late)
 
 
-def test_a_hidden_skew_is_found_and_its_slope_costs_no_simulation(monkeypatch):
-    found, rows = [], np.arange(3)
+def test_each_recordings_skew_is_found_kept_and_costs_no_simulation(monkeypatch, tmp_path):
+    """The jaw's is of each recording: a logger starts anew for each."""
+    found, rows, hidden = [], np.arange(3), np.array([0.0137, -0.006, 0.0202])
     measured = example_set()
     grasps = [dataclasses.replace(g, start=(g.command_m[0], np.zeros(1))) for g in measured.grasps[2:5]]
     replay = Replay(JAW, grasps, encoders_known=False)
-    read = replay.read(replay.simulate(rows, nominal(3)), rows, np.ones(3), skew_s=np.full(3, 0.0137)).position
+    read = replay.read(replay.simulate(rows, nominal(3)), rows, np.ones(3), skew_s=hidden).position
     noisy = read + 1e-4 * np.random.default_rng(0).standard_normal(read.shape)
     grasps = tuple(dataclasses.replace(g, position_m=p, start=None) for g, p in zip(grasps, noisy, strict=True))
     target = make_target(dataclasses.replace(measured, grasps=grasps), JAW)
@@ -60,9 +66,25 @@ def test_a_hidden_skew_is_found_and_its_slope_costs_no_simulation(monkeypatch):
     simulate = Replay.simulate
     monkeypatch.setattr(Replay, "simulate", lambda *a, **o: found.append(len(a[1])) or simulate(*a, **o))
     fit = fit_once(target, problem, Simulators(problem), problem.start())
-    values = dict(zip((e.name for e in problem.entries), fit.values, strict=True))
-    assert values[SKEW] == pytest.approx(0.0137, abs=4e-4)
     assert max(found) == (len(JAW.parameters) - 1) * len(target.grasps)  # slopes of all others
+    model = model_of(fit, target, Loaded(dataclasses.replace(measured, grasps=grasps), JAW, []), [])
+    write_model(model, tmp_path / "model.yaml")
+    again = read_model(tmp_path / "model.yaml")
+    assert SKEW not in again.base
+    for grasp, skew_s in zip(grasps, hidden, strict=True):
+        fitted = again.grasps[grasp.session][SKEW]
+        assert fitted.value == pytest.approx(skew_s, abs=6e-4)
+        assert fitted.low < skew_s < fitted.high
+
+    # a model stands beside the set that it was fitted to as it is; of other recordings the skew is fitted
+    _, _, known = apply_model(Loaded(dataclasses.replace(measured, grasps=grasps), JAW, []), again, silent, refit=False)
+    np.testing.assert_allclose(known.fit.values, fit.values, rtol=1e-3)
+    others = tuple(dataclasses.replace(g, name=f"{g.name}x", session=f"{g.session}x") for g in grasps)
+    told: list[str] = []
+    other = Loaded(dataclasses.replace(measured, grasps=others), JAW, [])
+    _, _, fitted_anew = apply_model(other, again, told.append, refit=False)
+    np.testing.assert_allclose(fitted_anew.fit.values, fit.values, rtol=0.05)
+    assert told[0].startswith(f"the model does not say {SKEW} of {others[0].session}, ")
 
 
 @pytest.mark.parametrize(
