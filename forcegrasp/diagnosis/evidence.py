@@ -14,8 +14,9 @@ ALARM = 0.01
 LEAST_SHARE = 0.25
 #: A change of the held-out log-likelihood below this is no evidence, however even it is.
 LEAST_RISE = 5.0
-# Effects whose signatures are that parallel can't be told apart, whatever the likelihood says.
-_PARALLEL = 0.995
+# Effects whose signatures are that parallel, and that gain this share of each other, can't be told apart, whatever the
+# likelihood says. Signatures are of small sizes: fitted, one may explain what the other can't.
+_PARALLEL, _ALIKE = 0.995, 0.9
 # An effect with fewer parameters that gains this share of what the best one gains can't be ruled out.
 _NEARLY = 0.95
 #: Between an effect and a fault of the set a lead below this decides nothing: to take one for the other costs most.
@@ -39,11 +40,12 @@ def _shows_in_some(candidate: Candidate) -> bool:
 
 def indistinguishable(winner: Candidate, other: Candidate) -> bool:
     """Whether these data can't tell another effect from the best one."""
-    parallel = abs(float(winner.signature @ other.signature))
+    parallel = abs(float(winner.signature @ other.signature)) > _PARALLEL
+    alike = parallel and other.heldout_gain > _ALIKE * winner.heldout_gain
     simpler = len(other.effect.parameters) < len(winner.effect.parameters)
     nearly = simpler and other.heldout_gain > _NEARLY * winner.heldout_gain
     least = LEAST_LEAD if winner.effect.of_set != other.effect.of_set else 0.0
-    return other.heldout_gain > 0 and (not _leads(winner, other, least) or parallel > _PARALLEL or nearly)
+    return other.heldout_gain > 0 and (not _leads(winner, other, least) or alike or nearly)
 
 
 def add_nothing(candidates: Sequence[Candidate]) -> set[str]:

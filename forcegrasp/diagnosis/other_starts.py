@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from forcegrasp.diagnosis.signatures import Background
@@ -13,16 +15,19 @@ from forcegrasp.identify.predict import predict
 _MULTIPLES = (0.1, 0.2, 0.35, 0.6, 0.8, 1.25, 1.6, 2.5, 4.0, 8.0)
 # So many of the promising ones are fitted.
 _MOST = 2
+# A time, a frequency or a speed of an effect is tried where it is this far from the fitted one, in logarithms.
+_APART = 0.5
 # A size is promising if, all else fitted anew as far as slopes tell, at most this share is added to the cost.
 _PROMISING = 0.3
 
 
 def other_starts(fit: Fit, study: Study) -> list[np.ndarray]:
-    """Coordinates to start from, each ``(p,)``: the best sizes, twice the size, and nominal base parameters.
+    """Coordinates to start from, each ``(p,)``: the best sizes, twice the size, other shapes, nominal base parameters.
 
-    Base parameters that made up for the effect while it was missing may be stuck where they are. The first parameter
-    of the last effect is set to sizes all over its range, each of them simulated by the model itself. What the other
-    parameters would make up for, as far as their slopes tell, is taken out of the residuals.
+    What rings at 6 Hz has a valley there and others at higher frequencies. Base parameters that made up for the effect
+    while it was missing may be stuck where they are. The first parameter of the last effect is set to sizes all over
+    its range, each of them simulated by the model itself. What the other parameters would make up for, as far as their
+    slopes tell, is taken out of the residuals.
 
     Args:
       fit: with an effect as its last one, that left more than noise.
@@ -52,4 +57,21 @@ def other_starts(fit: Fit, study: Study) -> list[np.ndarray]:
         if cost <= min(costs[max(0, i - 1) : i + 2]) and cost < (1 + _PROMISING) * fit.cost
     ]  # fmt: skip
     ordered = sorted(valleys, key=lambda i: costs[i])[:_MOST]
-    return [*(starts[i] for i in ordered), double, nominal]
+    return [*(starts[i] for i in ordered), double, *_other_shapes(fit, index), nominal]
+
+
+def _other_shapes(fit: Fit, first: int) -> Iterator[np.ndarray]:
+    """The fit's coordinates with a time, frequency or speed of its last effect where else the effect is tried.
+
+    Args:
+      fit: with the effect as its last one.
+      first: index of the effect's first parameter.
+    """
+    effect = fit.problem.effects[-1].effect
+    for place, parameter in enumerate(effect.parameters[1:], 1):
+        entry = fit.problem.entries[first + place]
+        for value in np.unique(effect.trials()[:, place]) if parameter.logarithmic else ():
+            if abs(entry.coordinate(value) - fit.vector[first + place]) > _APART:
+                start = fit.vector.copy()
+                start[first + place] = entry.coordinate(value)
+                yield start

@@ -56,7 +56,7 @@ def fit_base(
         progress(f"base model, start {len(ends)} of {most}: {rms_error(ends[-1], small.target):.2f} × noise")
     best = min(ends, key=lambda f: f.cost)
     errors = tuple(rms_error(f, small.target) for f in ends)
-    if ends[0].cost - best.cost > _cost_tolerance(best, small.target):  # another start found a better place
+    if ends[0].cost - best.cost > cost_tolerance(best, small.target):  # another start found a better place
         first = fit_once(target, problem, simulators, small.enlarge(best))
     if not _ends_agree(ends, small.target):
         spread = ", ".join(f"{error:.2f}" for error in errors)
@@ -74,13 +74,13 @@ def fit_base(
     # nor may slopes over small steps, where a finger sticks and slips
     simulators.step = LARGE_STEP
     smooth = check_gradient(fit_exactly(target, problem, simulators, further.fit.vector), target, errors)
-    if smooth.converged or further.fit.cost - smooth.fit.cost > _cost_tolerance(smooth.fit, target):
+    if smooth.converged or further.fit.cost - smooth.fit.cost > cost_tolerance(smooth.fit, target):
         return smooth
     simulators.step = STEP
     return further
 
 
-def _cost_tolerance(best: Fit, target: Target) -> float:
+def cost_tolerance(best: Fit, target: Target) -> float:
     """Difference of two costs that mean the same place."""
     return max(_SAME_SHARE * best.cost, _SAME_COST * target.readings)
 
@@ -88,7 +88,7 @@ def _cost_tolerance(best: Fit, target: Target) -> float:
 def _ends_agree(ends: Sequence[Fit], target: Target) -> bool:
     """Whether two fits at least ended in the best place."""
     best = min(ends, key=lambda f: f.cost)
-    tolerance = max(_cost_tolerance(best, target), _SAME_BEYOND * (best.cost - target.cost_of_noise))
+    tolerance = max(cost_tolerance(best, target), _SAME_BEYOND * (best.cost - target.cost_of_noise))
     return sum(f.cost - best.cost <= tolerance for f in ends) >= 2
 
 

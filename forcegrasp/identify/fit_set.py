@@ -7,8 +7,8 @@ import dataclasses
 import numpy as np
 
 from forcegrasp.errors import ConfigError
-from forcegrasp.identify.base_fit import BaseFit, check_gradient, fit_base
-from forcegrasp.identify.fit import Simulators, fit_once
+from forcegrasp.identify.base_fit import BaseFit, check_gradient, cost_tolerance, fit_base
+from forcegrasp.identify.fit import Simulators, fit_exactly, fit_once
 from forcegrasp.identify.loading import Loaded
 from forcegrasp.identify.problem import Problem
 from forcegrasp.identify.progress import Progress
@@ -56,6 +56,10 @@ def _weighed(target: Target, simulators: Simulators, base: BaseFit) -> tuple[Tar
     weighed, fit = reweigh(target, base.fit, simulators)
     if fit is not base.fit and base.converged:
         base = check_gradient(fit, weighed, base.errors)
+        if not base.converged:  # slopes of what sticks and slips never vanish: does the error still fall?
+            further = fit_exactly(weighed, fit.problem, simulators, fit.vector)
+            if fit.cost - further.cost <= cost_tolerance(further, weighed):
+                base = BaseFit(fit, base.errors, True)
     return weighed, simulators, dataclasses.replace(base, fit=fit)
 
 

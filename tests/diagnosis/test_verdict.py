@@ -63,6 +63,14 @@ def test_a_lead_within_its_standard_error_decides_nothing(made_up, ahead, equal)
     assert indistinguishable(winner, other) == equal
 
 
+@pytest.mark.parametrize(("gain", "equal"), [(95.0, True), (89.0, False)])
+def test_effects_of_parallel_signatures_are_alike_if_they_gain_alike(made_up, gain, equal):
+    """A small ringing looks like a delay; fitted, it may explain what a delay can't."""
+    winner = candidate(made_up, gains=np.full(4, 100.0), signature=np.array([1.0, 0.0]))
+    other = candidate(made_up, gains=np.full(4, gain), signature=np.array([1.0, 0.05]))
+    assert indistinguishable(winner, other) == equal
+
+
 @pytest.mark.parametrize(("lead", "equal"), [(9.0, True), (11.0, False)])
 def test_between_a_fault_of_the_set_and_an_effect_a_small_lead_decides_nothing(made_up, lead, equal):
     def one(name: str, gain: float, signature: list[float]):
