@@ -54,7 +54,7 @@ def load(path: str | Path | Sequence[str | Path]) -> Loaded[MeasurementSet] | Lo
 def compare(
     data: AnySet, model: AnyModel | None = None, *, seed: int = 0, progress: Progress | None = None
 ) -> CompareResult | TableResult:
-    """Finds out where a model fails on measured grasps.
+    """Finds out where a model fails on measured grasps, and of several sets which parameters differ between them.
 
     Args:
       data: what :func:`load` returns, or what it takes.

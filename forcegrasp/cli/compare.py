@@ -10,7 +10,7 @@ from forcegrasp.cli.verb import Verb
 from forcegrasp.config.verbs import CompareConfig
 
 NOTES = """
-  SET ...          the same as data=SET; several of one gripper are joined: 'data=[A,B]'
+  SET ...          the same as data=SET; several of one gripper are joined, and told apart: 'data=[A,B]'
   data=my_set      a folder with meta.yaml, grasps.csv and samples.csv (or samples.parquet); or, for a table of final
                    forces, with meta.yaml and table.csv
   model=FILE       what forcegrasp fit or add wrote; a model that was fitted to other grasps is tested on all of these
@@ -32,6 +32,7 @@ def run(config: CompareConfig) -> None:
     )
     from forcegrasp.identify import comparison, loading
     from forcegrasp.models.model_file import write_model
+    from forcegrasp.reports import between_sets
     from forcegrasp.reports import comparison as comparison_report
     from forcegrasp.reports.next_step import after_comparison
 
@@ -48,6 +49,8 @@ def run(config: CompareConfig) -> None:
     lead = comparison_report.answer(found)
     print_table(comparison_report.printed(found))
     print("\n".join([lead, *comparison_report.details(found), *(f"note: {note}" for note in notes)]))
+    if found.between is not None:
+        print_table(between_sets.printed(found.between))
     if model is None:
         write_model(dataclasses.replace(used, warnings=tuple(notes)), out / BASE_MODEL)
         print(f"wrote {out / BASE_MODEL}: the base model, fitted to this set")

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from forcegrasp.identify import fit_set
+from forcegrasp.identify.between_sets import BetweenSets, compare_sets
 from forcegrasp.identify.cross_validation import heldout_residual, make_folds, rms, rms_of_grasps
 from forcegrasp.identify.fitted_model import model_of
 from forcegrasp.identify.loading import Loaded
@@ -45,6 +46,7 @@ class Comparison(ShortRepr):
     residual: np.ndarray  #: (measured − predicted) ÷ noise, ``(G, S, C)``
     heldout: np.ndarray  #: the same for grasps held out of the fit; NaN where there are none
     floor: float  #: error ÷ noise that a perfect model would leave
+    between: BetweenSets | None = None  #: of several sets, which parameters differ from one to the next
 
     def summary(self) -> str:
         return f"error {self.floor_ratio():.2f} × noise, a perfect model {self.floor:.2f}"
@@ -148,8 +150,9 @@ def compare(
     held = heldout_residual(fit, target, make_folds(target.grasps)) if same else fit.residual
     numerical = numerical_error(fit, target)
     floor = numerical_floor(beyond_fit(fit, numerical), target)
-    comparison = Comparison(target, fit.predicted, fit.residual, held, floor)
-    return comparison, model or model_of(fit, target, loaded, numerical), notes
+    used = model or model_of(fit, target, loaded, numerical)
+    between = compare_sets(loaded.parts, used, progress) if loaded.parts else None
+    return Comparison(target, fit.predicted, fit.residual, held, floor, between), used, notes
 
 
 def of_width(values: np.ndarray, width: int) -> np.ndarray:

@@ -18,23 +18,34 @@ _CONFOUNDED = 0.98
 
 
 def standard_errors(fit: Fit, numerical: Sequence[np.ndarray] = ()) -> np.ndarray:
-    """Standard errors of the fitted coordinates, ``(p,)``.
-
-    The larger of two figures: white noise of the known size, and the scatter from grasp to grasp, which also sees
-    residuals that are correlated in time. The model's own numerical error adds what it would shift the parameters by.
+    """Standard errors of the fitted coordinates, ``(p,)``: by chance, and by the model's own numerical error.
 
     Args:
       fit: the fit.
       numerical: from :func:`~forcegrasp.identify.noise_floor.numerical_error`, each ``(G, S, C)``.
+    """
+    return np.sqrt(chance_errors(fit) ** 2 + np.sum(numerical_shifts(fit, numerical) ** 2, axis=0))
+
+
+def chance_errors(fit: Fit) -> np.ndarray:
+    """Standard errors of the fitted coordinates by chance alone, ``(p,)``.
+
+    The larger of two figures: white noise of the known size, and the scatter from grasp to grasp, which also sees
+    residuals that are correlated in time.
     """
     inverse = fit.covariance()
     slopes = np.einsum("gskp,gsk->gp", fit.jacobian, fit.weight**2 * fit.residual, optimize=True)
     count, p = slopes.shape
     freedom = count / max(1, count - min(p, count - 1))
     by_grasp = inverse @ (slopes.T @ slopes * min(freedom, 4.0)) @ inverse
-    shifts = [inverse @ (fit.slopes.T @ (fit.weight * n).ravel()) for n in numerical]
-    variance = np.maximum(np.diag(inverse), np.diag(by_grasp)) + sum((s**2 for s in shifts), np.zeros(p))
-    return np.sqrt(np.maximum(variance, 0.0))
+    return np.sqrt(np.maximum(np.maximum(np.diag(inverse), np.diag(by_grasp)), 0.0))
+
+
+def numerical_shifts(fit: Fit, numerical: Sequence[np.ndarray]) -> np.ndarray:
+    """By how much each numerical error of the model would move the coordinates, ``(errors, p)``."""
+    inverse = fit.covariance()
+    shifts = [inverse @ (fit.slopes.T @ (fit.weight * one).ravel()) for one in numerical]
+    return np.array(shifts).reshape(len(shifts), len(fit.vector))
 
 
 def intervals(fit: Fit, errors: np.ndarray) -> list[tuple[float, float, float]]:
@@ -63,15 +74,19 @@ def reached_bound(value: float, low: float, high: float, logarithmic: bool, null
     return None
 
 
+def hardly_fixed(fit: Fit, errors: np.ndarray) -> np.ndarray:
+    """Whether a parameter's interval is as wide as the range between its bounds, ``(p,)``."""
+    return Z95 * errors > 0.5 * (fit.problem.high - fit.problem.low)
+
+
 def warnings(fit: Fit, errors: np.ndarray) -> list[str]:
     """A line for each parameter at a bound, one for all that the data hardly fix, one for all that are confounded."""
-    entries, width = fit.problem.entries, fit.problem.high - fit.problem.low
-    lines = []
+    entries, lines = fit.problem.entries, []
     for entry, value in zip(entries, fit.values, strict=True):
         bound = reached_bound(float(value), entry.low, entry.high, entry.logarithmic, entry.null)
         if bound is not None:
             lines.append(f"{entry.name} ended at its bound {bound:g} {entry.unit}: widen it or doubt the model")
-    loose = [entry.name for entry, wide in zip(entries, Z95 * errors > 0.5 * width, strict=True) if wide]
+    loose = [entry.name for entry, wide in zip(entries, hardly_fixed(fit, errors), strict=True) if wide]
     if loose:
         lines.append(f"{listed(loose)} {'is' if len(loose) == 1 else 'are'} hardly fixed by these data")
     together = _confounded(fit)

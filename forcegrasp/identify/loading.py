@@ -14,7 +14,7 @@ from forcegrasp.identify.windows import cut
 from forcegrasp.measure import FinalForceTable, MeasurementSet, check_servo, check_set, check_table, read_set
 from forcegrasp.measure.check_givens import check_givens
 from forcegrasp.measure.checks import ALONE
-from forcegrasp.measure.join import join
+from forcegrasp.measure.join import join, parts_of
 from forcegrasp.models.model_file import Model
 from forcegrasp.physics.gripper import SKEW, Gripper
 from forcegrasp.physics.gripper_file import load_gripper
@@ -30,6 +30,7 @@ class Loaded(ShortRepr, Generic[Measured]):
     measured: Measured
     gripper: Gripper
     warnings: list[str]
+    parts: tuple[Loaded[MeasurementSet], ...] = ()  #: of joined sets of grasps or recordings, each of them
 
     @property
     def held_out(self) -> int:
@@ -80,7 +81,14 @@ def _joined(loaded: Sequence[Loaded[MeasurementSet] | Loaded[FinalForceTable]]) 
             raise ConfigError(f"{one.measured.path}: is of gripper {grippers}; only sets of one gripper can be joined")
     measured = join([one.measured for one in loaded], first.gripper.name_or_path)
     warned = [f"{one.measured.name}: {w}" for one in loaded for w in one.warnings if not w.endswith(ALONE)]
-    return Loaded(measured, first.gripper, [*warned, *measured.notes])
+    named = [one.measured for one in loaded if isinstance(one.measured, MeasurementSet)]
+    parts = parts_of(measured, named) if isinstance(measured, MeasurementSet) else []
+    return Loaded(
+        measured,
+        first.gripper,
+        [*warned, *measured.notes],
+        tuple(Loaded(part, one.gripper, one.warnings) for part, one in zip(parts, loaded, strict=False)),
+    )
 
 
 def _files(gripper: Gripper) -> tuple[bytes, bytes]:

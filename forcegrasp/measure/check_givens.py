@@ -60,6 +60,17 @@ def times(factor: float) -> str:
 
 def clock_factor(measured: MeasurementSet, period_s: float) -> float | None:
     """How many times a gripper's period its commands are apart; None if that may be right, or too few changed."""
+    apart = command_period_s(measured)
+    return None if apart is None or same_clock(apart, period_s) else apart / period_s
+
+
+def same_clock(one_s: float, other_s: float) -> bool:
+    """Whether two control periods differ by no more than jitter."""
+    return 1 / _OTHER_CLOCK < one_s / other_s < _OTHER_CLOCK
+
+
+def command_period_s(measured: MeasurementSet) -> float | None:
+    """How often commands come at most; None if too few changed to tell."""
     apart, rows = [], []
     for grasp in measured.grasps:
         changed = np.flatnonzero(np.any(np.diff(grasp.command_m, axis=0) != 0, axis=1)) + 1
@@ -68,8 +79,7 @@ def clock_factor(measured: MeasurementSet, period_s: float) -> float | None:
     gaps = np.concatenate(rows) if rows else np.array([])
     if len(gaps) < _LEAST_COMMANDS:
         return None
-    factor = float(np.quantile(gaps, _OFTEN, method="lower") * np.median(apart) / period_s)
-    return None if 1 / _OTHER_CLOCK < factor < _OTHER_CLOCK else factor
+    return float(np.quantile(gaps, _OFTEN, method="lower") * np.median(apart))
 
 
 def find_tare(measured: MeasurementSet) -> Tare | None:

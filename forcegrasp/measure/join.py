@@ -11,6 +11,7 @@ from typing import TypeVar
 import numpy as np
 
 from forcegrasp.errors import MeasurementError
+from forcegrasp.measure.check_givens import command_period_s, same_clock
 from forcegrasp.measure.folder import show
 from forcegrasp.measure.schema import FinalForceTable, MeasurementSet, fingerprint_of_parts
 
@@ -35,8 +36,7 @@ def join(sets: Sequence[Measured], gripper: str) -> Measured:
       MeasurementError: if a set is there twice, or they are of several kinds, give another noise, or another radius of
         an object.
     """
-    first, names = sets[0], [one.name for one in sets]
-    labels = [one.name if names.count(one.name) == 1 else str(one.path) for one in sets]
+    first, labels = sets[0], _labels(sets)
     for index, one in enumerate(sets):
         for other in sets[:index]:
             if one.fingerprint == other.fingerprint:
@@ -61,6 +61,19 @@ def join(sets: Sequence[Measured], gripper: str) -> Measured:
     return dataclasses.replace(first, **facts, **_grasps([s for s in sets if isinstance(s, MeasurementSet)], labels))
 
 
+def parts_of(joined: MeasurementSet, sets: Sequence[MeasurementSet]) -> list[MeasurementSet]:
+    """The sets that were joined, with the names that they and their grasps have in the joined one."""
+    ends = np.cumsum([len(one.grasps) for one in sets])[:-1].tolist()
+    grasps = [joined.grasps[low:high] for low, high in zip([0, *ends], [*ends, None], strict=True)]
+    named = zip(sets, _labels(sets), grasps, strict=True)
+    return [dataclasses.replace(one, name=label, grasps=own) for one, label, own in named]
+
+
+def _labels(sets: Sequence[Measured]) -> list[str]:
+    names = [one.name for one in sets]
+    return [one.name if names.count(one.name) == 1 else str(one.path) for one in sets]
+
+
 def _grasps(sets: Sequence[MeasurementSet], labels: Sequence[str]) -> dict[str, object]:
     _check_radii(sets)
     grasp_names = _told_apart([[g.name for g in one.grasps] for one in sets], labels)
@@ -71,7 +84,8 @@ def _grasps(sets: Sequence[MeasurementSet], labels: Sequence[str]) -> dict[str, 
         for grasp, name, session in zip(one.grasps, *new, strict=True)
     )
     fingerprint = fingerprint_of_parts((one.fingerprint for one in sets), (grasp.name for grasp in grasps))
-    return {"grasps": grasps, "fingerprint": fingerprint, "notes": _notes([{g.object for g in s.grasps} for s in sets])}
+    notes = _notes([{g.object for g in s.grasps} for s in sets]) + _contradictions(sets, labels)
+    return {"grasps": grasps, "fingerprint": fingerprint, "notes": notes}
 
 
 def _rows(tables: Sequence[FinalForceTable], labels: Sequence[str]) -> dict[str, object]:
@@ -104,6 +118,28 @@ def _check_radii(sets: Sequence[MeasurementSet]) -> None:
                 raise MeasurementError(f"{place} has {sizes}; give another object another name")
         for name, radii in own.items():
             known.setdefault(name, []).extend((radius, one.path) for radius in set(radii))
+
+
+def _contradictions(sets: Sequence[MeasurementSet], labels: Sequence[str]) -> tuple[str, ...]:
+    """What one set says and another does not, or says otherwise, though it may be right."""
+    found = []
+    for name in dict.fromkeys(g.object for one in sets for g in one.grasps if g.object):
+        having = {label: [g.radius_m for g in one.grasps if g.object == name]
+                  for one, label in zip(sets, labels, strict=True)}  # fmt: skip
+        without = [label for label, radii in having.items() if radii and None in radii]
+        given = [label for label, radii in having.items() if radii and None not in radii]
+        if without and given:
+            found.append(
+                f"{without[0]}: gives no radius of {show(name)}, {given[0]} does; give it in both, or it is fitted"
+            )
+    periods = {label: command_period_s(one) for one, label in zip(sets, labels, strict=True) if one.kind == "grasps"}
+    known = {label: period for label, period in periods.items() if period is not None}
+    first = next(iter(known), "")
+    for label, period in known.items():
+        if not same_clock(period, known[first]):
+            apart = f"commands are {period:.3g} s apart, in {first} {known[first]:.3g} s"
+            found.append(f"{label}: {apart}; are time stamps of one too long? else the gripper is commanded unlike")
+    return tuple(found)
 
 
 def _told_apart(names: Sequence[Sequence[str]], labels: Sequence[str]) -> list[list[str]]:

@@ -13,7 +13,7 @@ from rich.text import Text as Plain
 from forcegrasp.identify.comparison import Cell, Comparison
 from forcegrasp.identify.cross_validation import rms
 from forcegrasp.identify.target import Target
-from forcegrasp.reports import figures
+from forcegrasp.reports import between_sets, figures
 from forcegrasp.reports.html import Answer, Command, Picture, Section, Table, Text
 from forcegrasp.reports.view import view_section
 
@@ -97,6 +97,7 @@ def compare_json(comparison: Comparison, name: str, model: str, notes: list[str]
             for covariate, kind, share in comparison.explanations()
         ],
         "notes": notes,
+        "between_sets": between_sets.between_json(comparison.between) if comparison.between else None,
     }
 
 
@@ -195,12 +196,19 @@ def _rows(comparison: Comparison) -> list[tuple[str, str]]:
     """The same as pairs of what is told and its text."""
     errors, target = comparison.by_grasp(), comparison.target
     worst = [f"{target.grasps[i].label} ({errors[i]:.1f} ×)" for i in worst_grasps(comparison)]
-    rows = [*_recording_rows(comparison), (f"worst {target.part}s", ", ".join(worst))]
+    rows = [*_between_rows(comparison), *_recording_rows(comparison), (f"worst {target.part}s", ", ".join(worst))]
     name, kind, share = comparison.explanations()[0]
     if share >= _WORTH_TELLING and not at_floor(comparison.floor_ratio(), comparison.floor):
         rows.append((_GOES_WITH, f"{share:.0%} of the {kind} error goes with {covariate_words(name)}"))
     noise, _, sizes = noise_sentence(target).partition(": ")
     return [*rows, (noise, sizes)]
+
+
+def _between_rows(comparison: Comparison) -> list[tuple[str, str]]:
+    """What several sets share, and what not."""
+    if comparison.between is None:
+        return []
+    return [("between the sets", between_sets.answer(comparison.between, comparison.floor))]
 
 
 def covariate_words(name: str) -> str:
@@ -223,6 +231,8 @@ def sections(comparison: Comparison, notes: list[str]) -> list[Section]:
         _worst(comparison),
         dependence_section(comparison),
     ]
+    if comparison.between is not None:
+        found.insert(0, between_sets.section(comparison.between, comparison.floor))
     if notes:
         found.append(Section("To bear in mind", [Text(note) for note in notes]))
     return found

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,6 +12,7 @@ from matplotlib.figure import Figure
 
 from forcegrasp.identify.comparison import of_width
 from forcegrasp.identify.target import Target
+from forcegrasp.models.model_file import Fitted
 
 #: Okabe and Ito's colours, told apart by the colour-blind.
 LEFT, RIGHT, WITHOUT, WITH, MEASURED = "#0072b2", "#d55e00", "#d55e00", "#0072b2", "#444444"
@@ -268,6 +270,36 @@ def intervals(rows: Sequence[tuple[str, float, float, float]]) -> Figure:
     axes.set_xticks([0, 0.5, 1], ["lower bound", "", "upper bound"])
     axes.spines[:].set_visible(False)
     axes.tick_params(length=0)
+    return figure
+
+
+class Forest(NamedTuple):
+    """A panel of :func:`forest`."""
+
+    title: str
+    values: Mapping[str, Fitted]  #: by set
+    shared: Fitted | None  #: of all sets, if there is one
+    differs: bool
+
+
+def forest(panels: Sequence[Forest]) -> Figure:
+    """Values of parameters in several sets with their intervals, a panel for each parameter."""
+    lines = -(-len(panels) // 2)
+    most = max((len(one.values) for one in panels), default=0) + 1
+    figure = Figure(figsize=(8.5, lines * (0.75 + 0.2 * most)), layout="constrained")
+    for place, (title, values, shared, differs) in enumerate(panels, 1):
+        axes = figure.add_subplot(lines, 2, place)
+        drawn = [(name, fitted, "o", WITHOUT if differs else WITH) for name, fitted in values.items()]
+        drawn += [("all", shared, "D", MEASURED)] if shared else []
+        for row, (_, fitted, marker, colour) in enumerate(drawn):
+            axes.plot([fitted.low, fitted.high], [row, row], color=colour, lw=2)
+            axes.plot(fitted.value, row, marker, color=colour, ms=5)
+        axes.set_yticks(range(len(drawn)), [plain(name, 20) for name, *_ in drawn], fontsize=8)
+        axes.set_ylim(len(drawn) - 0.4, -0.6)
+        axes.set_title(plain(title, 48) + (" – differs" if differs else ""), fontsize=9, loc="left")
+        axes.tick_params(axis="x", labelsize=8)
+        axes.locator_params(axis="x", nbins=5)
+        _finish(axes, "")
     return figure
 
 

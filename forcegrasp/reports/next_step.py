@@ -9,6 +9,7 @@ from forcegrasp.assets import DEFAULT_GRIPPER
 from forcegrasp.diagnosis.advice import Advice
 from forcegrasp.diagnosis.result import Diagnosis, kept_steps
 from forcegrasp.effects.for_gripper import effect_of
+from forcegrasp.identify.between_sets import Agreement
 from forcegrasp.identify.comparison import Comparison
 from forcegrasp.identify.intervals import listed
 from forcegrasp.identify.verdict import Verdict
@@ -96,6 +97,13 @@ def added_law(data: str | Path, model: str | Path, law: str | Path) -> str:
 
 def after_comparison(comparison: Comparison, data: str | Path, model: str | Path) -> list[Command]:
     """What to do after a comparison with this model."""
+    differ = comparison.between.of(Agreement.DIFFERS) if comparison.between else []
+    if comparison.between and differ:
+        why = f"for {listed([one.name for one in differ[:3]])} differ{'s' if len(differ) == 1 else ''}"
+        return [
+            Command(f"diagnose {one.name} by itself, {why}", _line("diagnose", f"data={one.path}", f"model={model}"))
+            for one in comparison.between.sets
+        ]
     if at_floor(comparison.floor_ratio(), comparison.floor):
         return [_use("the model", model, data, comparison.target.gripper)]
     return [after_fit(data, model)]

@@ -82,8 +82,8 @@ def test_the_loop_runs_as_written(text, tmp_path, monkeypatch):
     printed = {}
     for program, verb, *options in commands():
         assert program == "forcegrasp"
-        if "simple" in " ".join(options):
-            continue  # the second set shows nothing else that could break
+        if re.search("simple|monday", " ".join(options)):
+            continue  # further sets show nothing else that could break; two copies are in tests/importers
         small = [next((new for key, new in SMALLER.items() if o.startswith(key)), o) for o in options]
         out = io.StringIO()
         with contextlib.redirect_stdout(out):

@@ -109,6 +109,38 @@ def test_one_name_for_two_objects_is_refused(grasps):
         join([first, far], "tiago")
 
 
+def test_what_one_set_gives_and_another_does_not_is_told(grasps):
+    first = make_set(grasps, Path("first"))
+    thing = grasps[0].object
+    bare = [change(g, radius_m=None, name=f"x{g.name}") for g in grasps if g.object == thing]
+    second = dataclasses.replace(make_set(bare, Path("second")), name="second")
+    told = join([first, second], "tiago").notes
+    line = f"second: gives no radius of '{thing}', {first.name} does; give it in both, or it is fitted"
+    assert [one for one in told if "radius" in one] == [line]
+    alike = make_set([change(g, name=f"y{g.name}") for g in grasps], Path("third"))
+    assert not [one for one in join([first, alike], "tiago").notes if "radius" in one]
+
+
+@pytest.mark.parametrize(("factor", "told"), [(1.1, 0), (2.0, 1), (0.5, 1)])
+def test_another_control_period_is_told(grasps, factor, told):
+    first = make_set(grasps, Path("first"))
+    slow = [change(g, time_s=factor * g.time_s, name=f"x{g.name}") for g in grasps]
+    second = dataclasses.replace(make_set(slow, Path("second")), name="second")
+    lines = [one for one in join([first, second], "tiago").notes if "apart" in one]
+    assert len(lines) == told
+    assert all(one.startswith(f"second: commands are {0.04 * factor:g} s apart, in ") for one in lines)
+    assert all("are time stamps of one too long?" in one for one in lines)
+
+
+def test_the_parts_of_joined_sets_keep_the_names_that_they_have_there(sets, grasps):
+    whole = load(list(sets))
+    clash = grasps[0].name
+    assert [part.measured.name for part in whole.parts] == ["first", "second"]
+    assert [g.name for part in whole.parts for g in part.measured.grasps] == [g.name for g in whole.measured.grasps]
+    assert whole.parts[1].measured.grasps[0].name == f"{clash} of second"
+    assert load(sets[0]).parts == ()
+
+
 def test_a_table_and_grasps_are_not_joined(sets, tmp_path):
     path = write_table(table(tmp_path / "t", 0.1), tmp_path / "t")
     with pytest.raises(MeasurementError, match=r"t: is of kind final_force, .* of kind grasps"):
