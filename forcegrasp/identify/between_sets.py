@@ -194,4 +194,4 @@ def _doubt(having: Sequence[tuple[SetFit, int, Entry]]) -> str:
         for one, place, _ in having
         if hardly_fixed(one.base.fit, one.errors)[place] or one.chance[place] < _LEAST_ERROR
     ]
-    return f"{listed(loose)} hardly fix it" if loose else ""
+    return f"{listed(loose)} hardly {'fixes' if len(loose) == 1 else 'fix'} it" if loose else ""

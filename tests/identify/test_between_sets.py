@@ -151,7 +151,7 @@ def test_a_fit_that_did_not_converge_tells_nothing(three, parts, monkeypatch):
 
 @pytest.mark.parametrize(
     ("change", "reason"),
-    [("bound", "it ended at its bound in b"), ("loose", "b hardly fix it"), ("no trace", "b hardly fix it")],
+    [("bound", "it ended at its bound in b"), ("loose", "b hardly fixes it"), ("no trace", "b hardly fixes it")],
 )
 def test_a_parameter_that_a_set_does_not_fix_is_not_told(three, parts, monkeypatch, change, reason):
     other = three.sets[1]

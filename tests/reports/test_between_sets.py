@@ -38,7 +38,7 @@ def between(made_up) -> BetweenSets:
         (
             parameter("position_gain", 0.0004),
             dataclasses.replace(parameter("friction", 0.6), is_ratio=False),
-            parameter("damping", float("nan"), reason="b hardly fix it"),
+            parameter("damping", float("nan"), reason="b hardly fixes it"),
         ),
     )
 
@@ -53,7 +53,7 @@ def text_of(table) -> str:
 def test_the_answer_names_what_differs_what_does_not_and_what_can_not_be_told(between):
     assert report.answer(between, FLOOR) == (
         "the sets differ in position_gain (48.2 in a, 51 in b; p 0.0004); no difference was found in 1 other parameter;"
-        " damping can't be told: b hardly fix it"
+        " damping can't be told: b hardly fixes it"
     )
     alike = dataclasses.replace(between, parameters=between.parameters[1:2])
     assert report.answer(alike, FLOOR) == "no difference was found in 1 parameter"
@@ -72,7 +72,7 @@ def test_the_table_has_what_differs_first(between):
     lines = [line for line in text_of(report.printed(between)).splitlines() if "N/m" in line]
     assert [line.split()[0] for line in lines] == ["position_gain", "damping", "friction"]
     assert all(part in lines[0] for part in ("48.2", "51", "× 1.06 (1.04 to 1.08)", "0.0004", "differs"))
-    assert "can't be told, b hardly fix it" in lines[1]
+    assert "can't be told, b hardly fixes it" in lines[1]
     assert "+1.06 (1.04 to 1.08)" in lines[2]
 
 
@@ -99,7 +99,7 @@ def test_the_json_holds_all_of_it(between, made_up):
     assert gain["shared"] is None  # two sets that differ have none
     assert found["parameters"]["friction"]["shared"]["value"] == 50.0
     assert "differences" in found["parameters"]["friction"]
-    assert (damping["agreement"], damping["reason"]) == ("cannot_tell", "b hardly fix it")
+    assert (damping["agreement"], damping["reason"]) == ("cannot_tell", "b hardly fixes it")
     whole = dataclasses.replace(made_up.comparison, between=between)
     assert comparison_report.compare_json(whole, "a + b", "m", [])["between_sets"] == found
     assert comparison_report.compare_json(made_up.comparison, "a", "m", [])["between_sets"] is None
