@@ -48,6 +48,25 @@ def test_check_of_a_part_that_is_not_there(root, monkeypatch, capsys):
     assert "no part taste" in capsys.readouterr().err
 
 
+def test_check_leaves_out_what_it_is_told_to(root, monkeypatch, capfd):
+    tool = runpy.run_path(str(root / "tools" / "check.py"))
+    tool["PARTS"].clear()
+    tool["PARTS"] |= {"well": [["python", "-c", "pass"]], "ill": [["python", "-c", "raise SystemExit(3)"]]}
+    for arguments, status in (((), 1), (("--skip", "ill"), 0), (("well",), 0), (("ill", "--skip", "well"), 1)):
+        monkeypatch.setattr(sys, "argv", ["check.py", *arguments])
+        assert tool["main"]() == status, arguments
+    monkeypatch.setattr(sys, "argv", ["check.py", "--skip", "taste"])
+    with pytest.raises(SystemExit, match="2"):
+        tool["main"]()
+    assert "no part taste" in capfd.readouterr().err
+
+
+def test_the_parts_of_a_check_have_names_that_tell_them_apart(root, capfd):
+    tool = runpy.run_path(str(root / "tools" / "check.py"))
+    assert "hidden-effects" in tool["PARTS"]
+    assert tool["examine"]("python", "tools/no_such_tool.py", "check")[0] == "python no_such_tool check"
+
+
 @pytest.fixture
 def smoke(root, tmp_path, monkeypatch):
     """The program that tries the wheel, and a folder that it may think is its own."""

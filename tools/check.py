@@ -2,6 +2,7 @@
 
     python tools/check.py               all of it; make check does the same in its own environment
     python tools/check.py style types   these parts alone
+    python tools/check.py --skip hidden-effects   all but that: its page is measured anew before a release, in hours
 
 Ends with a table. Exit status: 0 if all parts are in order.
 """
@@ -23,6 +24,7 @@ PARTS = {
     "imports": [["lint-imports", "--no-logo"]],
     "types": [["pyright", "--pythonpath", sys.executable]],
     "docs": [["sphinx-build", "--quiet", "--fail-on-warning", "--keep-going", "--fresh-env", "docs", "build/docs"]],
+    "hidden-effects": [["python", "tools/hidden_effects.py", "check"]],
     "tests": [["python", "-m", "pytest", "-q", "-n", "auto", "--dist", "loadfile", "--no-loadscope-reorder"]],
 }
 
@@ -30,17 +32,20 @@ PARTS = {
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("parts", nargs="*", help=f"of {', '.join(PARTS)}; all by default")
-    asked = parser.parse_args().parts
-    if unknown := set(asked) - set(PARTS):
+    parser.add_argument("--skip", action="append", default=[], metavar="PART", help="leave this part out")
+    options = parser.parse_args()
+    if unknown := {*options.parts, *options.skip} - set(PARTS):
         parser.error(f"no part {', '.join(sorted(unknown))}: there are {', '.join(PARTS)}")
-    rows = [examine(*command) for part in asked or PARTS for command in PARTS[part]]
+    asked = [part for part in options.parts or PARTS if part not in options.skip]
+    rows = [examine(*command) for part in asked for command in PARTS[part]]
     print("\n" + "\n".join(f"{name:<22}{seconds:7.1f} s  {verdict}" for name, seconds, verdict in rows))
     return int(any(verdict.startswith("failed") for _, _, verdict in rows))
 
 
 def examine(program: str, *arguments: str) -> tuple[str, float, str]:
     """Runs one command and shows what it says; returns its name, how long it took, and a verdict."""
-    name = " ".join([program, *(word for word in arguments if word in ("check", "format", "pytest"))])
+    shown = (Path(word).stem for word in arguments if word in ("check", "format", "pytest") or word.endswith(".py"))
+    name = " ".join([program, *shown])
     found = Path(sys.executable) if program == "python" else PROGRAMS / program
     print(f"\n== {name}", flush=True)
     if not found.exists():

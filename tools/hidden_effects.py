@@ -1,7 +1,9 @@
 """Hides effects in sets of an independent recorder, diagnoses them, and reports how often that succeeds.
 
     python tools/hidden_effects.py run [--only REGEX] [--jobs 2]   diagnoses what has no result yet; may be stopped
+    python tools/hidden_effects.py run --renew                     also what other code than the present has measured
     python tools/hidden_effects.py report                          writes docs/hidden-effects.md from the results
+    python tools/hidden_effects.py check                           fails if that page is of other code than the present
 
 The recorder is tests/independent: it shares no code with the effects under test. A set takes about a minute.
 """
@@ -22,6 +24,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
+PAGE = ROOT / "docs" / "hidden-effects.md"
 RESULTS = ROOT / "runs" / "hidden_effects.jsonl"
 SIZES = ("small", "medium", "large")
 PAIRS = (
@@ -157,9 +160,12 @@ def _intervals(model, truth) -> list[list]:
     return [[name, true, fitted.low, fitted.high] for name, true, fitted in rows]
 
 
-def run(only: str, workers: int) -> None:
-    """Works through what has no result yet."""
-    done = {row["name"] for row in load_results()}
+def run(only: str, workers: int, renew: bool) -> None:
+    """Works through what has no result yet, or none of the present code."""
+    from tools.measured_code import stamp
+
+    code = stamp()  # of what the workers are about to import
+    done = {row["name"] for row in load_results() if not renew or row.get("digest") == code["digest"]}
     todo = [job for job in jobs() if job.name not in done and re.search(only, job.name)]
     RESULTS.parent.mkdir(exist_ok=True)
     print(f"{len(todo)} sets to diagnose, {len(done)} done")
@@ -175,6 +181,7 @@ def run(only: str, workers: int) -> None:
                     "verdict": "error",
                     "error": repr(error),
                 }
+            row |= code
             with RESULTS.open("a") as file:
                 file.write(json.dumps(row) + "\n")
             said = ", ".join(row.get("effects", [])) or row.get("error", "")
@@ -192,20 +199,37 @@ def load_results() -> list[dict]:
     return list({row["name"]: row for row in rows}.values())
 
 
-def main() -> None:
+def check() -> int:
+    """Exit status: 1 if the page says that it measured other code than the present."""
+    from tools.measured_code import PACKAGES, digest, outdated
+
+    now = digest()
+    for line in (found := outdated(PAGE.read_text(), now)):
+        print(f"{PAGE.relative_to(ROOT)}: {line}")
+    if found:
+        print(f"Now it is digest {now}: forcegrasp/{', '.join(PACKAGES)} changed since. Measure anew, for hours:")
+        print("python tools/hidden_effects.py run --renew, then report; until then: --skip hidden-effects")
+    return int(bool(found))
+
+
+def main() -> int:
     """Reads the command line."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("what", choices=("run", "report"))
+    parser.add_argument("what", choices=("run", "report", "check"))
     parser.add_argument("--only", default="", help="regular expression that a set's name must match")
     parser.add_argument("--jobs", type=int, default=2, help="diagnoses side by side")
+    parser.add_argument("--renew", action="store_true", help="measure again what is not of the present code")
     arguments = parser.parse_args()
+    if arguments.what == "check":
+        return check()
     if arguments.what == "run":
-        run(arguments.only, arguments.jobs)
+        run(arguments.only, arguments.jobs, arguments.renew)
     else:
-        from hidden_effects_report import write
+        from tools.hidden_effects_report import write
 
         write(load_results(), jobs(), right_names)
+    return 0
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

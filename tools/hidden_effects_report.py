@@ -10,6 +10,9 @@ import matplotlib
 matplotlib.use("Agg")
 import numpy as np
 from matplotlib.figure import Figure
+from scipy.stats import binomtest
+
+from tools.measured_code import sentences
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 SIZES = ("small", "medium", "large")
@@ -33,15 +36,15 @@ COST = [
 
 def judge(row: dict, right: set[str]) -> str:
     """One of "first", "in set", "wrong", "missed", "error"."""
-    verdict, named = row["verdict"], row.get("effects", [])
+    verdict, named, group = row["verdict"], row.get("effects", []), row["group"].removeprefix("servo ")
     if verdict in ("error", "not_fitted"):
         return "error" if verdict == "error" else "missed"
-    if row["group"] == "none":
+    if group == "none":
         return "first" if verdict == "explained" else "missed" if verdict == "unknown" else "wrong"
-    if row["group"] == "outside":
+    if group == "outside":
         return "first" if verdict == "unknown" else "wrong" if named else "missed"
-    if row["group"] == "two":
-        first = {effects[0] for found, effects in row["steps"] if found != "none"} if named else set()
+    if group == "two":
+        first = {effects[0] for _, effects in row["steps"] if effects} if named else set()
         return "first" if first == right else "in set" if right & set(named) else "wrong" if named else "missed"
     if verdict == "one_of":
         return "first" if named[0] in right else "in set" if right & set(named) else "wrong"
@@ -55,21 +58,66 @@ def write(rows: list[dict], jobs: list, right_names: Callable) -> None:
     for row in rows:
         row["judged"] = judge(row, right[row["name"]])
         row["right"] = sorted(right[row["name"]])
-    (DOCS / "figures").mkdir(exist_ok=True)
-    _matrix([r for r in rows if r["group"] in ("one", "other reading", "outside", "none")])
-    _power([r for r in rows if r["group"] == "one"])
-    (DOCS / "hidden-effects.md").write_text(_page(rows, len(jobs)))
+    (DOCS / "figures").mkdir(parents=True, exist_ok=True)
+    for draw, groups in ((_matrix, ("one", "other reading", "outside", "none")), (_power, ("one",))):
+        if chosen := [r for r in rows if r["group"] in groups]:
+            draw(chosen)
+    servo = sum(job.group.startswith("servo") for job in jobs)
+    (DOCS / "hidden-effects.md").write_text(_page(rows, len(jobs) - servo, servo))
     print(f"wrote {DOCS / 'hidden-effects.md'} from {len(rows)} of {len(jobs)} sets")
 
 
 def _share(rows: list[dict], *judged: str) -> str:
-    if not rows:
+    return _rate([r["judged"] in judged for r in rows])
+
+
+def _rate(hits: list[bool]) -> str:
+    """How many of all, and the share with its 95 % interval (Wilson)."""
+    if not hits:
         return "–"
-    hits = sum(r["judged"] in judged for r in rows)
-    return f"{hits} of {len(rows)} ({hits / len(rows):.0%})"
+    found = binomtest(sum(hits), len(hits))
+    interval = found.proportion_ci(method="wilson")
+    return f"{sum(hits)} of {len(hits)} ({found.statistic:.0%}; {100 * interval.low:.0f}–{100 * interval.high:.0f} %)"
 
 
-def _page(rows: list[dict], planned: int) -> str:
+def _at_floor(rows: list[dict]) -> str:
+    """How often no more than 1.1 × the floor is left."""
+    return _rate([r["error_after"] <= 1.1 * r["floor"] for r in rows if "error_after" in r])
+
+
+def _servo_lines(rows: list[dict], planned: int) -> list[str]:
+    """The same of logs of a servo, as far as there are results."""
+    none, one, two = ([r for r in rows if r["group"] == f"servo {kind}"] for kind in ("none", "one", "two"))
+    if not none + one + two:
+        return []
+    return [
+        "## Logs of a servo",
+        "",
+        "A slide without fingers or object (`tests/independent/slide.py`, its own integration and effects): six",
+        "recordings of 8 s, with loads from outside, gains that are drawn, and 50 µm of noise.",
+        f"Results of {len(none + one + two)} sets ({planned} in the whole campaign).",
+        "",
+        "| | result |",
+        "|---|---|",
+        f'| one effect hidden: right one first, or in a right "one of" set | {_share(one, "first", "in set")} |',
+        f"| … strictly first | {_share(one, 'first')} |",
+        *(
+            f"| … {size} effects, first or in the set | {_share(rows, 'first', 'in set')} |"
+            for size, rows in ((size, [r for r in one if r["size"] == size]) for size in SIZES)
+        ),
+        f"| … error left at most 1.1 × the floor | {_at_floor(one)} |",
+        f"| two hidden: both named | {_share(two, 'first')} |",
+        f"| … at least one of them | {_share(two, 'first', 'in set')} |",
+        f"| … error left at most 1.1 × the floor | {_at_floor(two)} |",
+        f"| nothing hidden: called explained | {_share(none, 'first')} |",
+        f"| nothing hidden: an effect named (false alarm) | {_share(none, 'wrong')} |",
+        "",
+    ]  # fmt: skip
+
+
+def _page(rows: list[dict], planned: int, planned_servo: int) -> str:
+    grasped = [r for r in rows if not r["group"].startswith("servo")]
+
     def of(group: str, **wanted) -> list[dict]:
         return [r for r in rows if r["group"] == group and all(r[k] == v for k, v in wanted.items())]
 
@@ -80,9 +128,9 @@ def _page(rows: list[dict], planned: int) -> str:
     fitted = [r for r in rows if r["group"] in ("one", "none") and r["contact"] == "mujoco" and r["judged"] == "first"]
     inside, counted = _coverage(fitted)
     ratios = [r["error_after"] / r["floor"] for r in one if r["judged"] == "first"]
-    seconds = [r["processor_s"] for r in rows if "processor_s" in r]
+    seconds = [r["processor_s"] for r in grasped if "processor_s" in r]
     steps = [r["steps"] for r in one if r["judged"] == "first"]
-    more = sum(len([s for s in step if s[0] != "none"]) > 1 for step in steps)
+    more = sum(sum(bool(effects) for _, effects in step) > 1 for step in steps)
     lines = [
         "# How often a hidden effect is found",
         "",
@@ -94,7 +142,9 @@ def _page(rows: list[dict], planned: int) -> str:
         "    python tools/hidden_effects.py run      # the campaign, about a minute a set",
         "    python tools/hidden_effects.py report   # this page",
         "",
-        f"Results of {len(rows)} sets ({planned} in the whole campaign).",
+        *sentences(rows),
+        f"Results of {len(grasped)} sets ({planned} in the whole campaign).",
+        "Rates have 95 % intervals (Wilson).",
         "",
         "| | result |",
         "|---|---|",
@@ -104,6 +154,7 @@ def _page(rows: list[dict], planned: int) -> str:
             f"| … {size} effects, first or in the set | {_share(of('one', grasps=24, size=size), 'first', 'in set')} |"
             for size in SIZES
         ),
+        f"| … error left at most 1.1 × the floor | {_at_floor(one)} |",
         f"| … further effects named though only one is hidden | {more} of {len(steps)} |",
         f"| the same with 10 grasps, medium effects | {_share(few, 'first', 'in set')} |",
         f"| other honest readings of a catalogue effect | {_share(of('other reading'), 'first', 'in set')} |",
@@ -112,8 +163,12 @@ def _page(rows: list[dict], planned: int) -> str:
         f"| nothing hidden: called explained | {_share(plain_none, 'first')} |",
         f"| nothing hidden, another contact law than the model's: an effect named | {_share(other_none, 'wrong')} |",
         f"| an effect outside the catalogue: called unknown | {_share(of('outside'), 'first')} |",
-        f"| held-out error ÷ floor after adding the right effect, median | {np.median(ratios):.2f} |" if ratios else "",
-        f"| 95 % intervals that hold the true base parameter | {inside / max(counted, 1):.0%} of {counted} |",
+        f"| held-out error ÷ floor after adding the right effect, median | {np.median(ratios):.2f} |"
+        if ratios
+        else None,
+        f"| 95 % intervals that hold the true base parameter | {inside / counted:.0%} of {counted} |"
+        if counted
+        else None,
         f"| one diagnosis, one thread, median | {np.median(seconds):.0f} s of processor time |" if seconds else None,
         "",
         "![confusion matrix](figures/hidden_effects_matrix.png)",
@@ -125,6 +180,7 @@ def _page(rows: list[dict], planned: int) -> str:
         "How often each effect is found, by size. Sizes are those of `tests/independent/catalogue.py`; a small one",
         "moves some signal by about 3 σ somewhere.",
         "",
+        *_servo_lines(rows, planned_servo),
         *COST,
         "## Where it went wrong",
         "",

@@ -38,14 +38,14 @@ def provenance(config: TrainConfig, overrides: list[str]) -> dict[str, Any]:
         "command": ["forcegrasp", "train", *overrides],
         "seed": config.seed,
         "config": fingerprint(dataclasses.asdict(config)),
-        "git": _git_hash(),
+        "git": git_hash(),
         "python": sys.version.split()[0],
         "versions": {name: version(name) for name in _PACKAGES} | {"forcegrasp": version("forcegrasp")},
         "machine": {"system": platform.platform(), "processor": platform.machine(), "cores": os.cpu_count()},
     }
 
 
-def _git_hash() -> str | None:
+def git_hash() -> str | None:
     """Commit of the source tree, with "+" where it has changes; None outside a checkout."""
     root = Path(__file__).parents[2]
     if not (root / ".git").exists():

@@ -1,0 +1,161 @@
+"""The page of the campaign: its rates are those of its rows, and it says which code they are of."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import asdict
+
+import pytest
+
+from tools import hidden_effects, hidden_effects_report, measured_code
+from tools.hidden_effects import Job
+
+
+def row(job: Job, verdict: str, effects: tuple[str, ...] = (), after: float = 1.0, **more) -> dict:
+    steps = [[verdict, [name]] for name in effects] + [[None, []]]
+    return {
+        "name": job.name, **asdict(job), "verdict": verdict, "effects": list(effects), "steps": steps, "floor": 1.0,
+        "error_before": 3.0, "error_after": after, "left": "", "processor_s": 20.0, "intervals": [], **more,
+    }  # fmt: skip
+
+
+def servo(group: str, hidden: tuple[str, ...], seed: int, size: str = "medium") -> Job:
+    return Job(f"servo {group}", hidden, size, seed, "", 0)
+
+
+NONE = [servo("none", (), k, "") for k in range(4)]
+ONE = [servo("one", ("stiction",), k) for k in range(3)] + [servo("one", ("stiction",), 9, "small")]
+TWO = [servo("two", ("stiction", "command_delay"), k) for k in range(2)]
+CODE = {"commit": "0123456789abcdef+", "digest": "aaaabbbbcccc"}
+
+
+@pytest.fixture
+def page(tmp_path, monkeypatch):
+    """``page(rows, jobs)``: the page as it is written."""
+    monkeypatch.setattr(hidden_effects_report, "DOCS", tmp_path)
+
+    def written(rows: list[dict], jobs: list[Job]) -> str:
+        hidden_effects_report.write(rows, jobs, lambda job: set(job.hidden))
+        return (tmp_path / "hidden-effects.md").read_text()
+
+    return written
+
+
+def test_servos_have_rates_of_their_own(page):
+    rows = [
+        *(row(job, "explained") for job in NONE[:3]), row(NONE[3], "effect", ("backlash",)),
+        row(ONE[0], "effect", ("stiction",)), row(ONE[1], "one_of", ("coulomb_friction", "stiction"), 1.2),
+        row(ONE[2], "effect", ("backlash",)), row(ONE[3], "unknown", after=1.05),
+        row(TWO[0], "effect", ("command_delay", "stiction")), row(TWO[1], "effect", ("stiction",), 1.5),
+    ]  # fmt: skip
+    text = page(rows, [*NONE, *ONE, *TWO])
+    servos = text.partition("## Logs of a servo")[2].partition("\n## ")[0]
+    for line in (
+        '| one effect hidden: right one first, or in a right "one of" set | 2 of 4 (50%; 15–85 %) |',
+        "| … strictly first | 1 of 4 (25%; 5–70 %) |",
+        "| … small effects, first or in the set | 0 of 1 (0%; 0–79 %) |",
+        "| … medium effects, first or in the set | 2 of 3 (67%; 21–94 %) |",
+        "| … large effects, first or in the set | – |",
+        "| … error left at most 1.1 × the floor | 3 of 4 (75%; 30–95 %) |",
+        "| two hidden: both named | 1 of 2 (50%; 9–91 %) |",
+        "| … at least one of them | 2 of 2 (100%; 34–100 %) |",
+        "| … error left at most 1.1 × the floor | 1 of 2 (50%; 9–91 %) |",
+        "| nothing hidden: called explained | 3 of 4 (75%; 30–95 %) |",
+        "| nothing hidden: an effect named (false alarm) | 1 of 4 (25%; 5–70 %) |",
+    ):
+        assert line in servos
+    assert "Results of 10 sets (10 in the whole campaign)." in servos
+    assert "Results of 0 sets (0 in the whole campaign)." in text
+    assert text.count("| servo_stiction_medium_s2 | effect | backlash |") == 1
+
+
+def test_a_page_without_servos_says_nothing_of_them(page):
+    job = Job("one", ("backlash",), "medium", 1)
+    text = page([row(job, "effect", ("backlash",))], [job, *NONE])
+    assert "Logs of a servo" not in text
+    assert "Results of 1 sets (1 in the whole campaign)." in text
+    assert "| … strictly first | 1 of 1 (100%; 21–100 %) |" in text
+
+
+def test_a_set_that_failed_is_counted_and_not_measured(page):
+    failed = {"name": ONE[0].name, **asdict(ONE[0]), "verdict": "error", "error": "no memory"}
+    text = page([failed, row(ONE[1], "effect", ("stiction",))], ONE)
+    assert "| … strictly first | 1 of 2 (50%; 9–91 %) |" in text
+    assert "| … error left at most 1.1 × the floor | 1 of 1 (100%; 21–100 %) |" in text
+
+
+def test_the_page_says_which_code_its_results_are_of(page):
+    text = page([row(NONE[0], "explained", **CODE), row(NONE[1], "explained", **CODE), row(NONE[2], "explained")], NONE)
+    assert "Measured with commit `0123456789ab+`, digest `aaaabbbbcccc`: 2 sets." in text
+    assert "Measured with code that was not noted: 1 sets." in text
+    assert measured_code.outdated(text, "aaaabbbbcccc") == ["Measured with code that was not noted: 1 sets."]
+    clean = page([row(NONE[0], "explained", **CODE)], NONE)
+    assert measured_code.outdated(clean, "aaaabbbbcccc") == []
+    assert measured_code.outdated(clean, "another") == [line for line in clean.splitlines() if "aaaabbbbcccc" in line]
+    assert measured_code.outdated("# a page\n", "x") == ["It does not say which code it measured."]
+
+
+def test_the_digest_is_of_each_line_of_the_packages_and_of_no_others(tmp_path):
+    for name in (*measured_code.PACKAGES, "reports"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "one.py").write_text("a = 1\n")
+    known = {measured_code.digest(tmp_path)}
+    (tmp_path / "reports" / "one.py").write_text("a = 2\n")
+    assert measured_code.digest(tmp_path) in known
+    for name in measured_code.PACKAGES:
+        (tmp_path / name / "one.py").write_text("a = 2\n")
+        now = measured_code.digest(tmp_path)
+        assert now not in known
+        known.add(now)
+    assert len(measured_code.digest()) == 12
+
+
+def test_the_check_fails_where_the_page_is_of_other_code(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(hidden_effects, "ROOT", tmp_path)
+    monkeypatch.setattr(hidden_effects, "PAGE", tmp_path / "page.md")
+    monkeypatch.setattr(sys, "argv", ["hidden_effects.py", "check"])
+    (tmp_path / "page.md").write_text(measured_code.sentences([measured_code.stamp()])[0])
+    assert hidden_effects.main() == 0
+    assert capsys.readouterr().out == ""
+    (tmp_path / "page.md").write_text(measured_code.sentences([CODE])[0])
+    assert hidden_effects.main() == 1
+    said = capsys.readouterr().out
+    assert "page.md: Measured with commit `0123456789ab+`, digest `aaaabbbbcccc`: 1 sets." in said
+    assert "run --renew" in said
+    assert "--skip hidden-effects" in said
+
+
+@pytest.mark.parametrize(("renew", "done"), [(False, {"old", "new"}), (True, {"new"})])
+def test_results_are_stamped_and_those_of_other_code_are_renewed_on_demand(tmp_path, monkeypatch, renew, done):
+    jobs = [servo("none", (), k, "") for k in range(3)]
+    names = dict(zip(("old", "new", "none"), (job.name for job in jobs), strict=True))
+    now = measured_code.stamp()
+    monkeypatch.setattr(hidden_effects, "RESULTS", tmp_path / "results.jsonl")
+    monkeypatch.setattr(hidden_effects, "jobs", lambda: jobs)
+    monkeypatch.setattr(hidden_effects, "ProcessPoolExecutor", InThisProcess)
+    monkeypatch.setattr(hidden_effects, "run_job", lambda job: row(job, "explained"))
+    before = [row(jobs[0], "explained", **CODE), row(jobs[1], "explained", **now)]
+    (tmp_path / "results.jsonl").write_text("".join(f"{hidden_effects.json.dumps(r)}\n" for r in before))
+    hidden_effects.run("", 1, renew)
+    added = (tmp_path / "results.jsonl").read_text().splitlines()[2:]
+    found = {r["name"]: r for r in map(hidden_effects.json.loads, added)}
+    assert set(found) == set(names.values()) - {names[one] for one in done}
+    assert all({key: r[key] for key in now} == now for r in found.values())
+
+
+class InThisProcess:
+    """A pool without processes."""
+
+    def __init__(self, workers: int) -> None: ...
+
+    def __enter__(self) -> InThisProcess:
+        return self
+
+    def __exit__(self, *error: object) -> None: ...
+
+    def submit(self, function, job):
+        from concurrent.futures import Future
+
+        future: Future = Future()
+        future.set_result(function(job))
+        return future
