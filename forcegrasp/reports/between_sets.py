@@ -46,7 +46,9 @@ def answer(between: BetweenSets, floor: float) -> str:
 def printed(between: BetweenSets) -> Printed:
     """The parameters in each set, for the terminal, those that differ first."""
     head, rows = _table(between, brief=True)
-    table = Printed(*head, box=box.SIMPLE_HEAD, padding=(0, 1))
+    table = Printed(box=box.SIMPLE_HEAD, padding=(0, 1))
+    for name in head:
+        table.add_column(Plain(name))
     for row in rows[:_PRINTED]:
         table.add_row(*map(Plain, row))
     if len(rows) > _PRINTED:

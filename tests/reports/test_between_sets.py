@@ -12,8 +12,9 @@ from forcegrasp.identify.between_sets import Between, BetweenSets, SetFit
 from forcegrasp.models.model_file import Fitted
 from forcegrasp.reports import between_sets as report
 from forcegrasp.reports import comparison as comparison_report
-from forcegrasp.reports.html import Picture, Table
+from forcegrasp.reports.html import Picture, Table, write_report
 from forcegrasp.reports.next_step import after_comparison
+from tests.made_up import NASTY
 
 FLOOR = 1.02
 
@@ -74,6 +75,15 @@ def test_the_table_has_what_differs_first(between):
     assert all(part in lines[0] for part in ("48.2", "51", "× 1.06 (1.04 to 1.08)", "0.0004", "differs"))
     assert "can't be told, b hardly fixes it" in lines[1]
     assert "+1.06 (1.04 to 1.08)" in lines[2]
+
+
+def test_a_set_may_have_any_name(between, tmp_path):
+    named = dataclasses.replace(
+        between, sets=tuple(dataclasses.replace(one, name=f"{NASTY}[/red]{k}") for k, one in enumerate(between.sets))
+    )
+    assert "[red][/red]0" in text_of(report.printed(named))
+    path = write_report(tmp_path / "report.html", "a", "b", [report.section(named, FLOOR)], {})
+    assert "<script>alert" not in path.read_text()
 
 
 def test_a_set_without_the_parameter_and_a_spread_have_their_place(between):
