@@ -110,7 +110,7 @@ def evaluate(gripper: str, policies: dict[str, str], trials: int) -> dict[str, d
         figures = {key: float(value.mean()) for key, value in summarise(episodes, sensors, hand.period_s).items()}
         found[name] = {
             "force_reward": figures["force_reward_normalised"],
-            "peak_force_n": float(episodes["next", "force"].amax((1, 2)).mean()),
+            "peak_force_n": figures["peak_force_n"],
             "overshoot_percent": figures["overshoot_percent"],
             "moved_mm": figures["displacement_until_grasped_mm"],
         }

@@ -39,18 +39,24 @@ def ship(source: Path, name: str, evaluation: Path, what: str) -> None:
 
 
 def _card(name: str, what: str, made: dict, frames: int, report: dict, figures: dict) -> str:
-    def cell(key: str, digits: int) -> str:
-        found = figures[key]
-        return f"{found['mean']:.{digits}f} ± {found['std']:.{digits}f} | {found['iqm']:.{digits}f}"
+    def cell(key: str, digits: int, scale: float = 1.0) -> str:
+        mean, std, *quantiles = (scale * figures[key][name] for name in ("mean", "std", "median", "p95"))
+        return " | ".join([f"{mean:.{digits}f} ± {std:.{digits}f}", *(f"{q:.{digits}f}" for q in quantiles)])
 
     rows = {
         "force reward, normalised form (150 at best)": cell("force_reward_normalised", 1),
         "force reward, paper's form (150 at best)": cell("force_reward_paper", 1),
         "object moved until both fingers touch [mm]": cell("displacement_until_grasped_mm", 3),
         "object moved in all [mm]": cell("displacement_total_mm", 3),
+        "peak force [N]": cell("peak_force_n", 3),
+        "overshoot over the goal force [N]": cell("overshoot_n", 3),
         "overshoot over the goal force [%]": cell("overshoot_percent", 1),
+        "impact impulse beyond the goal [mN s]": cell("impact_impulse_ns", 2, 1e3),
         "time to the goal force, ± 2 σ_f [s]": cell("reach_s", 2),
-        "force error over the last second [N]": cell("final_force_error_n", 4),
+        "time from which the force stays there [s]": cell("settled_s", 2),
+        "force error over the last second [mN]": cell("final_force_error_n", 1, 1e3),
+        "crushed: beyond 1.5 × the goal for more than 40 ms [% of grasps]": cell("crushed_percent", 1),
+        "lost: not held throughout the last second [% of grasps]": cell("lost_percent", 1),
     }
     versions = ", ".join(f"{package} {version}" for package, version in made["versions"].items())
     command = shlex.join(part for part in made["command"] if not part.startswith("hydra."))
@@ -68,8 +74,8 @@ def _card(name: str, what: str, made: dict, frames: int, report: dict, figures: 
             f" `{report['physics']}`, {'model `' + report['model'] + '`, ' if report['model'] else ''}seed"
             f" {report['seed']}:",
             "",
-            "| | mean ± standard deviation | interquartile mean |",
-            "|---|---|---|",
+            "| | mean ± standard deviation | median | 95th percentile |",
+            "|---|---|---|---|",
             *(f"| {label} | {value} |" for label, value in rows.items()),
             "",
             f"Made with Python {made['python']}, {versions}.",

@@ -29,6 +29,11 @@ class AlgorithmConfig:
         True,
         "average the policy with its mirror image where the gripper is its own, so that it treats both fingers alike",
     )
+    squeeze_together: bool = option(
+        False,
+        "all motors get the mean of their actions once every reading has shown contact, as with force_pi",
+        source="Lach et al. 2022",
+    )
 
 
 @dataclass
@@ -53,4 +58,15 @@ class PPOConfig(AlgorithmConfig):
         "privileged",
         "what the value network sees while training: the policy's observation, or also the grasp's true state",
         choices=("observation", "privileged"),
+    )
+    teacher_weight: float = option(
+        0.0,
+        "weight at the start of the loss that draws the policy to a teacher that knows the object; 0: no teacher",
+        source="Schmitt et al. 2018",
+        low=0,
+        high=1000,
+    )
+    teacher_weight_end: float = option(0.0, "what is left of it at the end, linearly, as a fraction", low=0, high=1)
+    teacher_feedback: float = option(
+        0.5, "by how much of the relative force error the teacher corrects its command", low=0, high=10
     )

@@ -136,7 +136,7 @@ class ActionConfig:
 
 @dataclass
 class RewardConfig:
-    """r = α₁ r_force + α₂ r_obj + α₃ r_act (paper, eqs. 8-11)."""
+    """r = α₁ r_force + α₂ r_obj + α₃ r_act (paper, eqs. 8-11), and a term of our own for force beyond the goal."""
 
     form: str = option(
         "paper",
@@ -155,9 +155,20 @@ class RewardConfig:
         low=0,
         high=1,
     )
+    overshoot_weight: float = option(
+        0.0,
+        "weight of r_over = -Σ max(0, f / f_goal - 1 - overshoot_margin), once the curriculum has ended",
+        source="own",
+        low=0,
+        high=1000,
+    )
+    overshoot_margin: float = option(
+        0.05, "force beyond the goal that r_over leaves free, as a fraction of the goal", source="own", low=0, high=10
+    )
     forces: str = option(
         "actual",
-        "forces that r_force judges: actual ones, or those measured, before noise; they differ only with a model",
+        "forces that r_force and r_over judge: actual ones, or those measured, before noise; they differ only with a"
+        " model",
         choices=("actual", "measured"),
     )
 
@@ -178,6 +189,7 @@ class CurriculumConfig:
     speed_threshold_m: float = option(
         2e-4, "velocity threshold at the start", unit="m per control step", source="paper, Table 2", low=0, high=1
     )
+    overshoot_weight: float = option(0.0, "weight of r_over at the start", source="own", low=0, high=1000)
     radius_m: list[float] = of_gripper(
         [], "start_radius_m", "object radius at the start", unit="m", source="paper, Table 2", low=1e-4, high=1
     )

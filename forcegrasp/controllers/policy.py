@@ -12,6 +12,7 @@ from torch import Tensor, nn
 from torchrl.modules import MLP, IndependentNormal, ProbabilisticActor
 
 from forcegrasp.config import AlgorithmConfig, ObservationConfig, TrainConfig
+from forcegrasp.errors import ConfigError
 from forcegrasp.observation import PARTS
 from forcegrasp.physics.gripper import Gripper
 from forcegrasp.physics.gripper_file import default_gripper
@@ -44,17 +45,54 @@ class Mirrored(nn.Module):
         return (own + mirrored.flip(-1)) / 2
 
 
+class SqueezeTogether(nn.Module):
+    """Gives all motors the mean of their actions once every reading has shown contact (as in Lach et al. 2022).
+
+    The noise of one finger's reading then changes how hard both squeeze, and can't push the object.
+
+    Args:
+      net: ``(*B, size) -> (*B, motors)``.
+      contact: where the observation has ``had_contact`` in its newest frame.
+    """
+
+    contact: Tensor
+
+    def __init__(self, net: nn.Module, contact: Sequence[int]) -> None:
+        super().__init__()
+        self.net = net
+        self.register_buffer("contact", torch.tensor(contact), persistent=False)
+
+    def forward(self, observation: Tensor) -> Tensor:
+        """All actions, ``(*B, motors)``."""
+        action = self.net(observation)
+        grasped = (observation[..., self.contact] > 0.5).all(-1, keepdim=True)
+        return torch.where(grasped, action.mean(-1, keepdim=True), action)
+
+
 def part_sizes(gripper: Gripper, config: ObservationConfig) -> list[int]:
     """How many numbers each part of the stacked observation has, in its order."""
     return [PARTS[part].size(len(gripper.motors), len(gripper.forces)) for part in config.parts] * config.frames
 
 
 def policy_of(config: TrainConfig, gripper: Gripper) -> ProbabilisticActor:
-    """The policy of a training, as it starts."""
-    return make_policy(part_sizes(gripper, config.observation), config.algorithm, gripper)
+    """The policy of a training, as it starts.
+
+    Raises:
+      ConfigError: if its motors are to squeeze together and it can't see when.
+    """
+    sizes, parts = part_sizes(gripper, config.observation), config.observation.parts
+    contact: list[int] = []
+    if config.algorithm.squeeze_together:
+        if "had_contact" not in parts:
+            raise ConfigError(f"{config.algorithm.name}.squeeze_together: add had_contact to observation.parts")
+        newest = len(sizes) - len(parts) + parts.index("had_contact")
+        contact = list(range(sum(sizes[:newest]), sum(sizes[: newest + 1])))
+    return make_policy(sizes, config.algorithm, gripper, contact)
 
 
-def make_policy(sizes: Sequence[int], config: AlgorithmConfig, gripper: Gripper | None = None) -> ProbabilisticActor:
+def make_policy(
+    sizes: Sequence[int], config: AlgorithmConfig, gripper: Gripper | None = None, contact: Sequence[int] = ()
+) -> ProbabilisticActor:
     """Reads ``observation`` ``(*B, sum(sizes))``, writes ``action`` ``(*B, motors)`` and ``action_log_prob``.
 
     The standard deviation does not depend on the state. Actions are not squashed: the environment clips them to
@@ -64,6 +102,7 @@ def make_policy(sizes: Sequence[int], config: AlgorithmConfig, gripper: Gripper 
       sizes: of the parts of the stacked observation, see :func:`part_sizes`.
       config: size of the network, initial mean and deviation, and whether it is :class:`Mirrored`.
       gripper: how many motors there are, and whether it is its own mirror image; the paper's by default.
+      contact: where the newest frame has ``had_contact``, if the motors are to :class:`SqueezeTogether`.
     """
     gripper = gripper or default_gripper()
     actions = len(gripper.motors)
@@ -72,6 +111,7 @@ def make_policy(sizes: Sequence[int], config: AlgorithmConfig, gripper: Gripper 
     nn.init.orthogonal_(last.weight, gain=0.01)
     nn.init.constant_(last.bias, config.initial_action)
     mean = Mirrored(net, sizes) if config.mirrored and gripper.is_symmetric else net
+    mean = SqueezeTogether(mean, contact) if contact else mean
     scale = AddStateIndependentNormalScale(actions, init_value=config.log_std)
     return ProbabilisticActor(
         TensorDictModule(nn.Sequential(mean, scale), in_keys=["observation"], out_keys=["loc", "scale"]),

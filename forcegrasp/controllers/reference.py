@@ -5,6 +5,7 @@ from __future__ import annotations
 import torch
 from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
+from torch import Tensor
 
 from forcegrasp.physics.gripper import Gripper
 from forcegrasp.physics.gripper_file import default_gripper
@@ -40,10 +41,14 @@ class InformedFeedForward(TensorDictModuleBase):
         self.in_keys, self.out_keys = ["had_contact", "goal_force", "grasp_parameters"], ["action"]
         self.motors, self.reached = len(gripper.motors), gripper.training  # `training` is torch's own
 
+    def hold(self, goal: Tensor, parameters: Tensor) -> Tensor:
+        """The action whose force is the goal at rest, ``(*B, 1)``, from the goal and what is known of the grasp."""
+        return (-goal / (self.reached.max_force_n * self.reached.force_scale(parameters[..., :1]))).clamp(-1, 1)
+
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
         touched, goal, parameters = (tensordict.get(key) for key in self.in_keys)
         all_touched = touched.bool().all(-1, keepdim=True)
-        hold = -goal / (self.reached.max_force_n * self.reached.force_scale(parameters[..., :1]))
         waiting = (touched if touched.shape[-1] == self.motors else all_touched.to(goal.dtype)) - 1
-        action = torch.where(all_touched, hold, waiting).clamp(-1, 1)
+        hold = self.hold(goal, parameters)
+        action = torch.where(all_touched, hold, waiting)
         return tensordict.set("action", action.expand(*action.shape[:-1], self.motors))

@@ -25,6 +25,7 @@ class CurriculumHook:
         """Applies and returns the values that hold after ``frames`` frames."""
         values = self.schedule(frames)
         self._grasps.reward_config.object_weight = values.object_weight
+        self._grasps.reward_config.overshoot_weight = values.overshoot_weight
         self._grasps.reward_config.speed_threshold_m = values.speed_threshold_m
         self._grasps.sampler.set_ranges(list(values.radius_m), list(values.offset_m))
         return values

@@ -16,6 +16,7 @@ class CurriculumValues:
 
     object_weight: float  #: α₂
     speed_threshold_m: float  #: velocity threshold, metres per control step
+    overshoot_weight: float  #: weight of r_over
     radius_m: tuple[float, float]  #: range of object radii, W_o, metres
     offset_m: tuple[float, float]  #: range of object offsets, O_y, metres
 
@@ -24,6 +25,7 @@ class CurriculumValues:
         return {
             "object_weight": self.object_weight,
             "speed_threshold_m": self.speed_threshold_m,
+            "overshoot_weight": self.overshoot_weight,
             "radius_low_m": self.radius_m[0],
             "radius_high_m": self.radius_m[1],
             "offset_low_m": self.offset_m[0],
@@ -59,8 +61,9 @@ class LinearSchedule:
         gripper = gripper or default_gripper()
         curriculum, grasp = complete(curriculum, gripper), complete(grasp, gripper)
         self.end_frames = curriculum.end_fraction * total_frames if curriculum.enabled else 0.0
-        self._start = (curriculum.object_weight, curriculum.speed_threshold_m, curriculum.radius_m, curriculum.offset_m)
-        self._end = (reward.object_weight, reward.speed_threshold_m, grasp.radius_m, grasp.offset_m)
+        weighted = ((one.object_weight, one.speed_threshold_m, one.overshoot_weight) for one in (curriculum, reward))
+        ranges = ((one.radius_m, one.offset_m) for one in (curriculum, grasp))
+        self._start, self._end = (w + r for w, r in zip(weighted, ranges, strict=True))
 
     def __call__(self, frames: int) -> CurriculumValues:
         """The values after this many frames."""

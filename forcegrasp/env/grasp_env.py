@@ -14,7 +14,7 @@ from torchrl.data import Bounded, Categorical, Composite, Unbounded
 from torchrl.envs import EnvBase
 
 from forcegrasp.config import GraspConfig, PhysicsConfig, RewardConfig, check_no_effects, validate
-from forcegrasp.env.reward import force_reward, normalised_force_reward, object_penalty
+from forcegrasp.env.reward import force_reward, normalised_force_reward, object_penalty, overshoot_penalty
 from forcegrasp.gpu.simulator import WarpGraspSimulator
 from forcegrasp.models.model_file import Model
 from forcegrasp.models.variation import ModelVariation
@@ -35,14 +35,16 @@ OBSERVATIONS = {
     ("reward_terms", "force_paper"): (1, "r_force as printed in the paper, unweighted"),
     ("reward_terms", "force_normalised"): (1, "r_force divided by the goal force, unweighted"),
     ("reward_terms", "object"): (1, "r_obj, unweighted"),
+    ("reward_terms", "overshoot"): (1, "r_over, unweighted"),
 }
 
 
 class GraspEnv(EnvBase):
     """``n`` grasps at once. Action: ``joint_delta``, u = Δq_des, m or rad, ``(n, motors)``; see ``OBSERVATIONS``.
 
-    The reward is α₁ r_force + α₂ r_obj of paper eq. 11, from the true state; r_act needs the policy's own actions and
-    is added by :class:`~forcegrasp.transforms.ActionChangePenalty`. An episode is truncated, never terminated.
+    The reward is α₁ r_force + α₂ r_obj of paper eq. 11 and a weight times r_over, from the true state; r_act needs the
+    policy's own actions and is added by :class:`~forcegrasp.transforms.ActionChangePenalty`. An episode is truncated,
+    never terminated.
 
     Args:
       n: number of grasps, the batch size.
@@ -120,9 +122,10 @@ class GraspEnv(EnvBase):
             self.simulator.step(delta.numpy().astype(np.float64))
         state, config = self._state(), self.reward_config
         goal = state.get("goal_force")
-        error = goal - state.get("measured_force" if config.forces == "measured" else "force")
-        force = force_reward(error) if config.form == "paper" else normalised_force_reward(error, goal)
-        reward = config.force_weight * force + config.object_weight * state["reward_terms", "object"]
+        judged = state.get("measured_force" if config.forces == "measured" else "force")
+        form = force_reward(goal - judged) if config.form == "paper" else normalised_force_reward(goal - judged, goal)
+        reward = config.force_weight * form + config.object_weight * state["reward_terms", "object"]
+        reward = reward + config.overshoot_weight * overshoot_penalty(judged, goal, config.overshoot_margin)
         return state.set("reward", reward).update(self._done())
 
     def _column(self, values: Shaped[np.ndarray | Tensor, "{self.simulator.n} ..."]) -> Float[Tensor, "n k"]:
@@ -137,6 +140,7 @@ class GraspEnv(EnvBase):
             "force_paper": force_reward(error),
             "force_normalised": normalised_force_reward(error, goal),
             "object": object_penalty(speed, self.reward_config.speed_threshold_m),
+            "overshoot": overshoot_penalty(force, goal, self.reward_config.overshoot_margin),
         }
         return TensorDict(
             {

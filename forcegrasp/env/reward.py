@@ -34,6 +34,24 @@ def normalised_force_reward(
     return force_reward(force_error / goal_force)
 
 
+def overshoot_penalty(
+    force: Float[Tensor, "*B sides"], goal_force: Float[Tensor, "*B 1"], margin: float
+) -> Float[Tensor, "*B 1"]:
+    """r_over = −Σ_i max(0, f_i / f_goal − 1 − margin), own form: linear, as the damage of a squeeze grows with it.
+
+    r_force can't replace it: tanh is flat where a force is far beyond the goal, and both signs of Δf count alike.
+
+    Args:
+      force: f, newtons, ``(*B, sides)``.
+      goal_force: newtons, ``(*B, 1)``.
+      margin: what may be exceeded freely, as a fraction of the goal.
+
+    Returns:
+      ``(*B, 1)``, 0 at best.
+    """
+    return -(force / goal_force - 1 - margin).clamp_min(0).sum(-1, keepdim=True)
+
+
 def object_penalty(object_speed: Float[Tensor, "*B 1"], threshold: float) -> Float[Tensor, "*B 1"]:
     """r_obj = −1 where the object moves faster than the threshold, else 0 (paper, eq. 9).
 

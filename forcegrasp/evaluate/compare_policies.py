@@ -37,7 +37,7 @@ def evaluate(config: EvaluateConfig, out: str | Path, console: Console | None = 
     """Rolls every policy out on the same grasps; prints a summary and writes everything into ``out``.
 
     Writes ``report.html``, ``evaluation.json`` (the returned summary), ``tables.md``, ``trials.csv`` (one row per
-    trial), ``force_reward.png``, ``displacement.png``, and ``traces_<policy>.png``.
+    trial), ``force_reward.png``, ``displacement.png``, ``overshoot.png``, and ``traces_<policy>.png``.
 
     Raises:
       ConfigError, CheckpointError, MeasurementError, PhysicsError: with what to do about it.
@@ -105,9 +105,11 @@ def _boxes(metrics: dict[str, dict[str, np.ndarray]], grid: Grid, steps: int) ->
     """Box plots by the name of their file."""
     rewards = {name: values["force_reward_normalised"] for name, values in metrics.items()}
     moved = {name: np.maximum(values["displacement_total_mm"], 1e-3) for name, values in metrics.items()}
+    beyond = {name: np.maximum(values["overshoot_percent"], 0.1) for name, values in metrics.items()}
     return {
         "force_reward": cell_boxes(rewards, grid.cells, grid.what, f"force reward of an episode ({steps} at best)"),
         "displacement": cell_boxes(moved, grid.cells, grid.what, "object moved in all [mm]", log=True),
+        "overshoot": cell_boxes(beyond, grid.cells, grid.what, "largest force beyond the goal [%]", log=True),
     }
 
 

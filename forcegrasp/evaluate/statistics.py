@@ -1,4 +1,4 @@
-"""What can be said about a metric from a number of trials: means, interquartile means, and how sure they are.
+"""What can be said about a metric from a number of trials: means, quantiles, and how sure they are.
 
 Intervals are 95 % percentile bootstrap intervals, stratified: trials are drawn anew within each cell (a softness value,
 an object), never across cells (Agarwal et al. 2021, *Deep RL at the edge of the statistical precipice*).
@@ -10,6 +10,8 @@ import numpy as np
 from scipy.stats import trim_mean
 
 RESAMPLES = 1000
+#: Quantiles that are told beside the mean, by name.
+QUANTILES = {"median": 0.5, "p95": 0.95}
 
 
 class Bootstrap:
@@ -26,19 +28,25 @@ class Bootstrap:
         self.picks = rng.integers(trials, size=(RESAMPLES, cells, trials), dtype=np.int32)
 
     def describe(self, values: np.ndarray) -> dict:
-        """Mean, standard deviation and interquartile mean with intervals, over all cells and in each.
+        """Mean, standard deviation, interquartile mean, median and 95th percentile with intervals, over all cells; and
+        in each cell all but the interquartile mean, the quantiles without intervals.
 
         Args:
           values: ``(cells, trials)``.
         """
         drawn = np.take_along_axis(values[None], self.picks, axis=2)
-        everything = drawn.reshape(len(drawn), -1)
+        everything = np.sort(drawn.reshape(len(drawn), -1), axis=1)
         iqm_low, iqm_high = _interval(_interquartile_mean(everything))
         cells = [
-            {"mean": float(row.mean()), "std": float(row.std(ddof=1)), "low": low, "high": high}
+            {"mean": float(row.mean()), "std": float(row.std(ddof=1)), "low": low, "high": high} | _quantiles(row)
             for row, (low, high) in zip(values, map(_interval, drawn.mean(2).T), strict=True)
         ]
         low, high = _interval(everything.mean(1))
+        ends = {
+            f"{name}_{end}": bound
+            for name, share in QUANTILES.items()
+            for end, bound in zip(("low", "high"), _interval(_quantile(everything, share)), strict=True)
+        }
         return {
             "mean": float(values.mean()),
             "std": float(values.std(ddof=1)),
@@ -47,6 +55,8 @@ class Bootstrap:
             "iqm": float(trim_mean(values.ravel(), 0.25)),
             "iqm_low": iqm_low,
             "iqm_high": iqm_high,
+            **_quantiles(values.ravel()),
+            **ends,
             "by_cell": cells,
         }
 
@@ -77,9 +87,20 @@ class Bootstrap:
 
 
 def _interquartile_mean(rows: np.ndarray) -> np.ndarray:
-    """Mean of the middle half of each row, ``(n, m) -> (n,)``."""
+    """Mean of the middle half of each sorted row, ``(n, m) -> (n,)``."""
     cut = rows.shape[1] // 4
-    return np.sort(rows, axis=1)[:, cut : rows.shape[1] - cut].mean(1)
+    return rows[:, cut : rows.shape[1] - cut].mean(1)
+
+
+def _quantile(rows: np.ndarray, share: float) -> np.ndarray:
+    """Quantile of each sorted row, interpolated between its neighbours, ``(n, m) -> (n,)``."""
+    below, part = divmod(share * (rows.shape[1] - 1), 1)
+    above = min(int(below) + 1, rows.shape[1] - 1)
+    return (1 - part) * rows[:, int(below)] + part * rows[:, above]
+
+
+def _quantiles(values: np.ndarray) -> dict[str, float]:
+    return {name: float(np.quantile(values, share)) for name, share in QUANTILES.items()}
 
 
 def _interval(drawn: np.ndarray) -> tuple[float, float]:

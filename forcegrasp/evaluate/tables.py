@@ -10,6 +10,8 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from forcegrasp.evaluate.statistics import QUANTILES
+
 _MEASURED = ("force_reward_measured", "normalised form, of measured forces", 1)
 #: Metrics that are shown: name, heading, digits. The first ones, _BY_CELL, also cell by cell.
 METRICS = (
@@ -18,12 +20,21 @@ METRICS = (
     _MEASURED,
     ("displacement_until_grasped_mm", "object moved until both touch, mm", 3),
     ("displacement_total_mm", "object moved in all, mm", 3),
-    ("fast_steps", "steps over the speed threshold", 2),
     ("overshoot_percent", "largest overshoot, % of the goal", 1),
+    ("overshoot_n", "largest overshoot, N", 3),
+    ("displacement_after_grasped_mm", "object moved after both touch, mm", 3),
+    ("fast_steps", "steps over the speed threshold", 2),
+    ("peak_force_n", "peak force, N", 3),
+    ("impact_impulse_ns", "impact impulse beyond the goal, N s", 4),
     ("reach_s", "time until within 2 σ_f of the goal, s", 2),
+    ("settled_s", "time from which within 2 σ_f of it, s", 2),
     ("final_force_error_n", "force error over the last second, N", 4),
+    ("command_effort", "effort of the commands, m or rad", 5),
+    ("action_change", "change of the actions", 2),
+    ("crushed_percent", "crushed (> 1.5 × goal for > 40 ms), % of the grasps", 1),
+    ("lost_percent", "lost (not held throughout the last second), % of the grasps", 1),
 )
-_BY_CELL = 5
+_BY_CELL = 7
 #: Columns of a terminal in which numbers of the short table need not be folded.
 NARROW = 80
 
@@ -86,6 +97,15 @@ def sheets(report: dict) -> Iterator[Sheet]:
         ["figure", *names],
         [[heading, *(_overall(policies[name][metric], digits) for name in names)] for metric, heading, digits in shown],
     )
+    yield Sheet(
+        "mean ± half of its 95 % interval; median; 95th percentile, each with its 95 % interval",
+        ["figure", *names],
+        [
+            [heading, *(_spread(policies[name][metric], digits) for name in names)]
+            for metric, heading, digits in shown
+            if not metric.endswith(("_normalised", "_paper", "_measured"))
+        ],
+    )
     for metric, heading, digits in first:
         cells = {name: policies[name][metric]["by_cell"] for name in names}
         yield Sheet(
@@ -129,6 +149,14 @@ def _overall(found: dict, digits: int) -> str:
         f"{found['mean']:.{digits}f} ± {found['std']:.{digits}f}\n"
         f"{found['iqm']:.{digits}f} [{found['iqm_low']:.{digits}f}, {found['iqm_high']:.{digits}f}]"
     )
+
+
+def _spread(found: dict, digits: int) -> str:
+    quantiles = (
+        f"{found[name]:.{digits}f} [{found[f'{name}_low']:.{digits}f}, {found[f'{name}_high']:.{digits}f}]"
+        for name in QUANTILES
+    )
+    return "\n".join((half_interval(found, digits), *quantiles))
 
 
 def half_interval(found: dict, digits: int) -> str:

@@ -34,8 +34,15 @@ CHARTS = {
         "steps over the speed threshold": ("episode/fast_steps",),
         "time until contact, s": ("episode/first_contact_s", "episode/both_contact_s"),
     },
+    "Is it gentle?": {
+        "largest overshoot, % of the goal": ("episode/overshoot_percent",),
+        "peak force and overshoot, N": ("episode/peak_force_n", "episode/overshoot_n"),
+        "impact impulse beyond the goal, N s": ("episode/impact_impulse_ns",),
+        "crushed and lost, % of the grasps": ("episode/crushed_percent", "episode/lost_percent"),
+        "time to the goal and until settled, s": ("episode/reach_s", "episode/settled_s"),
+    },
     "Curriculum": {
-        "weight of the object's speed": ("curriculum/object_weight",),
+        "weights": ("curriculum/object_weight", "curriculum/overshoot_weight"),
         "object radius, m": ("curriculum/radius_low_m", "curriculum/radius_high_m"),
     },
     "Speed": {"frames per second": ("speed/frames_per_s", "speed/collect_frames_per_s")},
@@ -79,9 +86,9 @@ simulated with {simulator}.
     {evaluate_command(run, config)}        compare it with the hand-written controller
     forcegrasp curves {run.path}        its learning curves as a picture
 
-**Custom scalars** has one page per question: is it learning, does it push the object, is the algorithm healthy, how
-fast is it. **Scalars** has everything, what matters first; the numbers in the names only sort. All are means over a
-batch of episodes with exploring actions, so `forcegrasp evaluate` finds a little more.
+**Custom scalars** has one page per question: is it learning, does it push the object, is the algorithm healthy, is it
+gentle, how fast is it. **Scalars** has everything, what matters first; the numbers in the names only sort. All are
+means over a batch of episodes with exploring actions, so `forcegrasp evaluate` finds a little more.
 
 {meanings}
 * `return`: sum of all rewards, with the weights of the day: the curriculum changes them

@@ -94,6 +94,22 @@ def test_reward_follows_the_schedule():
     assert fast_steps[0] < fast_steps[1] < fast_steps[2]
 
 
+def test_the_weight_of_the_overshoot_reaches_the_reward():
+    env = build_env(16, physics=FAST, action=ActionConfig(inductive_bias=False))
+    schedule = LinearSchedule(CurriculumConfig(), GraspConfig(), RewardConfig(overshoot_weight=2.0), FRAMES)
+    hook, rewards = CurriculumHook(schedule, env), []
+    for frames, weight in ((0, 0.0), (150, 1.0), (300, 2.0)):
+        assert hook.apply(frames).overshoot_weight == pytest.approx(weight)
+        env.base_env.sampler.set_ranges([0.03, 0.035], [-0.006, 0.006])  # the same grasps each time
+        env.base_env.reward_config.object_weight = 0.0
+        env.base_env.set_seed(0)
+        after = env.rollout(40, lambda td: td.set("action", -torch.ones(16, 2)))["next"]
+        rewards.append(after["reward"] - weight * after["reward_terms", "overshoot"])
+        assert after["reward_terms", "overshoot"].any()
+    for others in rewards[1:]:
+        torch.testing.assert_close(others, rewards[0], rtol=0, atol=1e-4)
+
+
 def test_disabled_curriculum_leaves_the_environment_at_its_final_values():
     env = build_env(500, physics=FAST)
     values = hook_of(env, enabled=False).apply(0)

@@ -278,6 +278,8 @@ OTHER = {
         "object_weight": 0.5,
         "action_weight": 0.0,
         "speed_threshold_m": 2e-4,
+        "overshoot_weight": 1.0,
+        "overshoot_margin": 0.5,
     },
 }
 BASE = {
@@ -286,7 +288,7 @@ BASE = {
     "sensors": SensorConfig(),
     "observation": ObservationConfig(),
     "action": ActionConfig(),
-    "reward": RewardConfig(),
+    "reward": RewardConfig(overshoot_weight=0.1),  # without a weight the margin is nothing
 }
 
 

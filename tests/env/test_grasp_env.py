@@ -58,6 +58,7 @@ def test_entries_and_their_shapes():
         ("reward_terms", "force_paper"): 1,
         ("reward_terms", "force_normalised"): 1,
         ("reward_terms", "object"): 1,
+        ("reward_terms", "overshoot"): 1,
     }
     named = {"motors": 2, "channels": 2}
     assert {key: named.get(size, size) for key, (size, _) in OBSERVATIONS.items()} == sizes
@@ -185,6 +186,22 @@ def test_reward_is_the_papers(form, force_weight, object_weight, threshold):
     np.testing.assert_array_equal(terms.get("object"), penalty)
     expected = force_weight * (paper if form == "paper" else normalised) + object_weight * penalty
     np.testing.assert_allclose(after.get("reward"), expected, atol=4e-6)
+
+
+def test_force_beyond_the_goal_costs_its_weight():
+    """Without a weight not a bit of the reward differs, whatever the margin is."""
+    weights = ((0.0, 0.05), (0.0, 0.5), (0.7, 0.2))
+    plain, other, gentle = (
+        play(GraspEnv(16, FAST, NEAR, RewardConfig(overshoot_weight=weight, overshoot_margin=margin)), close(30, 16))[
+            "next"
+        ]
+        for weight, margin in weights
+    )
+    assert torch.equal(plain["reward"], other["reward"])
+    beyond = (plain["force"] / plain["goal_force"] - 1.2).clamp_min(0).sum(-1, keepdim=True)
+    assert 0.02 < (beyond > 0).float().mean() < 0.98
+    torch.testing.assert_close(gentle["reward_terms", "overshoot"], -beyond)
+    torch.testing.assert_close(gentle["reward"], plain["reward"] - 0.7 * beyond)
 
 
 def test_action_weight_is_left_to_its_transform():

@@ -7,7 +7,7 @@ import math
 import pytest
 import torch
 
-from forcegrasp.env.reward import force_reward, normalised_force_reward, object_penalty
+from forcegrasp.env.reward import force_reward, normalised_force_reward, object_penalty, overshoot_penalty
 
 
 def test_force_reward():
@@ -34,6 +34,26 @@ def test_normalised_force_reward():
     torch.testing.assert_close(
         normalised_force_reward(error, goal), torch.tensor(expected).unsqueeze(1), rtol=0, atol=1e-6
     )
+
+
+@pytest.mark.parametrize("margin", [0.0, 0.05, 0.5])
+def test_overshoot_penalty(margin):
+    generator = torch.Generator().manual_seed(2)
+    goal = torch.rand(50, 1, generator=generator) + 0.08
+    force = goal * 2 * torch.rand(50, 2, generator=generator)
+    expected = [
+        -sum(max(0.0, f / g - 1 - margin) for f in pair)
+        for pair, (g,) in zip(force.tolist(), goal.tolist(), strict=True)
+    ]
+    found = overshoot_penalty(force, goal, margin)
+    torch.testing.assert_close(found, torch.tensor(expected).unsqueeze(1), rtol=0, atol=1e-5)
+    assert (found < 0).any()
+    assert (found == 0).any()
+
+
+def test_overshoot_penalty_costs_nothing_up_to_the_margin_and_no_undershoot():
+    force = torch.tensor([[0.0, 0.0], [1.0, 1.0], [1.25, 0.5], [1.5, 1.25], [3.0, 1.25]])
+    assert overshoot_penalty(force, torch.ones(5, 1), 0.25).tolist() == [[0], [0], [0], [-0.25], [-1.75]]
 
 
 def test_object_penalty_is_strict():

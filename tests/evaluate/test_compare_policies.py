@@ -82,6 +82,7 @@ def trials(compared) -> list[dict]:
 def test_files(compared):
     _, out, _ = compared
     names = {"evaluation.json", "tables.md", "trials.csv", "force_reward.png", "displacement.png", "report.html"}
+    names.add("overshoot.png")
     assert {path.name for path in out.iterdir()} == names | {"traces_force_pi.png", "traces_close.png"}
     for path in out.glob("*.png"):
         with Image.open(path) as picture:

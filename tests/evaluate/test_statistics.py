@@ -16,6 +16,9 @@ def test_describe_is_what_numpy_and_scipy_say():
     assert found["std"] == pytest.approx(values.std(ddof=1))
     assert found["iqm"] == pytest.approx(trim_mean(values.reshape(-1), 0.25))
     assert [cell["mean"] for cell in found["by_cell"]] == pytest.approx(list(values.mean(1)))
+    assert (found["median"], found["p95"]) == pytest.approx((np.median(values), np.quantile(values, 0.95)))
+    assert [cell["median"] for cell in found["by_cell"]] == pytest.approx(list(np.median(values, axis=1)))
+    assert [cell["p95"] for cell in found["by_cell"]] == pytest.approx(list(np.quantile(values, 0.95, axis=1)))
     assert found["iqm_low"] < found["iqm"] < found["iqm_high"]
 
 
@@ -25,6 +28,16 @@ def test_intervals_are_as_wide_as_theory_says():
     assert found["high"] - found["low"] == pytest.approx(2 * 1.96 / np.sqrt(1200), rel=0.12)
     for cell in found["by_cell"]:
         assert cell["high"] - cell["low"] == pytest.approx(2 * 1.96 / np.sqrt(400), rel=0.15)
+
+
+def test_intervals_of_quantiles_are_as_wide_as_theory_says():
+    """Variance of a sample quantile: p (1 − p) / (n φ(x_p)²), with the density φ at the quantile."""
+    values = np.random.default_rng(0).normal(0, 1, (1, 4000))
+    found = Bootstrap(1, 4000, seed=1).describe(values)
+    for name, share in (("median", 0.5), ("p95", 0.95)):
+        width = 2 * 1.96 * np.sqrt(share * (1 - share) / 4000) / norm.pdf(norm.ppf(share))
+        assert found[f"{name}_low"] <= found[name] <= found[f"{name}_high"]
+        assert found[f"{name}_high"] - found[f"{name}_low"] == pytest.approx(width, rel=0.25)
 
 
 def test_differences_between_cells_do_not_widen_the_interval():

@@ -91,6 +91,17 @@ def test_detail_prints_all_tables():
         assert title not in short
 
 
+def test_medians_and_percentiles_are_told_in_the_units_of_the_metric():
+    report = made_up({"ib": 115, "force_pi": 100})
+    found = report["policies"]["ib"]["peak_force_n"]
+    told = [sheet for sheet in sheets(report) if "95th percentile" in sheet.title]
+    row = next(row for row in told[0].rows if row[0] == "peak force, N")
+    mean, median, percentile = row[1].splitlines()
+    assert mean.startswith(f"{found['mean']:.3f} ± ")
+    assert median == f"{found['median']:.3f} [{found['median_low']:.3f}, {found['median_high']:.3f}]"
+    assert percentile == f"{found['p95']:.3f} [{found['p95_low']:.3f}, {found['p95_high']:.3f}]"
+
+
 def test_page_has_all_tables_and_pictures(tmp_path):
     report = made_up({"<ib>": 115, "force_pi": 100})
     drawn = [Figure() for _ in range(3)]

@@ -10,8 +10,10 @@ from scipy.stats import norm
 from tensordict import TensorDict
 from torchrl.envs.utils import ExplorationType, set_exploration_type
 
-from forcegrasp.config import PPOConfig
-from forcegrasp.controllers.policy import make_policy
+from forcegrasp.config import ObservationConfig, PPOConfig, TrainConfig
+from forcegrasp.controllers.policy import make_policy, policy_of
+from forcegrasp.errors import ConfigError
+from forcegrasp.physics import default_gripper
 from forcegrasp.train.algorithms.value_network import make_value
 
 
@@ -84,6 +86,32 @@ def test_probability_of_actions():
 def test_deterministic_action_is_the_mean():
     drawn = act(make_policy([2] * 15, PPOConfig()), torch.randn(5, 30), ExplorationType.DETERMINISTIC)
     assert torch.equal(drawn["action"], drawn["loc"])
+
+
+def grasping(frames: int) -> TrainConfig:
+    return TrainConfig(observation=ObservationConfig(frames=frames), ppo=PPOConfig(squeeze_together=True))
+
+
+@pytest.mark.parametrize("frames", [1, 3])
+def test_fingers_squeeze_together_once_both_have_touched(frames):
+    """had_contact is the last part, and the newest frame the last: the last two numbers."""
+    policy = shaken(policy_of(grasping(frames), default_gripper()))
+    observation = torch.randn(64, 10 * frames)
+    plain = {}
+    for touched in ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)):
+        observation[:, -2:] = torch.tensor(touched)
+        plain[touched] = act(policy, observation)["loc"]
+        apart = (plain[touched][:, 0] - plain[touched][:, 1]).abs()
+        assert (apart == 0).all() if all(touched) else apart.min() > 1e-5
+    alone = policy[0].module[0].net(observation)
+    torch.testing.assert_close(plain[1.0, 1.0], alone.mean(-1, keepdim=True).expand(-1, 2))
+
+
+def test_fingers_that_squeeze_together_must_see_contact():
+    config = grasping(3)
+    config.observation.parts.remove("had_contact")
+    with pytest.raises(ConfigError, match=r"ppo.squeeze_together: add had_contact to observation.parts"):
+        policy_of(config, default_gripper())
 
 
 @pytest.mark.parametrize(("critic", "inputs"), [("observation", 30), ("privileged", 40)])

@@ -15,6 +15,7 @@ from torchrl.objectives.value import GAE
 from forcegrasp.config import TrainConfig
 from forcegrasp.physics.gripper import Gripper
 from forcegrasp.train.algorithms.base import Algorithm, part_of
+from forcegrasp.train.algorithms.teacher import Teacher, imitation_loss
 from forcegrasp.train.algorithms.value_network import Value, make_value
 
 #: What an update reports, by the names of torchrl's loss.
@@ -66,9 +67,13 @@ class PPO(Algorithm):
         self.optimizer = torch.optim.Adam(
             [*self.policy.parameters(), *self.value.parameters()], lr=options.learning_rate, eps=1e-5, fused=True
         )
+        self.teacher = Teacher(gripper, options.teacher_feedback) if options.teacher_weight else None
+        self.teacher_weight = options.teacher_weight
 
     def set_progress(self, share: float) -> None:
-        """Lowers the learning rate linearly; ``share`` of the training is over."""
+        """Lowers the learning rate and the teacher's weight linearly; ``share`` of the training is over."""
+        left = 1 - (1 - self.config.teacher_weight_end) * min(max(share, 0.0), 1.0)
+        self.teacher_weight = self.config.teacher_weight * left
         rate = self.config.learning_rate * (1 - (1 - self.config.learning_rate_end) * min(max(share, 0.0), 1.0))
         for group in self.optimizer.param_groups:
             group["lr"] = rate
@@ -79,19 +84,29 @@ class PPO(Algorithm):
         """
         with torch.no_grad():
             self.advantage(batch)
-        frames = batch.select(*self.value.in_keys, "action", "action_log_prob", "advantage", "value_target").reshape(-1)
+            if self.teacher:
+                self.teacher.label(batch)
+        learned = ("action", "action_log_prob", "advantage", "value_target")
+        taught = ("taught_action", "taught_unit") if self.teacher else ()
+        frames = batch.select(*self.value.in_keys, *learned, *taught).reshape(-1)
         advantage = frames["advantage"]
         frames["advantage"] = (advantage - advantage.mean()) / (advantage.std() + 1e-8)
-        sums = dict.fromkeys(DIAGNOSTICS, torch.zeros(()))
+        reported = (*DIAGNOSTICS, "loss_teacher") if self.teacher else DIAGNOSTICS
+        sums = dict.fromkeys(reported, torch.zeros(()))
         updates = 0
         for _ in range(self.config.epochs):
             order = torch.randperm(len(frames), generator=self.shuffle, device=self.shuffle.device)
             for ids in order.split(self.config.minibatch):
-                losses = self.loss(frames[ids])
+                minibatch = frames[ids]
+                losses = self.loss(minibatch)
                 # value errors in units of the horizon: in units of reward they would drown the policy's
                 objective = losses["loss_objective"] + losses["loss_critic"] / self.horizon**2
                 if self.config.entropy_weight:
                     objective = objective + losses["loss_entropy"]
+                if self.teacher:
+                    action = self.policy[0](minibatch.select("observation"))["loc"]
+                    losses["loss_teacher"] = imitation_loss(action, minibatch)
+                    objective = objective + self.teacher_weight * losses["loss_teacher"]
                 self.optimizer.zero_grad(set_to_none=True)
                 objective.backward()
                 for net in (self.policy, self.value):

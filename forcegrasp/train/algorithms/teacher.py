@@ -1,0 +1,42 @@
+"""A teacher that knows the object, for a student that can only feel it: kickstarting (Schmitt et al. 2018)."""
+
+from __future__ import annotations
+
+import torch
+from tensordict import TensorDictBase
+from torch import Tensor
+
+from forcegrasp.controllers.reference import InformedFeedForward
+from forcegrasp.physics.gripper import Gripper
+
+
+class Teacher:
+    """What ``informed`` would have done in the states that a student met, corrected by the true forces.
+
+    Args:
+      gripper: what grasps.
+      feedback: K; once every reading has shown contact, the action that holds the goal is multiplied by
+        1 + K (1 − f / f_goal), with the mean f of the true forces.
+    """
+
+    def __init__(self, gripper: Gripper, feedback: float) -> None:
+        self.controller, self.feedback = InformedFeedForward(gripper), feedback
+
+    def label(self, batch: TensorDictBase) -> None:
+        """Writes ``taught_action``, and ``taught_unit``, in which its errors are measured, ``(*B, motors)``.
+
+        With all fingers in contact the unit is the action that holds the goal: errors are then those of the force as
+        a fraction of its goal, so that a student in doubt of the stiffness presses gently.
+        """
+        state = batch.select(*self.controller.in_keys)
+        action, goal = self.controller(state)["action"], state["goal_force"]
+        grasped = state["had_contact"].bool().all(-1, keepdim=True)
+        correction = 1 + self.feedback * (1 - batch["force"].mean(-1, keepdim=True) / goal)
+        taught = torch.where(grasped, (action * correction).clamp(-1, 1), action)
+        unit = torch.where(grasped, -self.controller.hold(goal, state["grasp_parameters"]), 1.0)
+        batch.set("taught_action", taught).set("taught_unit", unit.expand_as(action))
+
+
+def imitation_loss(action: Tensor, frames: TensorDictBase) -> Tensor:
+    """Mean square of a student's error, in the teacher's units; ``action`` is its mean, ``(*B, motors)``."""
+    return ((action - frames["taught_action"]) / frames["taught_unit"]).square().sum(-1).mean()
