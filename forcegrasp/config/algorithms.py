@@ -29,6 +29,9 @@ class AlgorithmConfig:
         True,
         "average the policy with its mirror image where the gripper is its own, so that it treats both fingers alike",
     )
+    incremental: bool = option(
+        False, "the policy's mean is the last action plus the network's output, which makes it exact at rest"
+    )
     squeeze_together: bool = option(
         False,
         "all motors get the mean of their actions once every reading has shown contact, as with force_pi",
@@ -69,4 +72,7 @@ class PPOConfig(AlgorithmConfig):
     teacher_weight_end: float = option(0.0, "what is left of it at the end, linearly, as a fraction", low=0, high=1)
     teacher_feedback: float = option(
         0.5, "by how much of the relative force error the teacher corrects its command", low=0, high=10
+    )
+    teacher_caution: float = option(
+        1.0, "how many times more it costs to close harder than the teacher than to close less", low=1, high=1000
     )

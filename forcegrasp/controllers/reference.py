@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import torch
 from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
@@ -43,7 +45,8 @@ class InformedFeedForward(TensorDictModuleBase):
 
     def hold(self, goal: Tensor, parameters: Tensor) -> Tensor:
         """The action whose force is the goal at rest, ``(*B, 1)``, from the goal and what is known of the grasp."""
-        return (-goal / (self.reached.max_force_n * self.reached.force_scale(parameters[..., :1]))).clamp(-1, 1)
+        kappa: Any = parameters[..., :1]
+        return (-goal / (self.reached.max_force_n * self.reached.force_scale(kappa))).clamp(-1, 1)
 
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
         touched, goal, parameters = (tensordict.get(key) for key in self.in_keys)

@@ -105,7 +105,7 @@ class PPO(Algorithm):
                     objective = objective + losses["loss_entropy"]
                 if self.teacher:
                     action = self.policy[0](minibatch.select("observation"))["loc"]
-                    losses["loss_teacher"] = imitation_loss(action, minibatch)
+                    losses["loss_teacher"] = imitation_loss(action, minibatch, self.config.teacher_caution)
                     objective = objective + self.teacher_weight * losses["loss_teacher"]
                 self.optimizer.zero_grad(set_to_none=True)
                 objective.backward()

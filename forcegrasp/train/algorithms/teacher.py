@@ -29,14 +29,21 @@ class Teacher:
         a fraction of its goal, so that a student in doubt of the stiffness presses gently.
         """
         state = batch.select(*self.controller.in_keys)
-        action, goal = self.controller(state)["action"], state["goal_force"]
-        grasped = state["had_contact"].bool().all(-1, keepdim=True)
-        correction = 1 + self.feedback * (1 - batch["force"].mean(-1, keepdim=True) / goal)
+        action, goal, force = self.controller(state)["action"], state["goal_force"], batch["force"]
+        grasped = state.get("had_contact").bool().all(-1, keepdim=True)
+        correction = 1 + self.feedback * (1 - force.mean(-1, keepdim=True) / goal)
         taught = torch.where(grasped, (action * correction).clamp(-1, 1), action)
         unit = torch.where(grasped, -self.controller.hold(goal, state["grasp_parameters"]), 1.0)
         batch.set("taught_action", taught).set("taught_unit", unit.expand_as(action))
 
 
-def imitation_loss(action: Tensor, frames: TensorDictBase) -> Tensor:
-    """Mean square of a student's error, in the teacher's units; ``action`` is its mean, ``(*B, motors)``."""
-    return ((action - frames["taught_action"]) / frames["taught_unit"]).square().sum(-1).mean()
+def imitation_loss(action: Tensor, frames: TensorDictBase, caution: float = 1.0) -> Tensor:
+    """Mean square of a student's error, in the teacher's units.
+
+    Args:
+      action: the student's mean, ``(*B, motors)``.
+      frames: as :meth:`Teacher.label` left them.
+      caution: how many times more it costs to close harder than the teacher than to close less (an expectile).
+    """
+    error = (action - frames["taught_action"]) / frames["taught_unit"]
+    return (torch.where(error < 0, caution, 1.0) * error.square()).sum(-1).mean()
