@@ -29,9 +29,6 @@ class AlgorithmConfig:
         True,
         "average the policy with its mirror image where the gripper is its own, so that it treats both fingers alike",
     )
-    incremental: bool = option(
-        False, "the policy's mean is the last action plus the network's output, which makes it exact at rest"
-    )
     squeeze_together: bool = option(
         False,
         "all motors get the mean of their actions once every reading has shown contact, as with force_pi",
@@ -74,5 +71,5 @@ class PPOConfig(AlgorithmConfig):
         0.5, "by how much of the relative force error the teacher corrects its command", low=0, high=10
     )
     teacher_caution: float = option(
-        1.0, "how many times more it costs to close harder than the teacher than to close less", low=1, high=1000
+        0.0, "weight of the square of what is closed harder than the teacher by, beyond a tenth", low=0, high=1000
     )

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from itertools import accumulate
-from types import MappingProxyType
 from typing import cast
 
 import torch
@@ -46,26 +45,6 @@ class Mirrored(nn.Module):
         return (own + mirrored.flip(-1)) / 2
 
 
-class Incremental(nn.Module):
-    """Adds a network's output to the last action, which holds a force without having to learn its action exactly.
-
-    Args:
-      net: ``(*B, size) -> (*B, motors)``.
-      last_action: where the observation has ``last_action`` in its newest frame.
-    """
-
-    last_action: Tensor
-
-    def __init__(self, net: nn.Module, last_action: Sequence[int]) -> None:
-        super().__init__()
-        self.net = net
-        self.register_buffer("last_action", torch.tensor(last_action), persistent=False)
-
-    def forward(self, observation: Tensor) -> Tensor:
-        """All actions, ``(*B, motors)``."""
-        return observation[..., self.last_action] + self.net(observation)
-
-
 class SqueezeTogether(nn.Module):
     """Gives all motors the mean of their actions once every reading has shown contact (as in Lach et al. 2022).
 
@@ -99,24 +78,19 @@ def policy_of(config: TrainConfig, gripper: Gripper) -> ProbabilisticActor:
     """The policy of a training, as it starts.
 
     Raises:
-      ConfigError: if it does not see what an option needs.
+      ConfigError: if its motors are to squeeze together and it can't see when.
     """
     sizes, parts, options = part_sizes(gripper, config.observation), config.observation.parts, config.algorithm
-    newest = {}
-    for option, part in (("incremental", "last_action"), ("squeeze_together", "had_contact")):
-        if getattr(options, option):
-            if part not in parts:
-                raise ConfigError(f"{options.name}.{option}: add {part} to observation.parts")
-            index = len(sizes) - len(parts) + parts.index(part)
-            newest[part] = range(sum(sizes[:index]), sum(sizes[: index + 1]))
-    return make_policy(sizes, options, gripper, newest)
+    if not options.squeeze_together:
+        return make_policy(sizes, options, gripper)
+    if "had_contact" not in parts:
+        raise ConfigError(f"{options.name}.squeeze_together: add had_contact to observation.parts")
+    newest = len(sizes) - len(parts) + parts.index("had_contact")
+    return make_policy(sizes, options, gripper, range(sum(sizes[:newest]), sum(sizes[: newest + 1])))
 
 
 def make_policy(
-    sizes: Sequence[int],
-    config: AlgorithmConfig,
-    gripper: Gripper | None = None,
-    newest: Mapping[str, Sequence[int]] = MappingProxyType({}),
+    sizes: Sequence[int], config: AlgorithmConfig, gripper: Gripper | None = None, contact: Sequence[int] = ()
 ) -> ProbabilisticActor:
     """Reads ``observation`` ``(*B, sum(sizes))``, writes ``action`` ``(*B, motors)`` and ``action_log_prob``.
 
@@ -127,8 +101,7 @@ def make_policy(
       sizes: of the parts of the stacked observation, see :func:`part_sizes`.
       config: size of the network, initial mean and deviation, and whether it is :class:`Mirrored`.
       gripper: how many motors there are, and whether it is its own mirror image; the paper's by default.
-      newest: where the newest frame has ``last_action`` if the policy is to be :class:`Incremental`, and
-        ``had_contact`` if the motors are to :class:`SqueezeTogether`.
+      contact: where the newest frame has ``had_contact``, if the motors are to :class:`SqueezeTogether`.
     """
     gripper = gripper or default_gripper()
     actions = len(gripper.motors)
@@ -137,8 +110,7 @@ def make_policy(
     nn.init.orthogonal_(last.weight, gain=0.01)
     nn.init.constant_(last.bias, config.initial_action)
     mean = Mirrored(net, sizes) if config.mirrored and gripper.is_symmetric else net
-    mean = Incremental(mean, newest["last_action"]) if "last_action" in newest else mean
-    mean = SqueezeTogether(mean, newest["had_contact"]) if "had_contact" in newest else mean
+    mean = SqueezeTogether(mean, contact) if contact else mean
     scale = AddStateIndependentNormalScale(actions, init_value=config.log_std)
     return ProbabilisticActor(
         TensorDictModule(nn.Sequential(mean, scale), in_keys=["observation"], out_keys=["loc", "scale"]),

@@ -110,7 +110,6 @@ TRAIN_CASES: dict[str, Any] = {
     "ppo.log_std": -2.0,
     "ppo.initial_action": -0.8,
     "ppo.mirrored": False,
-    "ppo.incremental": True,
     "ppo.squeeze_together": True,
     "ppo.epochs": 3,
     "ppo.minibatch": 30,

@@ -107,19 +107,10 @@ def test_fingers_squeeze_together_once_both_have_touched(frames):
     torch.testing.assert_close(plain[1.0, 1.0], alone.mean(-1, keepdim=True).expand(-1, 2))
 
 
-def test_an_incremental_policy_starts_from_its_last_action():
-    """last_action is the last but one pair of five, in the newest of three frames: numbers 26 and 27."""
-    config = TrainConfig(ppo=PPOConfig(incremental=True, mirrored=False))
-    policy, observation = shaken(policy_of(config, default_gripper())), torch.randn(64, 30)
-    step = policy[0].module[0].net(observation)
-    torch.testing.assert_close(act(policy, observation)["loc"], observation[:, 26:28] + step)
-
-
-@pytest.mark.parametrize(("option", "part"), [("squeeze_together", "had_contact"), ("incremental", "last_action")])
-def test_a_policy_must_see_what_its_options_need(option, part):
-    config = TrainConfig(ppo=PPOConfig(**{option: True}))
-    config.observation.parts.remove(part)
-    with pytest.raises(ConfigError, match=rf"ppo.{option}: add {part} to observation.parts"):
+def test_fingers_that_squeeze_together_must_see_contact():
+    config = grasping(3)
+    config.observation.parts.remove("had_contact")
+    with pytest.raises(ConfigError, match=r"ppo.squeeze_together: add had_contact to observation.parts"):
         policy_of(config, default_gripper())
 
 

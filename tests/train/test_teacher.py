@@ -58,9 +58,9 @@ def test_errors_are_those_of_the_force_as_a_fraction_of_the_goal():
     """A student that is off by 0.1 on a grasp that wants 0.2 is off by a half, twice."""
     frames = TensorDict({"taught_action": torch.tensor([[-0.2, -0.2]]), "taught_unit": torch.full((1, 2), 0.2)}, [1])
     assert float(imitation_loss(torch.tensor([[-0.3, -0.1]]), frames)) == pytest.approx(0.5)
-    # one of the two closes harder, and only that counts more
-    assert float(imitation_loss(torch.tensor([[-0.3, -0.1]]), frames, caution=3.0)) == pytest.approx(0.25 * 3 + 0.25)
-    assert float(imitation_loss(torch.tensor([[-0.1, -0.1]]), frames, caution=3.0)) == pytest.approx(0.5)
+    # one of the two closes harder, and only what it does so beyond a tenth counts more
+    assert float(imitation_loss(torch.tensor([[-0.3, -0.1]]), frames, caution=3.0)) == pytest.approx(0.5 + 3 * 0.4**2)
+    assert float(imitation_loss(torch.tensor([[-0.21, -0.1]]), frames, caution=3.0)) == pytest.approx(0.05**2 + 0.25)
 
 
 def test_a_student_comes_near_its_teacher(tiny):

@@ -9,6 +9,9 @@ from torch import Tensor
 from forcegrasp.controllers.reference import InformedFeedForward
 from forcegrasp.physics.gripper import Gripper
 
+#: By how much a cautious student may close harder than its teacher at no further cost: noise must not make it let go.
+FREE = 0.1
+
 
 class Teacher:
     """What ``informed`` would have done in the states that a student met, corrected by the true forces.
@@ -37,13 +40,13 @@ class Teacher:
         batch.set("taught_action", taught).set("taught_unit", unit.expand_as(action))
 
 
-def imitation_loss(action: Tensor, frames: TensorDictBase, caution: float = 1.0) -> Tensor:
+def imitation_loss(action: Tensor, frames: TensorDictBase, caution: float = 0.0) -> Tensor:
     """Mean square of a student's error, in the teacher's units.
 
     Args:
       action: the student's mean, ``(*B, motors)``.
       frames: as :meth:`Teacher.label` left them.
-      caution: how many times more it costs to close harder than the teacher than to close less (an expectile).
+      caution: weight of the square of what a student closes harder by than the teacher, beyond ``FREE``.
     """
     error = (action - frames["taught_action"]) / frames["taught_unit"]
-    return (torch.where(error < 0, caution, 1.0) * error.square()).sum(-1).mean()
+    return (error.square() + caution * (-error - FREE).clamp_min(0).square()).sum(-1).mean()
