@@ -137,10 +137,28 @@ def test_no_curriculum_differs_from_ib_in_the_curriculum_alone():
     assert changed(train("experiment=ib"), train("experiment=no_curriculum")) == {"curriculum.enabled": False}
 
 
-def test_recommended_differs_from_ib_in_reward_form_and_waiting():
-    assert changed(train("experiment=ib"), train("experiment=recommended")) == {
+def test_ib_tuned_differs_from_ib_in_reward_form_and_waiting():
+    assert changed(train("experiment=ib"), train("experiment=ib_tuned")) == {
         "reward.form": "goal_normalised",
         "action.bias_one_contact": 0.0,
+    }
+
+
+def test_recommended_differs_from_ib_in_what_its_file_says():
+    assert changed(train("experiment=ib"), train("experiment=recommended")) == {
+        "observation.frames": 10,
+        "action.bias_one_contact": 0.0,
+        "action.bias_floor": 1.0,
+        "reward.form": "goal_normalised",
+        "reward.overshoot_weight": 1.0,
+        "curriculum.enabled": False,
+        "ppo.grasps": 128,
+        "ppo.minibatch": 256,
+        "ppo.hidden": [100, 100],
+        "ppo.log_std": -2.0,
+        "ppo.squeeze_together": True,
+        "ppo.teacher_weight": 100.0,
+        "ppo.teacher_caution": 1.0,
     }
 
 

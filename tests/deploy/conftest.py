@@ -36,7 +36,8 @@ def make_run(tmp_path_factory) -> Make:
             for tensor in policy.parameters():  # much of [-1, 1], and beyond
                 tensor.normal_(0.0, 0.4)
             mirrored = config.ppo.mirrored and gripper.is_symmetric
-            policy[0].module[0].get_submodule("net" if mirrored else "")[-1].bias.fill_(-1.0)
+            wrappers = ["net"] * (mirrored + config.ppo.squeeze_together)
+            policy[0].module[0].get_submodule(".".join(wrappers))[-1].bias.fill_(-1.0)
         run = RunDir.create(tmp_path_factory.mktemp("deploy") / "run", config, [])
         run.save(0, {f"policy.{name}": tensor for name, tensor in policy.state_dict().items()}, {}, keep=1)
         return run.path, config

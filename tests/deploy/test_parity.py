@@ -38,6 +38,7 @@ VARIANTS = {
         "observation": ObservationConfig(["force_error", "had_contact"], 2),
     },
     "not mirrored": {"ppo": PPOConfig(hidden=[8, 8], mirrored=False)},
+    "fingers that squeeze together": {"ppo": PPOConfig(hidden=[8, 8], squeeze_together=True)},
 } | {name: {"gripper": name, "grasp": GraspConfig()} for name in [*shipped_grippers(), "one_sensor"]}
 
 

@@ -85,9 +85,9 @@ def test_what_was_learned_is_told_and_drawn(tmp_path, capsys):
 
 
 def test_our_training_tells_of_each_batch(monkeypatch):
-    config = learning.recommended("fast")
+    config = learning.tuned("fast")
     config.ppo.grasps, config.ppo.total_frames = 2, 3 * STEPS
-    monkeypatch.setattr(learning, "recommended", lambda tier: config)
+    monkeypatch.setattr(learning, "tuned", lambda tier: config)
     told = []
     learning.ours("fast", 1, lambda frames, reward: told.append((frames, reward)))
     assert [frames for frames, _ in told] == [2 * STEPS, 4 * STEPS]

@@ -1,4 +1,4 @@
-"""Trainings on the recommended experiment, each reporting how its training episodes went, batch by batch.
+"""Trainings on the experiment ib_tuned, each reporting how its training episodes went, batch by batch.
 
 Both have the same problem, curriculum and number of frames to anneal it over; the reward is the normalised form,
 mean of the episodes of a batch, actions explored.
@@ -23,11 +23,11 @@ if TYPE_CHECKING:
 Report = Callable[[int, float], None]
 
 
-def recommended(tier: str) -> TrainConfig:
-    """What ``forcegrasp train experiment=recommended`` trains."""
+def tuned(tier: str) -> TrainConfig:
+    """What ``forcegrasp train experiment=ib_tuned`` trains."""
     from forcegrasp.cli.options import compose
 
-    return compose("train", ["experiment=recommended", f"physics={tier}"])
+    return compose("train", ["experiment=ib_tuned", f"physics={tier}"])
 
 
 def ours(tier: str, grasps: int, report: Report) -> None:
@@ -35,7 +35,7 @@ def ours(tier: str, grasps: int, report: Report) -> None:
     from forcegrasp.env.episodes import summarise
     from forcegrasp.train.loop import Trainer
 
-    trainer = Trainer(config := recommended(tier))
+    trainer = Trainer(config := tuned(tier))
     total, batches = config.ppo.total_frames, iter(trainer.collector)
     while trainer.frames < total:
         trainer.prepare()
@@ -58,7 +58,7 @@ def sb3(tier: str, grasps: int, report: Report, closing: bool) -> None:
 
     from forcegrasp.curriculum.schedule import LinearSchedule
 
-    config = recommended(tier)
+    config = tuned(tier)
     schedule = LinearSchedule(config.curriculum, config.grasp, config.reward, config.ppo.total_frames)
     envs = sb3_envs([partial(PlainGrasp, config, seed) for seed in range(grasps)], PlainGrasp.__module__)
 
