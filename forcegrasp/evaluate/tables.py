@@ -35,6 +35,8 @@ METRICS = (
     ("lost_percent", "lost (not held throughout the last second), % of the grasps", 1),
 )
 _BY_CELL = 7
+#: Metrics that are 0 or 100, of which quantiles say nothing.
+SHARES = ("crushed_percent", "lost_percent")
 #: Columns of a terminal in which numbers of the short table need not be folded.
 NARROW = 80
 
@@ -101,7 +103,7 @@ def sheets(report: dict) -> Iterator[Sheet]:
         "mean ± half of its 95 % interval; median; 95th percentile, each with its 95 % interval",
         ["figure", *names],
         [
-            [heading, *(_spread(policies[name][metric], digits) for name in names)]
+            [heading, *(_spread(policies[name][metric], digits, metric in SHARES) for name in names)]
             for metric, heading, digits in shown
             if not metric.endswith(("_normalised", "_paper", "_measured"))
         ],
@@ -151,10 +153,10 @@ def _overall(found: dict, digits: int) -> str:
     )
 
 
-def _spread(found: dict, digits: int) -> str:
+def _spread(found: dict, digits: int, share: bool) -> str:
     quantiles = (
         f"{found[name]:.{digits}f} [{found[f'{name}_low']:.{digits}f}, {found[f'{name}_high']:.{digits}f}]"
-        for name in QUANTILES
+        for name in (() if share else QUANTILES)
     )
     return "\n".join((half_interval(found, digits), *quantiles))
 

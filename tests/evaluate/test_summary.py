@@ -96,6 +96,7 @@ def test_medians_and_percentiles_are_told_in_the_units_of_the_metric():
     found = report["policies"]["ib"]["peak_force_n"]
     told = [sheet for sheet in sheets(report) if "95th percentile" in sheet.title]
     row = next(row for row in told[0].rows if row[0] == "peak force, N")
+    assert all(len(cell.splitlines()) == 1 for row in told[0].rows if row[0].startswith("crushed") for cell in row)
     mean, median, percentile = row[1].splitlines()
     assert mean.startswith(f"{found['mean']:.3f} ± ")
     assert median == f"{found['median']:.3f} [{found['median_low']:.3f}, {found['median_high']:.3f}]"
