@@ -47,12 +47,18 @@ class TrainConfig:
         return self.ppo
 
     def check(self, path: str) -> None:
-        """Refuses objects squeezed flat, a model on an engine without effects, and shares that workers can't have."""
+        """Refuses objects squeezed flat, models that engine or teacher can't have, and shares that workers can't."""
         check_no_effects(self.model, self.physics, f"{path}model={self.model}")
         check_deformation(self.grasp.deformation_m, self.curriculum.radius_m, f"{path}curriculum.radius_m")
         if self.collector.kind == "ray" and self.physics.device != "cpu":
             device = f"{path}physics.device={self.physics.device}"
             raise ConfigError(f"{device}: Ray's workers have no GPU; use collector=direct")
+        if self.model and self.ppo.teacher_weight:
+            option = f"{path}ppo.teacher_weight"
+            raise ConfigError(
+                f"{option}={self.ppo.teacher_weight:g}: the teacher knows the nominal gripper alone; with model= train"
+                f" experiment=ib_tuned, or add {option}=0"
+            )
         grasps, workers, name = self.algorithm.grasps, self.collector.workers, self.algorithm.name
         if grasps % workers:
             raise ConfigError(

@@ -44,7 +44,6 @@ TINY_TRAINING = TINY_GRASP | {
     "ppo.log_std": -1.0,
     "ppo.value_weight": 10.0,  # lest its gradient stays below the largest norm
     "curriculum.end_fraction": 1.0,
-    "ppo.teacher_weight": 0.5,  # that its end and its feedback count
     "log.checkpoint_every": 1,
     "log.histograms_every": 0,
     "log.figures_every": 0,
@@ -76,6 +75,9 @@ SHARED_CASES: dict[str, Any] = {
 
 #: They have tests of their own, as they want packages and hardware.
 ELSEWHERE = ("physics.engine", "physics.device")
+
+#: Options that are nothing without a teacher.
+TEACHING = ("ppo.teacher_weight_end", "ppo.teacher_feedback", "ppo.teacher_caution")
 
 #: The same, for the options of training alone.
 TRAIN_CASES: dict[str, Any] = {
@@ -289,7 +291,7 @@ def test_the_same_evaluation_finds_the_same(tmp_path, plain_evaluation, learned)
 
 @pytest.mark.parametrize(
     "name",
-    [n for n in TRAIN_CASES if n not in ("reward.forces", *ELSEWHERE) and not n.startswith("collector.")],
+    [n for n in TRAIN_CASES if n not in ("reward.forces", *TEACHING, *ELSEWHERE) and not n.startswith("collector.")],
 )
 def test_option_of_train(name, tmp_path, plain_training):
     different = trained(tmp_path, **{name: TRAIN_CASES[name]})
@@ -322,6 +324,19 @@ def test_option_of_collecting(name, monkeypatch):
 
     plain = {} if name == "collector.kind" else {"collector.kind": "ray"}
     assert asked(**plain) == asked(**plain) != asked(**plain | {name: TRAIN_CASES[name]})
+
+
+@pytest.mark.parametrize("name", TEACHING)
+def test_option_of_the_teacher(name, tmp_path):
+    taught = {"ppo.teacher_weight": 0.5}
+    plain = trained(tmp_path / "plain", **taught)
+    assert trained(tmp_path / "other", **taught | {name: TRAIN_CASES[name]}) != plain
+
+
+def test_a_teacher_does_not_know_a_model():
+    values = {"model": str(MODEL), "ppo.teacher_weight": 0.5}
+    with pytest.raises(ConfigError, match=r"ppo.teacher_weight=0.5: the teacher knows the nominal gripper alone"):
+        with_options(TrainConfig(), TINY_TRAINING | values)
 
 
 def test_forces_that_the_reward_judges_differ_with_a_model(tmp_path):
