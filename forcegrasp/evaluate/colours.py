@@ -9,6 +9,7 @@ from matplotlib.colors import to_hex, to_rgb
 
 #: Controllers, and policies that come with the package (Okabe and Ito's colours, distinct to the colour-blind).
 KNOWN = {
+    "recommended": "#7b2cbf",
     "ib": "#0072b2",
     "no_ib": "#d55e00",
     "no_rand": "#009e73",

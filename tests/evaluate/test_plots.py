@@ -36,7 +36,8 @@ def episodes() -> TensorDict:
         "grasp_parameters": torch.tensor([0.5, -9.0, 0.02, 0.001, GOAL_N]).expand(2, STEPS, 5),
     }
     terms = {name: torch.zeros(2, STEPS, 1) for name in ("force_normalised", "force_paper", "object", "action")}
-    now = {"force": force, "sensed_force": force, "measured_force": force, "reward_terms": terms, **rest}
+    held = {name: torch.zeros(2, STEPS, 2) for name in ("joint_position", "commanded_position")}
+    now = {"force": force, "sensed_force": force, "measured_force": force, "reward_terms": terms, **rest, **held}
     return TensorDict({**now, "next": now}, batch_size=(2, STEPS))
 
 
