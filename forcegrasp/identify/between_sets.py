@@ -62,9 +62,6 @@ class SetFit(ShortRepr):
         """Standard errors of the coordinates, ``(p,)``, as :func:`~forcegrasp.identify.intervals.standard_errors`."""
         return np.sqrt(self.chance**2 + np.sum(self.shifts**2, axis=0))
 
-    def summary(self) -> str:
-        return f"{self.name}: error {self.error:.2f} × noise"
-
 
 @dataclass(frozen=True, repr=False)
 class Between(ShortRepr):
@@ -93,9 +90,6 @@ class Between(ShortRepr):
         """The value of all sets; None if there is none, for two differ, or it can't be told."""
         alike = self.agreement is Agreement.SHARED or (self.spread is not None and not self.reason)
         return self.mean if alike else None
-
-    def summary(self) -> str:
-        return f"{self.name}: {self.agreement}, p {self.p_corrected:.2g}"
 
 
 @dataclass(frozen=True, repr=False)
