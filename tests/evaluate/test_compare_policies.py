@@ -279,6 +279,21 @@ def test_shipped_policies_work_by_name(name):
     assert episodes["next", "force"].any()
 
 
+def test_recommended_is_gentle_and_ib_is_not(tmp_path, undrawn):
+    """Who crushes: docs/results.md has 0.1 % and 41 % of 2,200 grasps."""
+    grasp = GraspConfig(steps=100)
+    config = evaluate_config(policies=["recommended", "ib", "force_pi"], kappas=3, trials=12, grasp=grasp)
+    found = evaluate(config, tmp_path / "out", Console(file=io.StringIO()))["policies"]
+    crushed, beyond, moved, reward = (
+        {name: metrics[metric]["mean"] for name, metrics in found.items()}
+        for metric in ("crushed_percent", "overshoot_n", "displacement_total_mm", "force_reward_normalised")
+    )
+    assert crushed["recommended"] <= 100 / 36 < 15 < crushed["ib"]
+    assert beyond["recommended"] < 0.5 * beyond["ib"]
+    assert moved["recommended"] < moved["ib"]
+    assert reward["force_pi"] + 5 < reward["recommended"]
+
+
 def test_many_policies_and_one_softness(tmp_path):
     config = evaluate_config(policies=["force_pi", "informed", "close", "nothing"], kappas=1, trials=2)
     report = evaluate(config, tmp_path / "out", Console(file=io.StringIO()))
