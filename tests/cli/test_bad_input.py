@@ -29,7 +29,7 @@ MISTAKES = [
     (["effects", "backlash", "adhesion"], "one name at a time"),
     # presets
     (["train", "experiment=no_id"], "did you mean no_ib"),
-    (["train", "experiment="], "known: ib, no_curriculum"),
+    (["train", "experiment="], "known: ib, ib_tuned, no_curriculum"),
     (["train", "physics=quick"], "known: fast, reference"),
     (["train", "reward=normalised"], "goal_normalised"),
     (["train", "sensors=noisy"], "authors, paper"),
