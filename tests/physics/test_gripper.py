@@ -232,7 +232,7 @@ BROKEN_VALUES = [
     (f"{_DAMPING}.low", "ten", f"{_DAMPING}.low: must be a number, not ten"),
     (f"{_DAMPING}.high", None, f"{_DAMPING}.high: must be a number, not None"),
     (f"{_DAMPING}.unit", 3, f"{_DAMPING}.unit: must be text, not 3"),
-    (f"{_DAMPING}.scope", "finger", f"{_DAMPING}.scope: must be gripper, object or grasp, not finger"),
+    (f"{_DAMPING}.scope", "finger", f"{_DAMPING}.scope: must be gripper, object, recording or grasp, not finger"),
     (f"{_DAMPING}.writes", [], f"{_DAMPING}.writes: must name a field"),
     (f"{_DAMPING}.writes", "dof_damping", f"{_DAMPING}.writes: must be a list, such as `[dof_damping]`"),
     (f"{_DAMPING}.writes", 3, f"{_DAMPING}.writes: must be a list"),
