@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import itertools
 import shutil
 from pathlib import Path
 
@@ -49,9 +50,9 @@ def study(data: Path, out: Path, splits: int = SPLITS) -> Study:
 def _splits(verbs: Verbs, measured: Path, motions: list[str], out: Path, splits: int) -> list[list[str]]:
     """What each split finds: a table with a row each."""
     rows = [["judged on", "verdict", "found", "or else", "error held out, × noise"]]
-    rng = np.random.default_rng(0)
-    for number in range(splits):
-        judged = sorted(rng.choice(motions, JUDGED, replace=False).tolist())
+    every = list(itertools.combinations(sorted(motions), JUDGED))
+    for number, index in enumerate(np.random.default_rng(0).permutation(len(every))[:splits]):
+        judged = list(every[index])
         split = _split(measured, out / f"split_{number:02d}", judged)
         found = verbs.diagnosis(f"diagnosis_{number:02d}", split)
         steps = found_steps(found)
