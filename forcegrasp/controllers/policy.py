@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from itertools import accumulate
 from typing import cast
@@ -118,3 +119,9 @@ def make_policy(
         distribution_class=IndependentNormal,
         return_log_prob=True,
     )
+
+
+def log_prob(action: Tensor, loc: Tensor, scale: Tensor) -> Tensor:
+    """Logarithm of the density of independent Gaussians, ``(*B, d)`` each, as ``torch.distributions`` computes it."""
+    each = -((action - loc) ** 2) / (2 * scale**2) - scale.log() - math.log(math.sqrt(2 * math.pi))
+    return each.sum(-1)

@@ -25,6 +25,7 @@ from forcegrasp.curriculum import CurriculumHook, CurriculumValues, LinearSchedu
 from forcegrasp.env import GraspEnv, build_env
 from forcegrasp.models.model_file import Model
 from forcegrasp.train import cluster
+from forcegrasp.train.episodes import can_collect, collect
 
 
 class GraspCollector(Collector):
@@ -48,6 +49,15 @@ class GraspCollector(Collector):
         }
         super().__init__(create_env_fn, policy, **plain | options)
         self.curriculum = CurriculumHook(schedule, self.env)
+
+    def iterator(self) -> Iterator[TensorDictBase]:
+        """Batches without end, by :mod:`forcegrasp.train.episodes` where it does the same as the base class."""
+        actor = cast(ProbabilisticActor, self.policy)
+        if not can_collect(self.env, actor):
+            yield from super().iterator()
+        steps = self.frames_per_batch
+        while True:
+            yield collect(cast(TransformedEnv, self.env), actor, steps)
 
     def prepare(self, frames: int, weights: dict[str, Tensor]) -> CurriculumValues:
         """Applies the curriculum after so many frames, and the learner's weights."""

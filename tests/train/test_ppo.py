@@ -7,7 +7,7 @@ import pytest
 import torch
 from scipy.stats import multivariate_normal
 
-from forcegrasp.train.algorithms.ppo import entropy
+from forcegrasp.train.algorithms.ppo import Frames, entropy
 from forcegrasp.train.loop import Trainer
 
 HORIZON_OF = {0.9: 10.0, 0.97: 100 / 3}
@@ -203,11 +203,22 @@ def test_gradients_are_scaled_down(trainer, batch, tiny):
         assert float(norm) == pytest.approx(0.01, rel=1e-3)
 
 
+def spy_on(lookup, seen):
+    """A lookup of minibatches that also notes down whose turn it is."""
+
+    def noted(self, ids):
+        frames = lookup(self, ids)
+        seen.append(frames["action_log_prob"].flatten())
+        return frames
+
+    return noted
+
+
 @pytest.mark.parametrize("minibatch", [32, 60, 120, 10_000])
-def test_every_epoch_sees_every_frame_once(trainer, batch, minibatch):
+def test_every_epoch_sees_every_frame_once(trainer, batch, minibatch, monkeypatch):
     trainer.algorithm.config.minibatch, trainer.algorithm.config.epochs = minibatch, 3
     seen = []
-    trainer.algorithm.loss.register_forward_pre_hook(lambda _, inputs: seen.append(inputs[0]["action_log_prob"]))
+    monkeypatch.setattr(Frames, "__getitem__", spy_on(Frames.__getitem__, seen))
     trainer.algorithm.update(batch)
     per_epoch = -(-120 // minibatch)
     assert len(seen) == 3 * per_epoch
@@ -217,10 +228,10 @@ def test_every_epoch_sees_every_frame_once(trainer, batch, minibatch):
     assert not torch.equal(epochs[0], epochs[1])
 
 
-def test_order_of_frames_comes_from_its_own_generator(trainer, batch):
+def test_order_of_frames_comes_from_its_own_generator(trainer, batch, monkeypatch):
     trainer.algorithm.config.minibatch = 30
     firsts = []
-    trainer.algorithm.loss.register_forward_pre_hook(lambda _, inputs: firsts.append(inputs[0]["action_log_prob"]))
+    monkeypatch.setattr(Frames, "__getitem__", spy_on(Frames.__getitem__, firsts))
     before = torch.get_rng_state()
     trainer.algorithm.shuffle.manual_seed(1)
     trainer.algorithm.update(batch)

@@ -3,23 +3,65 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import ClassVar, cast
 
 import torch
+from jaxtyping import Float
 from tensordict import TensorDictBase
+from tensordict.nn import TensorDictModule
+from tensordict.utils import NestedKey
 from torch import Tensor, nn
 from torchrl.envs import TransformedEnv
-from torchrl.objectives import ClipPPOLoss
 from torchrl.objectives.value import GAE
 
 from forcegrasp.config import TrainConfig
+from forcegrasp.controllers.policy import log_prob
 from forcegrasp.physics.gripper import Gripper
 from forcegrasp.train.algorithms.base import Algorithm, part_of
 from forcegrasp.train.algorithms.teacher import Teacher, imitation_loss
 from forcegrasp.train.algorithms.value_network import Value, make_value
 
-#: What an update reports, by the names of torchrl's loss.
-DIAGNOSTICS = ("loss_objective", "loss_critic", "kl_approx", "clip_fraction", "ESS")
+
+def clipped_loss(log_ratio: Float[Tensor, " n"], advantage: Float[Tensor, " n"], clip: float) -> dict[str, Tensor]:
+    """The clipped surrogate (Schulman et al. 2017, eq. 7) and its diagnostics, as torchrl's ``ClipPPOLoss`` has them.
+
+    Its tensordicts, and modules with parameters put into them, take three times as long as these few numbers.
+
+    Args:
+      log_ratio: logarithm of the probability of each action now over that when it was taken.
+      advantage: of each action.
+      clip: ε.
+    """
+    clipped = log_ratio.clamp(math.log1p(-clip), math.log1p(clip))
+    gain = torch.minimum(log_ratio.exp() * advantage, clipped.exp() * advantage)
+    with torch.no_grad():
+        effective = (2 * log_ratio.logsumexp(0) - (2 * log_ratio).logsumexp(0)).exp() / len(log_ratio)
+        share = (clipped != log_ratio).float().mean()
+        divergence = -log_ratio.mean()
+    return {"loss_objective": -gain.mean(), "kl_approx": divergence, "clip_fraction": share, "ESS": effective}
+
+
+class Frames:
+    """Entries ``(*B, d)`` of a batch as rows of one matrix, so that a minibatch is one lookup.
+
+    Args:
+      batch: where they are.
+      keys: which.
+    """
+
+    def __init__(self, batch: TensorDictBase, keys: Sequence[NestedKey]) -> None:
+        entries = [batch.get(key) for key in keys]
+        entries = [e.unsqueeze(-1) if e.ndim == batch.ndim else e for e in entries]
+        self.sizes = {key: entry.shape[-1] for key, entry in zip(keys, entries, strict=True)}
+        self.rows = torch.cat(entries, -1).flatten(0, -2)
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def __getitem__(self, ids: Tensor) -> dict[NestedKey, Tensor]:
+        """Entries ``(len(ids), d)`` of these frames."""
+        return dict(zip(self.sizes, self.rows[ids].split(list(self.sizes.values()), -1), strict=True))
 
 
 def entropy(scale: Tensor) -> Tensor:
@@ -54,16 +96,6 @@ class PPO(Algorithm):
         self.value = make_value(size, options, gripper).to(env.device)
         self.shuffle = torch.Generator(env.device).manual_seed(config.seed)
         self.advantage = GAE(gamma=options.discount, lmbda=options.gae_lambda, value_network=self.value)
-        self.loss = ClipPPOLoss(
-            self.policy,
-            self.value,
-            clip_epsilon=options.clip,
-            entropy_bonus=options.entropy_weight > 0,
-            entropy_coeff=options.entropy_weight,
-            critic_coeff=options.value_weight,
-            loss_critic_type="l2",
-            normalize_advantage=False,
-        )
         self.optimizer = torch.optim.Adam(
             [*self.policy.parameters(), *self.value.parameters()], lr=options.learning_rate, eps=1e-5, fused=True
         )
@@ -79,47 +111,58 @@ class PPO(Algorithm):
             group["lr"] = rate
 
     def update(self, batch: TensorDictBase) -> dict[str, float]:
-        """Improves both networks on a batch ``(n, T)`` of whole episodes; returns means of the loss's diagnostics, the
-        learning rate, and standard deviation and entropy of the policy that collected.
+        """Improves both networks on a batch ``(n, T)`` of whole episodes; returns means of the losses and of what tells
+        how they go, the learning rate, and standard deviation and entropy of the policy that collected.
         """
         with torch.no_grad():
             self.advantage(batch)
             if self.teacher:
                 self.teacher.label(batch)
-        learned = ("action", "action_log_prob", "advantage", "value_target")
-        taught = ("taught_action", "taught_unit") if self.teacher else ()
-        frames = batch.select(*self.value.in_keys, *learned, *taught).reshape(-1)
-        advantage = frames["advantage"]
-        frames["advantage"] = (advantage - advantage.mean()) / (advantage.std() + 1e-8)
-        reported = (*DIAGNOSTICS, "loss_teacher") if self.teacher else DIAGNOSTICS
-        sums = dict.fromkeys(reported, torch.zeros(()))
+        advantage = batch["advantage"]
+        batch["advantage"] = (advantage - advantage.mean()) / (advantage.std() + 1e-8)
+        frames = Frames(batch, self._read())
+        sums: dict[str, Tensor] = {}
         updates = 0
         for _ in range(self.config.epochs):
             order = torch.randperm(len(frames), generator=self.shuffle, device=self.shuffle.device)
             for ids in order.split(self.config.minibatch):
-                minibatch = frames[ids]
-                losses = self.loss(minibatch)
-                # value errors in units of the horizon: in units of reward they would drown the policy's
-                objective = losses["loss_objective"] + losses["loss_critic"] / self.horizon**2
-                if self.config.entropy_weight:
-                    objective = objective + losses["loss_entropy"]
-                if self.teacher:
-                    action = self.policy[0](minibatch.select("observation"))["loc"]
-                    losses["loss_teacher"] = imitation_loss(action, minibatch, self.config.teacher_caution)
-                    objective = objective + self.teacher_weight * losses["loss_teacher"]
+                objective, told = self._losses(frames[ids])
                 self.optimizer.zero_grad(set_to_none=True)
                 objective.backward()
                 for net in (self.policy, self.value):
                     nn.utils.clip_grad_norm_(net.parameters(), self.config.max_grad_norm)
                 self.optimizer.step()
                 updates += 1
-                sums = {name: total + losses[name].detach() for name, total in sums.items()}
+                sums = {name: sums.get(name, 0) + value.detach() for name, value in told.items()}
         return {
             **{name: float(total) / updates for name, total in sums.items()},
             "learning_rate": self.optimizer.param_groups[0]["lr"],
             "action_std": float(batch["scale"].mean()),
             "entropy": float(entropy(batch["scale"])),
         }
+
+    def _read(self) -> tuple[NestedKey, ...]:
+        """The entries of a batch that an update reads."""
+        learned = ("action", "action_log_prob", "advantage", "value_target")
+        taught = ("taught_action", "taught_unit") if self.teacher else ()
+        return tuple(dict.fromkeys(("observation", *self.value.in_keys, *learned, *taught)))
+
+    def _losses(self, frames: dict[NestedKey, Tensor]) -> tuple[Tensor, dict[str, Tensor]]:
+        """What a gradient step lowers on a minibatch, and its parts and diagnostics."""
+        options = self.config
+        loc, scale = cast(TensorDictModule, self.policy[0]).module(frames["observation"])
+        value = self.value.module(*(frames[key] for key in self.value.in_keys))
+        log_ratio = log_prob(frames["action"], loc, scale) - frames["action_log_prob"].squeeze(-1)
+        told = clipped_loss(log_ratio, frames["advantage"].squeeze(-1), options.clip)
+        told["loss_critic"] = options.value_weight * (value - frames["value_target"]).square().mean()
+        # value errors in units of the horizon: in units of reward they would drown the policy's
+        objective = told["loss_objective"] + told["loss_critic"] / self.horizon**2
+        if options.entropy_weight:
+            objective = objective - options.entropy_weight * entropy(scale)
+        if self.teacher:
+            told["loss_teacher"] = imitation_loss(loc, frames, options.teacher_caution)
+            objective = objective + self.teacher_weight * told["loss_teacher"]
+        return objective, told
 
     def state_dict(self) -> dict[str, Tensor]:
         tensors = super().state_dict() | {f"value.{k}": v for k, v in self.value.state_dict().items()}

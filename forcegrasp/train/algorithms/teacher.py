@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 import torch
 from tensordict import TensorDictBase
 from torch import Tensor
@@ -40,7 +43,7 @@ class Teacher:
         batch.set("taught_action", taught).set("taught_unit", unit.expand_as(action))
 
 
-def imitation_loss(action: Tensor, frames: TensorDictBase, caution: float = 0.0) -> Tensor:
+def imitation_loss(action: Tensor, frames: Mapping[Any, Tensor] | TensorDictBase, caution: float = 0.0) -> Tensor:
     """Mean square of a student's error, in the teacher's units.
 
     Args:
