@@ -215,6 +215,11 @@ class CollectorConfig:
         "Ray cluster to use. local: one of this machine, for this run alone. auto: the one that this machine is in",
         choices=("local", "auto"),
     )
+    ahead: bool = option(
+        True,
+        "collect the next batch while the last one is learned from, by the policy before that update, so that no core"
+        " waits; false: by the newest policy",
+    )
 
     def check(self, path: str) -> None:
         """Refuses what only Ray has without it."""

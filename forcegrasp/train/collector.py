@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
+import copy
 import dataclasses
 import functools
 import sys
+import time
 import warnings
 from collections.abc import Iterator
-from contextlib import contextmanager
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any, cast
 
 import numpy as np
@@ -20,12 +23,15 @@ from torchrl.envs import TransformedEnv
 from torchrl.envs.transforms import Transform
 from torchrl.modules import ProbabilisticActor
 
-from forcegrasp.config import TrainConfig
+from forcegrasp.config import CollectorConfig, TrainConfig
 from forcegrasp.curriculum import CurriculumHook, CurriculumValues, LinearSchedule
 from forcegrasp.env import GraspEnv, build_env
 from forcegrasp.models.model_file import Model
 from forcegrasp.train import cluster
 from forcegrasp.train.episodes import can_collect, collect
+
+#: How a checkpoint names the weights that the batch after it was begun with.
+COLLECTING = "collecting."
 
 
 class GraspCollector(Collector):
@@ -132,6 +138,7 @@ def make_collector(
       ConfigError: if Ray is not installed, does not answer or has no room.
     """
     if config.collector.kind == "direct":
+        policy = copy.deepcopy(policy) if config.collector.ahead else policy
         return GraspCollector(env, policy, schedule=schedule, frames_per_batch=frames_per_batch)
     cluster.join(config)
     # weights travel with the curriculum, by Ray: torch's own way needs host names that every machine resolves
@@ -168,22 +175,62 @@ def _as_one(batch: TensorDictBase) -> TensorDictBase:
     return batch.flatten(0, 1)
 
 
-@contextmanager
-def collecting(collector: GraspCollector | RayCollector) -> Iterator[Iterator[TensorDictBase]]:
-    """Yields batches ``(grasps, T)`` without end; ends the collector afterwards, and Ray with it.
+class NextBatch:
+    """The batch that comes next. With ``ahead`` a thread collects it while the one before is learned from.
+
+    Args:
+      collector: who collects it.
+      config: how many workers that has, and whether they collect ahead.
+
+    Attributes:
+      begun: every generator's state and the policy's weights as it was begun, as tensors and as JSON; None before.
+    """
+
+    def __init__(self, collector: GraspCollector | RayCollector, config: CollectorConfig) -> None:
+        self.collector, self.config = collector, config
+        self.begun: tuple[dict[str, Tensor], dict[str, Any]] | None = None
+        self._thread = ThreadPoolExecutor(1, initializer=torch.set_num_threads, initargs=(1,))
+        self._batches: Iterator[TensorDictBase] | None = None
+
+    def begin(self, frames: int, weights: dict[str, Tensor]) -> None:
+        """Begins it, after so many frames; all workers act with these weights."""
+        weights = {name: value.clone() for name, value in weights.items()}
+        tensors, facts = random_states(self.collector)
+        self.begun = tensors | {COLLECTING + name: value for name, value in weights.items()}, facts
+        self._values = self.collector.map_fn("prepare", [(frames, weights)] * self.config.workers)[0]
+        self._collected = self._thread.submit(self._collect) if self.config.ahead else None
+
+    def get(self) -> tuple[TensorDictBase, CurriculumValues, float]:
+        """Waits for it; returns it, the curriculum's values in it, and how many seconds it took to collect."""
+        batch, seconds = self._collected.result() if self._collected else self._collect()
+        self.begun = None
+        return batch, self._values, seconds
+
+    def end(self) -> None:
+        """Waits until nothing collects."""
+        self._thread.shutdown()
+
+    def _collect(self) -> tuple[TensorDictBase, float]:
+        started = time.perf_counter()
+        self._batches = self._batches or iter(self.collector)
+        return next(self._batches), time.perf_counter() - started
+
+
+@contextlib.contextmanager
+def collecting(batches: NextBatch) -> Iterator[None]:
+    """Ends the collector afterwards, and Ray with it.
 
     Raises:
       ForcegraspError: of a worker as of this process; and if a worker is lost.
     """
+    direct = isinstance(batches.collector, GraspCollector)
     try:
-        if isinstance(collector, GraspCollector):
-            yield iter(collector)
-        else:
-            with cluster.translate_ray_errors():
-                yield iter(collector)
+        with contextlib.nullcontext() if direct else cluster.translate_ray_errors():
+            yield
     finally:
-        collector.shutdown()
-        if not isinstance(collector, GraspCollector):
+        batches.end()
+        batches.collector.shutdown()
+        if not direct:
             cluster.find_ray().shutdown()
 
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import torch
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+from tensordict import TensorDictBase
 from torch import Tensor
 from torchrl.envs import TransformedEnv
 from torchrl.modules import ProbabilisticActor
@@ -22,7 +23,16 @@ from forcegrasp.physics import load_gripper
 from forcegrasp.physics.completion import complete
 from forcegrasp.runs.run_dir import RunDir
 from forcegrasp.train.algorithms import algorithm_of
-from forcegrasp.train.collector import collecting, make_collector, random_states, set_random_states, training_env
+from forcegrasp.train.algorithms.base import part_of
+from forcegrasp.train.collector import (
+    COLLECTING,
+    NextBatch,
+    collecting,
+    make_collector,
+    random_states,
+    set_random_states,
+    training_env,
+)
 from forcegrasp.train.logging import TrainingLog
 from forcegrasp.train.stop import stop_signals
 
@@ -50,22 +60,37 @@ class Trainer:
         total, frames = self.algorithm.total_frames, self.algorithm.frames_per_batch
         self.schedule = LinearSchedule(config.curriculum, config.grasp, config.reward, total)
         self.collector = make_collector(config, self.env, self.policy, self.schedule, frames, model)
+        self.next_batch = NextBatch(self.collector, config.collector)
+        self._begin_with: dict[str, Tensor] = {}
 
     @property
     def policy(self) -> ProbabilisticActor:
         """What the algorithm has learned so far."""
         return self.algorithm.policy
 
-    def prepare(self) -> CurriculumValues:
-        """Sets curriculum and weights of whoever collects the next batch; returns the curriculum's values."""
-        frames_and_weights = (self.frames, self.policy.state_dict())
-        return self.collector.map_fn("prepare", [frames_and_weights] * self.config.collector.workers)[0]
+    def collect(self) -> tuple[TensorDictBase, CurriculumValues, float]:
+        """The next batch, the curriculum's values in it, and how many seconds it took to collect.
+
+        With ``collector.ahead`` the batch after it is begun, by the policy as it is now.
+        """
+        if self.next_batch.begun is None:
+            self._begin(self.frames)
+        collected = self.next_batch.get()
+        after = self.frames + collected[0].numel()
+        if self.config.collector.ahead and after < self.algorithm.total_frames:
+            self._begin(after)
+        return collected
+
+    def _begin(self, frames: int) -> None:
+        """Begins the next batch, after so many frames; one that a checkpoint saw begun, with the weights it had."""
+        self.next_batch.begin(frames, self._begin_with or self.policy.state_dict())
+        self._begin_with = {}
 
     def state(self) -> tuple[dict[str, Tensor], dict[str, Any]]:
-        """All that changes while training, as tensors and as JSON."""
-        generators, facts = random_states(self.collector)
+        """All that changes while training, as tensors and as JSON: a batch that was begun will be begun again."""
+        generators, facts = self.next_batch.begun or random_states(self.collector)
         tensors = self.algorithm.state_dict() | generators
-        facts |= {"batches": self.batches, "curriculum": self.schedule(self.frames).scalars()}
+        facts = facts | {"batches": self.batches, "curriculum": self.schedule(self.frames).scalars()}
         return {k: v.detach().cpu().contiguous().clone() for k, v in tensors.items()}, facts
 
     def restore(self, tensors: dict[str, Tensor], facts: dict[str, Any]) -> None:
@@ -82,6 +107,7 @@ class Trainer:
     def _restore(self, tensors: dict[str, Tensor], facts: dict[str, Any]) -> None:
         self.algorithm.load_state_dict(tensors)
         self.frames, self.batches = int(facts["frames"]), int(facts["batches"])
+        self._begin_with = part_of(tensors, COLLECTING)
         set_random_states(self.collector, self.config.collector.workers, tensors, facts)
 
 
@@ -105,7 +131,7 @@ def _train(config: TrainConfig, run: RunDir, resume: bool) -> bool:
         trainer.restore(*run.load())
     batch = None
     with (
-        collecting(trainer.collector) as batches,
+        collecting(trainer.next_batch),
         TrainingLog(run, config, trainer.frames) as log,
         stop_signals() as stop,
         _progress(total, trainer.frames, config.grasp.steps) as progress,
@@ -113,8 +139,7 @@ def _train(config: TrainConfig, run: RunDir, resume: bool) -> bool:
         last = trainer.frames >= total
         while not last:
             started = time.perf_counter()
-            values = trainer.prepare()
-            batch = next(batches)
+            batch, values, collect_s = trainer.collect()
             collected = time.perf_counter()
             summary = summarise(batch, config.sensors, period_s)
             metrics = {name: float(value.mean()) for name, value in summary.items()}
@@ -133,7 +158,7 @@ def _train(config: TrainConfig, run: RunDir, resume: bool) -> bool:
                 "curriculum": values.scalars(),
                 "speed": {
                     "frames_per_s": batch.numel() / (ended - started),
-                    "collect_frames_per_s": batch.numel() / (collected - started),
+                    "collect_frames_per_s": batch.numel() / collect_s,
                     "update_share": (ended - collected) / (ended - started),
                 },
             }

@@ -76,6 +76,9 @@ SHARED_CASES: dict[str, Any] = {
 #: They have tests of their own, as they want packages and hardware.
 ELSEWHERE = ("physics.engine", "physics.device")
 
+#: Options of who collects with Ray.
+RAY = ("collector.kind", "collector.workers", "collector.address")
+
 #: Options that are nothing without a teacher.
 TEACHING = ("ppo.teacher_weight_end", "ppo.teacher_feedback", "ppo.teacher_caution")
 
@@ -131,6 +134,7 @@ TRAIN_CASES: dict[str, Any] = {
     "collector.kind": "ray",
     "collector.workers": 2,
     "collector.address": "auto",
+    "collector.ahead": False,
     "log.histograms_every": 1,
     "log.figures_every": 1,
     "log.video_every": 1,
@@ -291,7 +295,7 @@ def test_the_same_evaluation_finds_the_same(tmp_path, plain_evaluation, learned)
 
 @pytest.mark.parametrize(
     "name",
-    [n for n in TRAIN_CASES if n not in ("reward.forces", *TEACHING, *ELSEWHERE) and not n.startswith("collector.")],
+    [n for n in TRAIN_CASES if n not in ("reward.forces", *TEACHING, *ELSEWHERE, *RAY)],
 )
 def test_option_of_train(name, tmp_path, plain_training):
     different = trained(tmp_path, **{name: TRAIN_CASES[name]})
@@ -302,7 +306,7 @@ class JoinedError(Exception):
     """The training would begin now, on this cluster."""
 
 
-@pytest.mark.parametrize("name", [name for name in TRAIN_CASES if name.startswith("collector.")])
+@pytest.mark.parametrize("name", RAY)
 def test_option_of_collecting(name, monkeypatch):
     """What is asked of Ray; tests/train/test_collector.py has what comes of it."""
 

@@ -81,3 +81,22 @@ def test_what_it_cannot_do_is_left_to_torchrl():
     assert not can_collect(made.collector.env, made.policy)
     batch = next(iter(made.collector))
     assert torch.equal(batch["observation"][:, 1:], batch["next", "observation"][:, :-1] + 1)
+
+
+def test_ahead_the_policy_is_one_update_behind():
+    """The first two batches are the untrained policy's; by turns, each is of the newest."""
+
+    def scales(ahead: bool) -> list[float]:
+        made = trainer(f"collector.ahead={ahead}", "ppo.total_frames=144", "ppo.learning_rate=0.1", "ppo.minibatch=9")
+        found = []
+        for _ in range(4):
+            batch = made.collect()[0]
+            found.append(float(batch["scale"][0, 0, 0]))
+            made.algorithm.update(batch)
+            made.frames += batch.numel()
+        return found
+
+    by_turns, ahead = scales(False), scales(True)
+    assert by_turns[0] == ahead[0] == ahead[1] != by_turns[1]
+    assert len(set(by_turns)) == 4
+    assert len(set(ahead)) == 3

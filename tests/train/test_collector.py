@@ -20,7 +20,7 @@ from forcegrasp.config import TrainConfig
 from forcegrasp.errors import ConfigError, ForcegraspError, PhysicsError
 from forcegrasp.runs.run_dir import RunDir
 from forcegrasp.train import cluster
-from forcegrasp.train.collector import GraspCollector, training_env, worker_seed
+from forcegrasp.train.collector import GraspCollector, NextBatch, training_env, worker_seed
 from forcegrasp.train.logging import TrainingLog
 from forcegrasp.train.loop import train
 
@@ -62,8 +62,15 @@ class SideBySide:
 @pytest.fixture
 def side_by_side(monkeypatch) -> None:
     """Trainings use that double in place of Ray."""
+
+    @contextlib.contextmanager
+    def collecting(batches: NextBatch) -> Iterator[None]:
+        with contextlib.ExitStack() as stack:
+            stack.callback(batches.end)
+            yield
+
     monkeypatch.setattr("forcegrasp.train.loop.make_collector", SideBySide)
-    monkeypatch.setattr("forcegrasp.train.loop.collecting", lambda double: contextlib.nullcontext(iter(double)))
+    monkeypatch.setattr("forcegrasp.train.loop.collecting", collecting)
 
 
 @contextlib.contextmanager
@@ -100,7 +107,7 @@ def test_one_worker_trains_as_this_process_does(tiny, tmp_path, trained, monkeyp
     direct = trained(tmp_path / "direct", tiny())
     with monkeypatch.context() as patch:
         patch.setattr("forcegrasp.train.loop.make_collector", SideBySide)
-        patch.setattr("forcegrasp.train.loop.collecting", lambda double: contextlib.nullcontext(iter(double)))
+        patch.setattr("forcegrasp.train.loop.collecting", lambda _: contextlib.nullcontext())
         worker = trained(tmp_path / "worker", tiny(collector={"kind": "ray"}))
     (one, facts), (other, its_facts) = direct.load(), worker.load()
     assert one.keys() == other.keys()

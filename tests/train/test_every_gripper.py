@@ -24,7 +24,7 @@ def test_a_tiny_run_trains_and_resumes_bit_for_bit(name, tiny, tmp_path, monkeyp
     whole = RunDir.create(tmp_path / "whole", config, [])
     assert train(config, whole)
     run = RunDir.create(tmp_path / "resumed", config, [])
-    first = Trainer.prepare
+    first = Trainer.collect
 
     def stops(trainer: Trainer):
         if trainer.batches == 1:
@@ -32,7 +32,7 @@ def test_a_tiny_run_trains_and_resumes_bit_for_bit(name, tiny, tmp_path, monkeyp
         return first(trainer)
 
     with monkeypatch.context() as patch:
-        patch.setattr(Trainer, "prepare", stops)
+        patch.setattr(Trainer, "collect", stops)
         with pytest.raises(KeyboardInterrupt):
             train(config, run)
     assert train(run.config(), run, resume=True)

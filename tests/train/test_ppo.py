@@ -269,11 +269,12 @@ def test_the_value_network_sees_the_true_gaps(tiny):
     config = tiny(
         grasp={"steps": 60, "offset_m": [0.004, 0.004], "radius_m": [0.03, 0.03], "kappa": [0.0, 0.0]},
         curriculum={"enabled": False},
+        collector={"ahead": False},
     )
     trainer = Trainer(config)
     seen = []
     trainer.algorithm.value.module.net.register_forward_pre_hook(lambda _, inputs: seen.append(inputs[0]))
-    trainer.prepare()
+    trainer.collect()
     with torch.no_grad():
         episodes = trainer.env.rollout(60, lambda td: td.set("action", -torch.ones(2, 2)))
         trainer.algorithm.value(episodes)

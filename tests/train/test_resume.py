@@ -74,6 +74,7 @@ def final(run: RunDir) -> bytes:
 SECTIONS = {
     "default": {"log": {"checkpoint_every": 2, "keep": 99}},
     "other": {
+        "collector": {"ahead": False},
         "log": {"checkpoint_every": 2, "keep": 99},
         "ppo": {"critic": "observation", "mirrored": False, "entropy_weight": 0.01, "grasps": 3, "total_frames": 450},
         "observation": {"frames": 1},
@@ -220,14 +221,14 @@ def test_interrupted_before_the_first_checkpoint(whole, run, equal, again):
 
 
 def test_a_signal_before_the_first_batch_leaves_a_checkpoint(run, monkeypatch):
-    prepare = Trainer.prepare
+    collect = Trainer.collect
 
     def interrupted(self):
         if not self.frames:
             terminate()
-        return prepare(self)
+        return collect(self)
 
-    monkeypatch.setattr(Trainer, "prepare", interrupted)
+    monkeypatch.setattr(Trainer, "collect", interrupted)
     assert not train(run.config(), run)
     assert run.load()[1]["batches"] == 1
 

@@ -36,13 +36,11 @@ def ours(tier: str, grasps: int, report: Report) -> None:
     from forcegrasp.train.loop import Trainer
 
     trainer = Trainer(config := tuned(tier))
-    total, batches = config.ppo.total_frames, iter(trainer.collector)
-    while trainer.frames < total:
-        trainer.prepare()
-        batch = next(batches)
+    while trainer.frames < config.ppo.total_frames:
+        batch = trainer.collect()[0]
         reward = float(summarise(batch, config.sensors)["force_reward_normalised"].mean())
         report(trainer.frames + batch.numel(), reward)
-        trainer.algorithm.set_progress(trainer.frames / total)
+        trainer.algorithm.set_progress(trainer.frames / config.ppo.total_frames)
         trainer.algorithm.update(batch)
         trainer.frames += batch.numel()
 

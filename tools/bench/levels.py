@@ -93,10 +93,9 @@ def collection(case: Case) -> Run:
 def training(case: Case) -> Run:
     """Collection, and PPO's updates on each batch."""
     trainer = _closing_trainer(case)
-    batches = iter(trainer.collector)
 
     def run() -> int:
-        batch = next(batches)
+        batch = trainer.collect()[0]
         trainer.algorithm.update(batch)
         return batch.numel()
 
