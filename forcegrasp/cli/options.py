@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Iterator
 from importlib.resources import files
 from typing import Any
@@ -102,6 +103,7 @@ def _folder(option: str, value: str) -> str:
     return value
 
 
+@functools.cache
 def register_schemas() -> None:
     """Makes the config dataclasses known to Hydra: as VERB_schema where conf/VERB.yaml adds presets, else as VERB."""
     from hydra.core.config_store import ConfigStore

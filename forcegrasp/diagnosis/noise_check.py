@@ -1,4 +1,4 @@
-"""Whether what a model leaves is noise of another size or shape than was assumed: white, and alike everywhere."""
+"""Whether what a model leaves is noise of another size or shape than was assumed: alike everywhere."""
 
 from __future__ import annotations
 
@@ -25,6 +25,11 @@ _QUANTILES, _OUTLIER, _LEAST_SHARE = (0.25, 0.5, 0.75, 0.9, 0.97), 4.0, 1e-3
 _SMALLER = 0.8
 # rms ÷ core above which tails are heavy: 1 if the noise is normal, 1.5 with three degrees of freedom.
 _HEAVY = 1.2
+# Noise may lean on the reading before it by so much; slower, it can't be told from a model's error. Of noise that does
+# the state may explain this share of the mean square.
+_SLOWEST, _BY_STATE = 0.95, 0.05
+# Random features, what a unit of their weights costs, and folds of grasps.
+_FEATURES, _RIDGE, _FOLDS = 100, 1.0, 4
 # Half of a normal distribution lies within so many σ.
 _MEDIAN = float(ndtri(0.75))
 
@@ -36,6 +41,7 @@ class Noise:
     ratio: np.ndarray  #: rms of the residuals ÷ the assumed noise, ``(C,)``
     core: np.ndarray  #: the same of the middle half of them, which tails don't reach, ``(C,)``
     affected: np.ndarray  #: which signals it concerns, ``(C,)``
+    memory: np.ndarray  #: correlation of each reading's noise with that of the reading before; 0 if white, ``(C,)``
 
     @property
     def heavy_tails(self) -> np.ndarray:
@@ -54,7 +60,8 @@ def unexpected_noise(
     """The noise, if it is not as assumed and all that residuals show; None if it is, or if they show more than noise.
 
     A signal's residuals are judged by their normal scores: each is replaced by the quantile that its size has among
-    all of them, with its sign. So neither the noise's size nor its tails count.
+    all of them, with its sign. So neither the noise's size nor its tails count. Noise that is slow, as behind a
+    filter, is judged by what is new in each reading, and only if nothing in the model's state foretells it.
 
     Args:
       residual: of held-out grasps, in units of the noise, ``(G, S, C)``.
@@ -68,15 +75,22 @@ def unexpected_noise(
     core = np.array([_core(residual[..., k][_present(residual[..., k], target)]) for k in range(count)])
     if not excess(residual, numerical, target):
         smaller = ratio < _SMALLER
-        return Noise(ratio, core, smaller) if smaller.any() else None
-    clean, affected = residual.copy(), np.zeros(count, bool)
+        return Noise(ratio, core, smaller, np.zeros(count)) if smaller.any() else None
+    clean, affected, memory = residual.copy(), np.zeros(count, bool), np.zeros(count)
     for k, signal in enumerate(one):
         values, floor = residual[..., k], numerical_floor(numerical, target, signal)
         scores, beyond = _normal_scores(values, _present(values, target)), 1 - (min(floor, core[k]) / ratio[k]) ** 2
-        groups = _partitions(target, predicted[..., target.axis.side_of(k)])
-        if _is_white(scores, beyond, groups) and not _some_group_as_assumed(values / floor, groups):
+        state = predicted[..., target.axis.side_of(k)]
+        groups = _partitions(target, state)
+        if _some_group_as_assumed(values / floor, groups):
+            continue
+        if _is_white(scores, beyond, groups):
             clean[..., k], affected[k] = scores, True
-    return None if excess(clean, numerical, target) else Noise(ratio, core, affected)
+            continue
+        new, leaning = _innovations(scores)
+        if 0 < leaning < _SLOWEST and _is_white(new, beyond, groups) and foretold(scores, state, target) < _BY_STATE:
+            clean[..., k], affected[k], memory[k] = new, True, leaning
+    return None if excess(clean, numerical, target) else Noise(ratio, core, affected, memory)
 
 
 def _present(values: np.ndarray, target: Target) -> np.ndarray:
@@ -136,6 +150,45 @@ def _is_white(scores: np.ndarray, beyond: float, partitions: Sequence[np.ndarray
         if _at_most(float(differing), 2 * len(groups) / count, len(groups)) > _BETWEEN_GROUPS * beyond:
             return False
     return True
+
+
+def _innovations(scores: np.ndarray) -> tuple[np.ndarray, float]:
+    """What of each score ``(G, S)`` the one before does not tell, of variance 1; and their correlation."""
+    before = np.roll(scores, 1, axis=1)
+    before[:, 0] = np.nan
+    both = np.isfinite(scores) & np.isfinite(before)
+    leaning = float(np.clip(np.mean(scores[both] * before[both]), -0.99, 0.99))
+    new = np.where(both, (scores - leaning * before) / np.sqrt(1 - leaning**2), scores)
+    return new, leaning
+
+
+def foretold(values: np.ndarray, state: np.ndarray, target: Target) -> float:
+    """Share of the mean square of values ``(G, S)`` that a smooth function of the state foretells in other grasps.
+
+    The function is a ridge regression on random features (Rahimi and Recht 2007) of position, force, their speeds,
+    and the time since the start and since the phase began. What a model lacks repeats itself with these, unlike noise.
+
+    Args:
+      values: NaN where there are none.
+      state: position and force, if there is one, of the signal's side, ``(G, S, 2)``.
+      target: the measurements.
+    """
+    there = np.isfinite(values)
+    speed = np.diff(state, axis=1, prepend=state[:, :1])
+    samples = np.broadcast_to(np.arange(values.shape[1]), values.shape)
+    begins = np.diff(target.phase, axis=1, prepend=-2) != 0
+    since = samples - np.maximum.accumulate(np.where(begins, samples, 0), axis=1)
+    known = np.concatenate([state, speed, np.stack([samples, since], -1)], axis=-1)[there]
+    known = (known - known.mean(0)) / np.maximum(known.std(0), 1e-12)
+    rng = np.random.default_rng(0)
+    features = np.cos(known @ rng.standard_normal((known.shape[1], _FEATURES)) + rng.uniform(0, 2 * np.pi, _FEATURES))
+    wanted, grasp = values[there], np.nonzero(there)[0]
+    left = np.empty_like(wanted)
+    for fold in range(folds := min(_FOLDS, int(grasp.max()) + 1)):
+        out = grasp % folds == fold
+        inner = features[~out].T @ features[~out] + _RIDGE * np.eye(_FEATURES)
+        left[out] = wanted[out] - features[out] @ np.linalg.solve(inner, features[~out].T @ wanted[~out])
+    return 1 - float(np.mean(left**2) / np.mean(wanted**2))
 
 
 def _some_group_as_assumed(values: np.ndarray, partitions: Sequence[np.ndarray]) -> bool:

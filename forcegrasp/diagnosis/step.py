@@ -70,7 +70,7 @@ def look_further(
     new = signatures.missing(effects)
     signatures.simulate(fit, new)
     groups = signatures.scores(fit, start.background, effects)
-    null = null_gains(groups, rng, noise=start.noise)
+    null = null_gains(groups, rng, noise=start.noise, memory=start.memory)
     threshold = start.refit_threshold(groups, null)
     stale = {g[0].setting.effect for g in groups if g[0].gain > _RESIMULATE_RATIO * threshold} - set(new)
     if stale:
@@ -112,8 +112,9 @@ class _Start:
         self.held = study.heldout(fit)  #: residuals of held-out grasps, ``(G, S, C)``
         self.error = rms(self.held, study.target)
         noise = unexpected_noise(self.held, study.numerical, study.target, fit.predicted)
-        #: noise of each signal ÷ what was assumed, ``(C,)``; None if that may be what it is
+        #: of noise that is not as was assumed: its size ÷ that, ``(C,)``, and its memory, for :func:`null_gains`
         self.noise = None if noise is None else np.maximum(noise.ratio, 1.0)
+        self.memory = None if noise is None else (noise.memory, self.held.shape[1])
 
     def refit_threshold(self, groups: Sequence[Sequence[Score]], null: np.ndarray) -> float:
         """What a signature must gain for its effect to be worth a fit."""

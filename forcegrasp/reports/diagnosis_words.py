@@ -186,8 +186,10 @@ def noise_words(diagnosis: Diagnosis) -> str:
     again = "give position_std_m and force_std_n as they are in meta.yaml, and diagnose again: a small effect may show"
     if not noise.stronger:
         return f"But the noise is smaller than that: {sizes}. What is smaller than the noise can't be seen; {again}."
+    names = [words(name) for name, leaning in zip(names, noise.memory, strict=True) if leaning > 0]
+    shape = "white in time" if not names else f"slow, as behind a filter ({', '.join(names)}), foretold by nothing"
     return (
-        f"But the noise is not what was {source}: {sizes}. The residuals are white in time and alike in all phases,"
+        f"But the noise is not what was {source}: {sizes}. The residuals are {shape} and alike in all phases,"
         f" which no missing effect makes. To do: {again}."
     )
 

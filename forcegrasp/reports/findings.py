@@ -83,11 +83,14 @@ def noise_json(diagnosis: Diagnosis) -> dict[str, Any] | None:
     if noise is None:
         return None
     return {
-        signal: {"times_stated": float(ratio), "core": float(core), "heavy_tails": bool(heavy)}
-        for signal, ratio, core, heavy, affected in zip(
-            diagnosis.target.axis.names, noise.ratio, noise.core, noise.heavy_tails, noise.affected, strict=True
-        )
-        if affected
+        signal: {
+            "times_stated": float(noise.ratio[k]),
+            "core": float(noise.core[k]),
+            "heavy_tails": bool(noise.heavy_tails[k]),
+            "memory": float(noise.memory[k]),
+        }
+        for k, signal in enumerate(diagnosis.target.axis.names)
+        if noise.affected[k]
     }
 
 

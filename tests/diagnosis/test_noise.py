@@ -108,14 +108,6 @@ def test_grasps_that_were_not_held_out_are_left_out():
     assert noise.ratio == pytest.approx(3, rel=0.07)
 
 
-def slow(residual):
-    """Each reading leans on the one before."""
-    out = residual.copy()
-    for k in range(1, S):
-        out[:, k] += 0.7 * out[:, k - 1]
-    return out
-
-
 def level(residual):
     residual[:, PHASE == 3, 2] += 1.5
     return residual
@@ -158,15 +150,56 @@ def wave(residual):
     return residual + 2 * np.sin(2 * np.pi * np.arange(S) / 4)[:, None]
 
 
-def one_signal_slow(residual):
-    return np.concatenate([3 * residual[..., :3], slow(residual)[..., 3:]], axis=-1)
+def slow(residual, memory=0.7):
+    """Each reading leans on the one before, as behind a filter."""
+    out = residual.copy()
+    for k in range(1, S):
+        out[:, k] += memory * out[:, k - 1]
+    return out
+
+
+def slow_and_a_law(residual):
+    return slow(residual) + 3 * FORCE[:, None]
+
+
+def slow_and_the_same_in_every_grasp(residual):
+    return np.tile(slow(residual)[:1], (G, 1, 1)) + 0.5 * residual
+
+
+def slow_where_pressed(residual):
+    return np.where((PHASE >= 2)[:, None], slow(residual), 2 * residual)
+
+
+def too_slow(residual):
+    return slow(residual, 0.99)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_slow_noise(seed):
+    """It is new in every grasp, and nothing foretells it."""
+    residual = np.concatenate([3 * normal(seed)[..., :3], slow(normal(seed))[..., 3:]], axis=-1)
+    noise = unexpected_noise(residual, NOTHING, make(), GRASPS)
+    assert noise is not None
+    assert noise.memory[:3].tolist() == [0, 0, 0]
+    assert noise.memory[3] == pytest.approx(0.7, abs=0.05)
+    assert noise.ratio == pytest.approx([3, 3, 3, 1.4], rel=0.1)
+    assert noise.stronger
+
+
+def test_chance_gains_more_where_noise_is_slow():
+    """The sum of many readings, as of an offset, scatters by as much as the noise's sum does."""
+    signature = np.zeros((G, S, 4))
+    signature[..., 3] = 1 / np.sqrt(G * S)
+    scores = [[Score(EffectSetting.typical(get_effect("force_bias")), 1.0, signature.ravel())]]
+    memory = np.array([0.9, 0.0, 0.0, 0.6])
+    white, as_is = (null_gains(scores, np.random.default_rng(0), 4000, memory=m) for m in (None, (memory, S)))
+    assert as_is.mean() / white.mean() == pytest.approx(1.6 / 0.4, rel=0.05)
 
 
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize(
     "spoil",
     [
-        slow,
         level,
         louder_in_one_phase,
         louder_when_pressed,
@@ -175,7 +208,10 @@ def one_signal_slow(residual):
         twice_and_more_in_motion,
         louder_with_the_force,
         wave,
-        one_signal_slow,
+        slow_and_a_law,
+        slow_and_the_same_in_every_grasp,
+        slow_where_pressed,
+        too_slow,
     ],
 )
 def test_an_effect_is_not_taken_for_noise(spoil, seed):
@@ -206,8 +242,8 @@ def test_chance_gains_as_much_as_the_noise_that_there_is(channel, times):
 # --- in words ------------------------------------------------------------------------------------------------------
 
 
-def of(made_up, verdict: str, times: list[float], core: list[float], unlike: list[bool], **changed):
-    noise = Noise(np.array(times), np.array(core), np.array(unlike))
+def of(made_up, verdict: str, times: list[float], core: list[float], unlike: list[bool], memory=None, **changed):
+    noise = Noise(np.array(times), np.array(core), np.array(unlike), np.array(memory or [0.0] * 4))
     return dataclasses.replace(made_up.diagnosis(verdict), noise=noise, left="", **changed)
 
 
@@ -223,8 +259,13 @@ def test_the_answer_tells_the_noise(made_up):
     assert "none of the effects" not in answer
     found = diagnosis_report.diagnosis_json(diagnosis, None, made_up.tried, "s")
     assert set(found["noise"]) == {"position_l", "position_r", "force_r"}
-    assert found["noise"]["force_r"] == {"times_stated": 1.7, "core": 1.1, "heavy_tails": True}
+    assert found["noise"]["force_r"] == {"times_stated": 1.7, "core": 1.1, "heavy_tails": True, "memory": 0.0}
     assert found["where"]["explainable"] == 0
+
+
+def test_slow_noise_is_called_so(made_up):
+    diagnosis = of(made_up, "explained", [2.0] * 4, [2.0] * 4, [True] * 4, [0.0, 0.0, 0.7, 0.6])
+    assert "slow, as behind a filter (force left, force right)" in diagnosis_report.answer(diagnosis)
 
 
 def test_an_effect_and_other_noise(made_up):
