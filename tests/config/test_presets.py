@@ -159,6 +159,7 @@ def test_recommended_differs_from_ib_in_what_its_file_says():
         "ppo.squeeze_together": True,
         "ppo.teacher_weight": 100.0,
         "ppo.teacher_caution": 1.0,
+        "collector.ahead": False,
     }
 
 

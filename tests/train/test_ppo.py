@@ -110,7 +110,8 @@ def batch(trainer):
         episodes = trainer.env.rollout(40, trainer.policy)
     assert episodes["next", "truncated"][:, -1].all()
     assert episodes["next", "force"].any(), "the fingers must arrive"
-    # as if the policy had moved on since these actions were drawn: some ratios lie beyond the clip
+    trainer.algorithm.prepare(episodes)
+    # as if the policy had moved on in this update: some ratios lie beyond the clip
     episodes["action_log_prob"] += 0.3 * torch.randn(episodes.shape)
     return episodes
 
@@ -140,11 +141,26 @@ def objective(trainer, frames, advantage, target, policy, value) -> dict[str, fl
 
 
 def test_advantages(trainer, batch):
-    with torch.no_grad():
-        trainer.algorithm.advantage(batch)
     advantage, target = advantages(trainer, batch)
-    np.testing.assert_allclose(numpy(batch["advantage"])[..., 0], advantage, rtol=1e-4, atol=1e-4)
+    normal = (advantage - advantage.mean()) / advantage.std(ddof=1)
+    np.testing.assert_allclose(numpy(batch["advantage"])[..., 0], normal, rtol=1e-4, atol=1e-4)
     np.testing.assert_allclose(numpy(batch["value_target"])[..., 0], target, rtol=1e-4, atol=1e-4)
+
+
+def test_a_policy_that_has_moved_on_since_a_batch_was_collected(trainer, batch):
+    """Advantages count by how much likelier their actions are now, and ratios are to the policy as it is now."""
+    then = log_probability(parameters(trainer.policy), numpy_frames(batch)[0], trainer.config.ppo.mirrored)
+    batch["action_log_prob"] = torch.as_tensor(then, dtype=torch.float32)
+    last = [*trainer.policy.parameters()][-1]
+    with torch.no_grad():
+        last += 0.2
+    trainer.algorithm.prepare(batch)
+    now = log_probability(parameters(trainer.policy), numpy_frames(batch)[0], trainer.config.ppo.mirrored)
+    assert np.abs(now - then).max() > 0.1
+    np.testing.assert_allclose(numpy(batch["action_log_prob"]), now, rtol=1e-4, atol=1e-4)
+    advantage = advantages(trainer, batch)[0]
+    normal = (advantage - advantage.mean()) / advantage.std(ddof=1)
+    np.testing.assert_allclose(numpy(batch["advantage"])[..., 0], normal * np.exp(now - then), rtol=1e-3, atol=1e-4)
 
 
 def test_what_an_update_reports(trainer, batch):
@@ -155,7 +171,7 @@ def test_what_an_update_reports(trainer, batch):
         parameters(trainer.policy),
         parameters(trainer.algorithm.value),
     )
-    reported = trainer.algorithm.update(batch)
+    reported = trainer.algorithm.learn(batch)
     assert 0.1 < reported["clip_fraction"] < 0.9
     assert set(reported) <= set(expected)
     for name, value in reported.items():
@@ -173,7 +189,7 @@ def test_advantages_are_normalised_over_the_batch_and_not_the_minibatch(trainer,
         parameters(trainer.policy),
         parameters(trainer.algorithm.value),
     )
-    reported = trainer.algorithm.update(batch)
+    reported = trainer.algorithm.learn(batch)
     for name in ("loss_objective", "loss_critic", "kl_approx", "clip_fraction"):
         assert reported[name] == pytest.approx(expected[name], rel=1e-3, abs=1e-5), name
 
@@ -181,7 +197,7 @@ def test_advantages_are_normalised_over_the_batch_and_not_the_minibatch(trainer,
 def test_gradient(trainer, batch):
     frames, (advantage, target) = numpy_frames(batch)[0], advantages(trainer, batch)
     policy, value = parameters(trainer.policy), parameters(trainer.algorithm.value)
-    trainer.algorithm.update(batch)
+    trainer.algorithm.learn(batch)
     rng = np.random.default_rng(0)
     for module, weights in ((trainer.policy, policy), (trainer.algorithm.value, value)):
         for name, parameter in module.named_parameters():
@@ -197,7 +213,7 @@ def test_gradient(trainer, batch):
 
 def test_gradients_are_scaled_down(trainer, batch, tiny):
     trainer.algorithm.config.max_grad_norm = 0.01
-    trainer.algorithm.update(batch)
+    trainer.algorithm.learn(batch)
     for net in (trainer.policy, trainer.algorithm.value):
         norm = torch.stack([parameter.grad.norm() for parameter in net.parameters()]).norm()
         assert float(norm) == pytest.approx(0.01, rel=1e-3)
@@ -219,7 +235,7 @@ def test_every_epoch_sees_every_frame_once(trainer, batch, minibatch, monkeypatc
     trainer.algorithm.config.minibatch, trainer.algorithm.config.epochs = minibatch, 3
     seen = []
     monkeypatch.setattr(Frames, "__getitem__", spy_on(Frames.__getitem__, seen))
-    trainer.algorithm.update(batch)
+    trainer.algorithm.learn(batch)
     per_epoch = -(-120 // minibatch)
     assert len(seen) == 3 * per_epoch
     epochs = [torch.cat(seen[first : first + per_epoch]) for first in range(0, len(seen), per_epoch)]
@@ -234,9 +250,9 @@ def test_order_of_frames_comes_from_its_own_generator(trainer, batch, monkeypatc
     monkeypatch.setattr(Frames, "__getitem__", spy_on(Frames.__getitem__, firsts))
     before = torch.get_rng_state()
     trainer.algorithm.shuffle.manual_seed(1)
-    trainer.algorithm.update(batch)
+    trainer.algorithm.learn(batch)
     trainer.algorithm.shuffle.manual_seed(1)
-    trainer.algorithm.update(batch)
+    trainer.algorithm.learn(batch)
     assert torch.equal(firsts[0], firsts[4])
     assert torch.equal(before, torch.get_rng_state())
 
@@ -253,7 +269,7 @@ def test_a_rate_of_zero_changes_no_weight(trainer, batch):
     trainer.algorithm.config.learning_rate = 0.0
     trainer.algorithm.set_progress(0.0)
     before = parameters(trainer.policy) | parameters(trainer.algorithm.value)
-    trainer.algorithm.update(batch)
+    trainer.algorithm.learn(batch)
     after = parameters(trainer.policy) | parameters(trainer.algorithm.value)
     assert all(np.array_equal(before[name], after[name]) for name in before)
 

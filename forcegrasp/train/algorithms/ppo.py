@@ -114,12 +114,27 @@ class PPO(Algorithm):
         """Improves both networks on a batch ``(n, T)`` of whole episodes; returns means of the losses and of what tells
         how they go, the learning rate, and standard deviation and entropy of the policy that collected.
         """
-        with torch.no_grad():
-            self.advantage(batch)
-            if self.teacher:
-                self.teacher.label(batch)
-        advantage = batch["advantage"]
-        batch["advantage"] = (advantage - advantage.mean()) / (advantage.std() + 1e-8)
+        self.prepare(batch)
+        return self.learn(batch)
+
+    @torch.no_grad()
+    def prepare(self, batch: TensorDictBase) -> None:
+        """Writes what is learned from: ``advantage``, ``value_target``, the teacher's answers, ``action_log_prob``.
+
+        Of a batch that was collected ahead the policy has moved on since. So the ratio that is clipped is that to the
+        policy as it is now, and an advantage counts by how much likelier its action is now than it was then (decoupled
+        objective, Hilton et al. 2022).
+        """
+        self.advantage(batch)
+        if self.teacher:
+            self.teacher.label(batch)
+        advantage, then = batch["advantage"], batch["action_log_prob"]
+        now = log_prob(batch["action"], *self._gaussian(batch["observation"]))
+        normal = (advantage - advantage.mean()) / (advantage.std() + 1e-8)
+        batch["advantage"], batch["action_log_prob"] = normal * (now - then).exp().unsqueeze(-1), now
+
+    def learn(self, batch: TensorDictBase) -> dict[str, float]:
+        """The passes over a batch that is prepared, minibatch by minibatch; returns what :meth:`update` does."""
         frames = Frames(batch, self._read())
         sums: dict[str, Tensor] = {}
         updates = 0
@@ -141,6 +156,10 @@ class PPO(Algorithm):
             "entropy": float(entropy(batch["scale"])),
         }
 
+    def _gaussian(self, observation: Tensor) -> tuple[Tensor, Tensor]:
+        """Mean and standard deviation of the actions, ``(*B, motors)`` each."""
+        return cast(TensorDictModule, self.policy[0]).module(observation)
+
     def _read(self) -> tuple[NestedKey, ...]:
         """The entries of a batch that an update reads."""
         learned = ("action", "action_log_prob", "advantage", "value_target")
@@ -150,7 +169,7 @@ class PPO(Algorithm):
     def _losses(self, frames: dict[NestedKey, Tensor]) -> tuple[Tensor, dict[str, Tensor]]:
         """What a gradient step lowers on a minibatch, and its parts and diagnostics."""
         options = self.config
-        loc, scale = cast(TensorDictModule, self.policy[0]).module(frames["observation"])
+        loc, scale = self._gaussian(frames["observation"])
         value = self.value.module(*(frames[key] for key in self.value.in_keys))
         log_ratio = log_prob(frames["action"], loc, scale) - frames["action_log_prob"].squeeze(-1)
         told = clipped_loss(log_ratio, frames["advantage"].squeeze(-1), options.clip)
