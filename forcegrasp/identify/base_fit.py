@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from forcegrasp.identify.cross_validation import rms
-from forcegrasp.identify.fit import LARGE_STEP, STEP, Fit, Simulators, fit_exactly, fit_once
+from forcegrasp.identify.fit import LARGE_STEP, STEP, Fit, Simulators, descend_roughly, fit_exactly, fit_once
 from forcegrasp.identify.initial_guess import guess
 from forcegrasp.identify.problem import Problem
 from forcegrasp.identify.progress import Progress, silent
@@ -53,11 +53,11 @@ def fit_base(
     while len(ends) < STARTS or (len(ends) < MOST_STARTS and not _ends_agree(ends, small.target)):
         ends.append(small.fit(_random_start(small.problem, guess(small.target, small.problem), rng)))
         most = STARTS if len(ends) <= STARTS else MOST_STARTS
-        progress(f"base model, start {len(ends)} of {most}: {rms_error(ends[-1], small.target):.2f} × noise")
-    best = min(ends, key=lambda f: f.cost)
-    errors = tuple(rms_error(f, small.target) for f in ends)
+        progress(f"base model, start {len(ends)} of {most}: {ends[-1].error:.2f} × noise")
+    best = min(ends, key=lambda end: end.cost)
+    errors = tuple(end.error for end in ends)
     if ends[0].cost - best.cost > cost_tolerance(best, small.target):  # another start found a better place
-        first = fit_once(target, problem, simulators, small.enlarge(best))
+        first = fit_once(target, problem, simulators, small.enlarge(best.vector))
     if not _ends_agree(ends, small.target):
         spread = ", ".join(f"{error:.2f}" for error in errors)
         return BaseFit(first, errors, False, f"the starts end in different places (errors of {spread} × noise)")
@@ -80,16 +80,16 @@ def fit_base(
     return further
 
 
-def cost_tolerance(best: Fit, target: Target) -> float:
+def cost_tolerance(best: Fit | _End, target: Target) -> float:
     """Difference of two costs that mean the same place."""
     return max(_SAME_SHARE * best.cost, _SAME_COST * target.readings)
 
 
-def _ends_agree(ends: Sequence[Fit], target: Target) -> bool:
+def _ends_agree(ends: Sequence[_End], target: Target) -> bool:
     """Whether two fits at least ended in the best place."""
-    best = min(ends, key=lambda f: f.cost)
+    best = min(ends, key=lambda end: end.cost)
     tolerance = max(cost_tolerance(best, target), _SAME_BEYOND * (best.cost - target.cost_of_noise))
-    return sum(f.cost - best.cost <= tolerance for f in ends) >= 2
+    return sum(end.cost - best.cost <= tolerance for end in ends) >= 2
 
 
 def check_gradient(fit: Fit, target: Target, errors: tuple[float, ...] = ()) -> BaseFit:
@@ -123,6 +123,15 @@ def _few_grasps(target: Target) -> np.ndarray:
     return np.array(chosen)
 
 
+@dataclass(frozen=True)
+class _End:
+    """Where a start ended."""
+
+    vector: np.ndarray  #: coordinates
+    cost: float  #: as of :class:`Fit`
+    error: float  #: rms residual ÷ noise
+
+
 class _Subset:
     """The same problem on some of its grasps, with the cheap model corrected as in a fit of all of them."""
 
@@ -136,11 +145,13 @@ class _Subset:
         self._places = [names.index(e.name) for e in self.problem.entries]
         self.known = fitted.vector[self._places]
 
-    def fit(self, start: np.ndarray) -> Fit:
-        return fit_once(self.target, self.problem, self._simulators, start, self._correction, rounds=0)
+    def fit(self, start: np.ndarray) -> _End:
+        vector, residual = descend_roughly(self.target, self.problem, self._simulators, start, self._correction)
+        cost = float(np.sum((self.target.weight * residual) ** 2))
+        return _End(vector, cost, rms(residual, self.target))
 
-    def enlarge(self, fit: Fit) -> np.ndarray:
+    def enlarge(self, part: np.ndarray) -> np.ndarray:
         """Coordinates for the whole problem: what these grasps don't fix stays as it was."""
         vector = self._fitted.vector.copy()
-        vector[self._places] = fit.vector
+        vector[self._places] = part
         return vector

@@ -121,6 +121,20 @@ def fit_once(
     return _finish(local, vector, local.value(vector) + correction, correction, free, total)
 
 
+def descend_roughly(
+    target: Target, problem: Problem, simulators: Simulators, start: np.ndarray, correction: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Where a rough fit from one start ends, ``(p,)``, and the residuals there; less than :func:`fit_once` simulates.
+
+    Args:
+      target, problem, simulators, start, correction: as there.
+    """
+    local = _Local(target, problem, simulators.cheap, simulators.cheap, None, simulators.step)
+    vector = np.clip(start, problem.low + 1e-9, problem.high - 1e-9)
+    vector, _ = _descend(local, vector, correction, np.ones(len(problem), bool), _ROUGH)
+    return vector, target.residual(local.value(vector) + correction)
+
+
 def fit_exactly(target: Target, problem: Problem, simulators: Simulators, start: np.ndarray) -> Fit:
     """Fits the model itself, near an optimum, with slopes from the cheap one.
 

@@ -24,7 +24,8 @@ def test_larger_steps_are_kept_where_they_lead_further(made_up, monkeypatch, lef
         share = left if simulators.step == LARGE_STEP else 1.0
         return dataclasses.replace(fit, residual=share * fit.residual)
 
-    small = SimpleNamespace(known=None, fit=lambda start: fit, problem=None, target=made_up.target)
+    end = SimpleNamespace(vector=fit.vector, cost=fit.cost, error=1.0)
+    small = SimpleNamespace(known=None, fit=lambda start: end, problem=None, target=made_up.target)
     for name, value in {
         "fit_once": lambda *a: fit,
         "fit_exactly": fit_exactly,
