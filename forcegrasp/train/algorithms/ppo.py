@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import ClassVar, cast
+from typing import Any, ClassVar, cast
 
 import torch
 from tensordict import TensorDictBase
@@ -88,7 +88,8 @@ class PPO(Algorithm):
                 self.teacher.label(batch)
         learned = ("action", "action_log_prob", "advantage", "value_target")
         taught = ("taught_action", "taught_unit") if self.teacher else ()
-        frames = batch.select(*self.value.in_keys, *learned, *taught).reshape(-1)
+        seen = cast(Any, [*self.policy.in_keys, *self.value.in_keys])
+        frames, size = self.samples(batch.select(*seen, *learned, *taught))
         advantage = frames["advantage"]
         frames["advantage"] = (advantage - advantage.mean()) / (advantage.std() + 1e-8)
         reported = (*DIAGNOSTICS, "loss_teacher") if self.teacher else DIAGNOSTICS
@@ -96,7 +97,7 @@ class PPO(Algorithm):
         updates = 0
         for _ in range(self.config.epochs):
             order = torch.randperm(len(frames), generator=self.shuffle, device=self.shuffle.device)
-            for ids in order.split(self.config.minibatch):
+            for ids in order.split(size):
                 minibatch = frames[ids]
                 losses = self.loss(minibatch)
                 # value errors in units of the horizon: in units of reward they would drown the policy's
@@ -104,7 +105,7 @@ class PPO(Algorithm):
                 if self.config.entropy_weight:
                     objective = objective + losses["loss_entropy"]
                 if self.teacher:
-                    action = self.policy[0](minibatch.select("observation"))["loc"]
+                    action = self.policy[0](minibatch.select(*cast(Any, self.policy.in_keys)))["loc"]
                     losses["loss_teacher"] = imitation_loss(action, minibatch, self.config.teacher_caution)
                     objective = objective + self.teacher_weight * losses["loss_teacher"]
                 self.optimizer.zero_grad(set_to_none=True)
@@ -113,13 +114,17 @@ class PPO(Algorithm):
                     nn.utils.clip_grad_norm_(net.parameters(), self.config.max_grad_norm)
                 self.optimizer.step()
                 updates += 1
-                sums = {name: total + losses[name].detach() for name, total in sums.items()}
+                sums = {name: total + losses[name].detach().mean() for name, total in sums.items()}
         return {
             **{name: float(total) / updates for name, total in sums.items()},
             "learning_rate": self.optimizer.param_groups[0]["lr"],
             "action_std": float(batch["scale"].mean()),
             "entropy": float(entropy(batch["scale"])),
         }
+
+    def samples(self, batch: TensorDictBase) -> tuple[TensorDictBase, int]:
+        """What minibatches of a batch ``(n, T)`` are drawn from, and of how many of these they are."""
+        return batch.reshape(-1), self.config.minibatch
 
     def state_dict(self) -> dict[str, Tensor]:
         tensors = super().state_dict() | {f"value.{k}": v for k, v in self.value.state_dict().items()}
