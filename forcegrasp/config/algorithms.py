@@ -89,14 +89,15 @@ class SACConfig(AlgorithmConfig):
     total_frames: int = option(500_000, "control steps to train for, over all grasps", low=1, high=10**12)
     grasps: int = option(32, "grasps simulated at once; a batch is one episode of each", low=1, high=100_000)
     hidden: list[int] = option([100, 100], "width of each hidden layer, policy and value alike", low=1, high=10_000)
+    log_std: float = option(-1.5, "logarithm of the policy's initial standard deviation", low=-10, high=2)
     buffer: int = option(100_000, "transitions kept, the newest; checkpoints have them, too", low=1, high=10**9)
-    updates: int = option(500, "gradient steps after each batch", low=1, high=10**6)
-    minibatch: int = option(256, "transitions per gradient step", low=1, high=10**9)
-    learning_rate: float = option(5e-4, "Adam's step size", low=0, high=1)
+    updates: int = option(200, "gradient steps after each batch", low=1, high=10**6)
+    minibatch: int = option(512, "transitions per gradient step", low=1, high=10**9)
+    learning_rate: float = option(1e-3, "Adam's step size", low=0, high=1)
     discount: float = option(0.97, "γ", low=0, high=1)
     target_rate: float = option(0.01, "by how much the target networks follow in a step, τ", low=1e-6, high=0.5)
     entropy_weight: float = option(0.05, "weight of the entropy at the start; it is learned, too", low=1e-9, high=10)
-    entropy_target: float = option(-1.5, "entropy per motor that its weight is learned to keep, nats", low=-20, high=2)
+    entropy_target: float = option(-2.0, "entropy per motor that its weight is learned to keep, nats", low=-20, high=2)
     critic: str = option(
         "privileged",
         "what the value networks see while training: the policy's observation, or also the grasp's true state",

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import cast
+
 import torch
 from tensordict.nn import TensorDictModule
 from torch import Tensor, nn
@@ -59,6 +61,7 @@ class ActionValue(nn.Module):
     def __init__(self, value: Value) -> None:
         super().__init__()
         self.value = value
+        nn.init.zeros_(cast(nn.Linear, value.net[-1]).weight)  # else the policy follows what no reward has said
 
     def forward(self, observation: Tensor, action: Tensor, *state: Tensor) -> Tensor:
         return self.value(torch.cat([observation, action], dim=-1), *state)
