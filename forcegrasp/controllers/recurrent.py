@@ -125,7 +125,7 @@ class RecurrentNetwork(nn.Module):
         """``(1, n), (1, size) -> (1, motors), (1, size)``."""
         seen = observation if self.mirror is None else torch.cat([observation, self.mirror(observation)])
         before, gru = memory.reshape(len(seen), -1), dict(self.gru.named_parameters())
-        # the cell's own equations: a whole nn.GRU would be exported as a loop over a sequence, for a single step
+        # the cell's own equations: a step needs no operator for sequences
         reset_i, update_i, new_i = linear(seen, gru["weight_ih_l0"], gru["bias_ih_l0"]).chunk(3, -1)
         reset_h, update_h, new_h = linear(before, gru["weight_hh_l0"], gru["bias_hh_l0"]).chunk(3, -1)
         update = torch.sigmoid(update_i + update_h)

@@ -8,6 +8,7 @@ import pytest
 import torch
 
 from forcegrasp.runs.run_dir import RunDir
+from forcegrasp.train.algorithms import algorithm_of
 from forcegrasp.train.loop import train
 
 SAC = {"total_frames": 300, "grasps": 2, "hidden": [8], "buffer": 130, "updates": 3, "minibatch": 16}
@@ -34,3 +35,5 @@ def test_resumed_run_equals_the_uninterrupted_one(name, tiny, trained, metrics, 
     assert (run.checkpoints / last).read_bytes() == (whole.checkpoints / last).read_bytes()
     assert (run.checkpoints / last).read_bytes() != (whole.checkpoints / first).read_bytes()
     assert metrics(run) == metrics(whole)
+    drawn = [column for page in algorithm_of(config).CHARTS.values() for chart in page.values() for column in chart]
+    assert set(drawn) <= set(metrics(run)[0])
