@@ -96,7 +96,7 @@ def test_exported_policy(name, make_run, tmp_path, one_sensor):
     touching = rollout["had_contact"].sum(-1)
     for count in range(rollout["had_contact"].shape[-1] + 1):  # the states are of every phase
         assert (touching == count).float().mean() > 0.01
-    assert rollout["action"].abs().max() > (0.99 if config.learner == "sac" else 1)
+    assert rollout["action"].abs().max() > (0.9 if config.learner == "sac" else 1)
     action, command = differences(GraspController.load(tmp_path / "out"), config, rollout)
     assert action <= TOLERANCE
     assert command <= TOLERANCE * 0.01
