@@ -40,9 +40,7 @@ def actions(controller: GraspController, readings=READINGS) -> np.ndarray:
 
 def test_the_contract_says_how_much_is_remembered(folder, exported):
     content = json.loads((folder / "contract.json").read_text())
-    assert (
-        content["control"]["memory"] == read_contract(folder)[0].memory == 12
-    )  # two of six
+    assert content["control"]["memory"] == read_contract(folder)[0].memory == 12  # two of six
     assert content["network"]["memory"] | {"layout": ""} == {
         "input": "memory",
         "output": "next_memory",
