@@ -41,7 +41,7 @@ def run(arguments: list[str]) -> int:
 
 VERB = Verb(
     "train",
-    "learn a grasp-force policy with PPO, or resume a run",
+    "learn a grasp-force policy with PPO or SAC, or resume a run",
     run=run,
     notes=NOTES,
     schema=TrainConfig,

@@ -1,6 +1,6 @@
 """Every option that a command line or YAML may set, as dataclasses: default, unit, bounds, choices and source."""
 
-from forcegrasp.config.algorithms import AlgorithmConfig, PPOConfig
+from forcegrasp.config.algorithms import AlgorithmConfig, PPOConfig, SACConfig
 from forcegrasp.config.option import is_left_out, validate
 from forcegrasp.config.sections import (
     ActionConfig,
@@ -48,6 +48,7 @@ __all__ = [
     "RecordConfig",
     "RenderConfig",
     "RewardConfig",
+    "SACConfig",
     "SensorConfig",
     "TrainConfig",
     "check_deformation",

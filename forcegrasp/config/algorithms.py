@@ -42,8 +42,13 @@ class PPOConfig(AlgorithmConfig):
 
     name: ClassVar[str] = "ppo"
 
+    memory: int = option(
+        0, "units of the policy's memory, a GRU over the whole grasp (recurrent PPO); 0: no memory", low=0, high=10_000
+    )
     epochs: int = option(2, "passes over each batch; the authors had 10", low=1, high=1000)
-    minibatch: int = option(512, "frames per gradient step; the authors had 64", low=1, high=10**9)
+    minibatch: int = option(
+        512, "frames per gradient step; the authors had 64. With a memory, in whole grasps", low=1, high=10**9
+    )
     learning_rate: float = option(6e-4, "Adam's step size at the start", source="authors' code", low=0, high=1)
     learning_rate_end: float = option(0.05, "what is left of it at the end, linearly, as a fraction", low=0, high=1)
     discount: float = option(0.97, "γ; the authors had 0.99", low=0, high=1)
@@ -72,4 +77,29 @@ class PPOConfig(AlgorithmConfig):
     )
     teacher_caution: float = option(
         0.0, "weight of the square of what is closed harder than the teacher by, beyond a tenth", low=0, high=1000
+    )
+
+
+@dataclass
+class SACConfig(AlgorithmConfig):
+    """Soft actor-critic (Haarnoja et al. 2018), which learns from transitions of earlier batches, too."""
+
+    name: ClassVar[str] = "sac"
+
+    total_frames: int = option(500_000, "control steps to train for, over all grasps", low=1, high=10**12)
+    grasps: int = option(32, "grasps simulated at once; a batch is one episode of each", low=1, high=100_000)
+    hidden: list[int] = option([100, 100], "width of each hidden layer, policy and value alike", low=1, high=10_000)
+    log_std: float = option(-2.0, "logarithm of the policy's initial standard deviation", low=-10, high=2)
+    buffer: int = option(100_000, "transitions kept, the newest; checkpoints have them, too", low=1, high=10**9)
+    updates: int = option(400, "gradient steps after each batch", low=1, high=10**6)
+    minibatch: int = option(256, "transitions per gradient step", low=1, high=10**9)
+    learning_rate: float = option(1e-3, "Adam's step size", low=0, high=1)
+    discount: float = option(0.97, "γ", low=0, high=1)
+    target_rate: float = option(0.02, "by how much the target networks follow in a step, τ", low=1e-6, high=0.5)
+    entropy_weight: float = option(0.01, "weight of the entropy at the start; it is learned, too", low=1e-9, high=10)
+    entropy_target: float = option(-2.0, "entropy per motor that its weight is learned to keep, nats", low=-20, high=2)
+    critic: str = option(
+        "privileged",
+        "what the value networks see while training: the policy's observation, or also the grasp's true state",
+        choices=("observation", "privileged"),
     )

@@ -208,7 +208,7 @@ class CollectorConfig:
         choices=("direct", "ray"),
     )
     workers: int = option(
-        1, "processes, each with an equal share of ppo.grasps; physics.threads are each one's own", low=1, high=4096
+        1, "processes, each with an equal share of the grasps; physics.threads are each one's own", low=1, high=4096
     )
     address: str = option(
         "local",

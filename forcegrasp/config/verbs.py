@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, field
 
 from forcegrasp.assets import DEFAULT_GRIPPER
-from forcegrasp.config.algorithms import AlgorithmConfig, PPOConfig
+from forcegrasp.config.algorithms import AlgorithmConfig, PPOConfig, SACConfig
 from forcegrasp.config.option import of_gripper, option
 from forcegrasp.config.sections import (
     ActionConfig,
@@ -30,6 +30,11 @@ class TrainConfig:
     seed: int = option(0, "seed of everything random", low=0, high=2**31 - 1)
     gripper: str = option(DEFAULT_GRIPPER, "gripper by name, or the path of a description")
     model: str = option("", "model file of forcegrasp fit or add: train with its effects, within fitted intervals")
+    learner: str = option(
+        "ppo",
+        "the algorithm that learns, with the options of its section; PPO with ppo.memory is recurrent PPO",
+        choices=("ppo", "sac"),
+    )
     physics: PhysicsConfig = field(default_factory=lambda: PhysicsConfig(tier="fast"))
     grasp: GraspConfig = field(default_factory=GraspConfig)
     sensors: SensorConfig = field(default_factory=SensorConfig)
@@ -38,13 +43,14 @@ class TrainConfig:
     reward: RewardConfig = field(default_factory=RewardConfig)
     curriculum: CurriculumConfig = field(default_factory=CurriculumConfig)
     ppo: PPOConfig = field(default_factory=PPOConfig)
+    sac: SACConfig = field(default_factory=SACConfig)
     collector: CollectorConfig = field(default_factory=CollectorConfig)
     log: LogConfig = field(default_factory=LogConfig)
 
     @property
     def algorithm(self) -> AlgorithmConfig:
         """Options of the algorithm that learns."""
-        return self.ppo
+        return self.sac if self.learner == "sac" else self.ppo
 
     def check(self, path: str) -> None:
         """Refuses objects squeezed flat, models that engine or teacher can't have, and shares that workers can't."""
@@ -53,11 +59,16 @@ class TrainConfig:
         if self.collector.kind == "ray" and self.physics.device != "cpu":
             device = f"{path}physics.device={self.physics.device}"
             raise ConfigError(f"{device}: Ray's workers have no GPU; use collector=direct")
-        if self.model and self.ppo.teacher_weight:
+        if self.model and self.learner == "ppo" and self.ppo.teacher_weight:
             option = f"{path}ppo.teacher_weight"
             raise ConfigError(
                 f"{option}={self.ppo.teacher_weight:g}: the teacher knows the nominal gripper alone; with model= train"
                 f" experiment=ib_tuned, or add {option}=0"
+            )
+        if self.learner == "sac" and self.collector.ahead and self.collector.kind == "direct":
+            raise ConfigError(
+                f"{path}learner=sac: it draws numbers while it learns, and so does what collects ahead: add"
+                f" {path}collector.ahead=false"
             )
         grasps, workers, name = self.algorithm.grasps, self.collector.workers, self.algorithm.name
         if grasps % workers:

@@ -76,6 +76,7 @@ class Contract:
     position_reading_m: tuple[float, float]  #: readings beyond this can't be true
     force_reading_n: tuple[float, float]  #: readings beyond this can't be true
     gap_s: tuple[float, float]  #: shortest and longest time from one reading to the next
+    memory: int = 0  #: numbers that the network remembers from one step of a grasp to the next
 
     def __post_init__(self) -> None:
         unknown = [part for part in self.parts if part not in PARTS]
@@ -91,6 +92,8 @@ class Contract:
             raise ValueError("parts must name each part of the observation once, and at least one")
         if self.frames < 1:
             raise ValueError(f"frames={self.frames}: must be at least 1")
+        if self.memory < 0:
+            raise ValueError(f"memory={self.memory}: must not be negative")
         _check_finite(self)
         for name in ("bias_one_contact", "bias_floor"):
             if not 0 <= getattr(self, name) <= 1:

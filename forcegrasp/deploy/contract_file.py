@@ -24,8 +24,9 @@ FORMAT, FIRST_FORMAT = "forcegrasp-policy/2", "forcegrasp-policy/1"
 CONTRACT_FILE, NETWORK_FILE = "contract.json", "policy.onnx"
 #: What decides: an exported network, or the hand-written controller.
 NETWORK, FORCE_PI = "network", "force_pi"
-#: Name of what goes in and comes out of the network.
+#: Name of what goes in and comes out of the network; and where it has a memory, of that.
 INPUT, OUTPUT = "observation", "action"
+MEMORY, NEXT_MEMORY = "memory", "next_memory"
 _MAX_CONTRACT_BYTES, _MAX_NETWORK_BYTES = 1_000_000, 500_000_000
 #: Type of an entry → types of its value or of its list's items, as JSON gives them, and how to say that.
 _KINDS: dict[str, tuple[set[type], str]] = {
@@ -52,6 +53,8 @@ def write_contract(folder: Path, contract: Contract, decides: bytes | ForcePIGai
     """
     control = dataclasses.asdict(contract)
     content = {"format": FORMAT, "policy": FORCE_PI, "gripper": control.pop("gripper")}
+    if not contract.memory:
+        del control["memory"]  # versions that know of none read it, too
     if isinstance(decides, ForcePIGains):
         content["gains"] = dataclasses.asdict(decides)
     else:
@@ -61,7 +64,7 @@ def write_contract(folder: Path, contract: Contract, decides: bytes | ForcePIGai
 
 
 def _network(contract: Contract, network: bytes) -> dict[str, Any]:
-    return {
+    described = {
         "sha256": hashlib.sha256(network).hexdigest(),
         "input": {
             "name": INPUT,
@@ -79,6 +82,15 @@ def _network(contract: Contract, network: bytes) -> dict[str, Any]:
             "layout": "motors in the order of their positions; negative closes; not clipped: clip to [-1, 1]",
         },
     }
+    if contract.memory:
+        described["memory"] = {
+            "input": MEMORY,
+            "output": NEXT_MEMORY,
+            "dtype": "float32",
+            "shape": [1, contract.memory],
+            "layout": "zeros at the first step of a grasp, then what came out at the step before",
+        }
+    return described
 
 
 def read_contract(folder: Path | str) -> tuple[Contract, bytes | ForcePIGains]:
@@ -168,16 +180,17 @@ def _entry(owner: Any, name: str, kind: type) -> Any:
 
 
 def _read(kind: type[Section], section: str, entries: dict[str, Any], **known: Any) -> Section:
-    """A section of the file, every entry of which must be there and of its type, but those that are known already."""
-    kinds = {entry.name: str(entry.type) for entry in dataclasses.fields(kind) if entry.name not in known}
+    """A section of the file, every entry of which must be there and of its type, but those known or with a default."""
+    fields = {entry.name: entry for entry in dataclasses.fields(kind) if entry.name not in known}
+    kinds = {name: str(entry.type) for name, entry in fields.items()}
     for name in entries:
         if name not in kinds:
             raise ValueError(f"{section}: no entry {name!r}{closest(name, kinds)}")
     values = {}
     for name, expected in kinds.items():
-        if name not in entries:
+        value = entries.get(name, fields[name].default)
+        if value is dataclasses.MISSING:
             raise ValueError(f"{section}: {name} is missing")
-        value = entries[name]
         types, said = _KINDS[expected]
         items = value if isinstance(value, list) else [value]
         fits = isinstance(value, list) == expected.startswith("tuple")

@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 
 from forcegrasp.deploy.contract import Contract, ForcePIGains
-from forcegrasp.deploy.contract_file import INPUT, NETWORK_FILE, OUTPUT, read_contract
+from forcegrasp.deploy.contract_file import INPUT, MEMORY, NETWORK_FILE, NEXT_MEMORY, OUTPUT, read_contract
 from forcegrasp.errors import DeployError
 
 
@@ -25,7 +25,7 @@ class Policy(Protocol):
 
 
 class OnnxPolicy:
-    """An exported network, and the stack of observations that it sees.
+    """An exported network, the stack of observations that it sees, and what it remembers.
 
     Args:
       network: the bytes of ``policy.onnx``.
@@ -47,16 +47,22 @@ class OnnxPolicy:
         except Exception as error:  # onnxruntime's own, without a base of their own
             raise DeployError(f"{NETWORK_FILE}: onnxruntime can't load it; export the policy again") from error
         found = [(p.name, p.type, p.shape) for p in (*session.get_inputs(), *session.get_outputs())]
-        sizes = ((INPUT, contract.observation_size), (OUTPUT, contract.action_size))
+        memory = contract.memory
+        inputs = {INPUT: contract.observation_size} | ({MEMORY: memory} if memory else {})
+        outputs = {OUTPUT: contract.action_size} | ({NEXT_MEMORY: memory} if memory else {})
+        sizes = (*inputs.items(), *outputs.items())
         expected = [(name, "tensor(float)", [1, size]) for name, size in sizes]
         if found != expected:
             raise DeployError(f"{NETWORK_FILE}: has {found}, but its contract says {expected}")
         self._session, self._parts, self._frames = session, contract.parts, contract.frames
+        self._outputs, self._memory_size = list(outputs), memory
         self.reset()
 
     def reset(self) -> None:
-        """Forgets: the next observation fills the whole stack."""
+        """Forgets: the next observation fills the whole stack, and the memory is zero."""
         self._stack: np.ndarray | None = None
+        size = self._memory_size
+        self._memory = {MEMORY: np.zeros((1, size), np.float32)} if size else {}
 
     def act(self, parts: dict[str, np.ndarray]) -> np.ndarray:
         """The mean of the policy's Gaussian, not clipped, float32 ``(motors,)``."""
@@ -65,7 +71,10 @@ class OnnxPolicy:
             self._stack = np.tile(frame, self._frames)
         else:
             self._stack = np.concatenate([self._stack[len(frame) :], frame])
-        return self._session.run([OUTPUT], {INPUT: self._stack[np.newaxis]})[0][0]
+        action, *after = self._session.run(self._outputs, {INPUT: self._stack[np.newaxis], **self._memory})
+        if after and np.isfinite(after[0]).all():  # else all later actions would not be finite either
+            self._memory = {MEMORY: after[0]}
+        return action[0]
 
 
 class ForcePI:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from torchrl.envs import TransformedEnv
@@ -106,6 +107,12 @@ def build_env(
 def _transform(module: str, gripper: Gripper, sensors: SensorConfig) -> Transform:
     """What writes a part of the observation that is not always there, see :mod:`forcegrasp.observation`."""
     return importlib.import_module(f"forcegrasp.transforms.{module}").make(gripper, sensors)
+
+
+def with_memory(env: TransformedEnv, policy: Any) -> TransformedEnv:
+    """The environment, which now carries what a policy remembers from step to step, if it has a memory."""
+    make_primer = getattr(policy, "make_tensordict_primer", None)
+    return env.append_transform(make_primer()) if make_primer else env
 
 
 def seed_env(env: TransformedEnv, seed: int) -> None:

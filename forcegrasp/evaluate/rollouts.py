@@ -11,7 +11,7 @@ from tensordict.nn import TensorDictModuleBase
 from torchrl.envs.utils import ExplorationType, set_exploration_type
 
 from forcegrasp.config import GraspConfig
-from forcegrasp.env import build_env
+from forcegrasp.env import build_env, with_memory
 from forcegrasp.physics import FixedGrasps, GraspParameters
 
 #: Grasps simulated at once; more would only take memory.
@@ -39,10 +39,8 @@ def roll_out(
         env = build_env(len(chunk), grasp=grasp, sampler=FixedGrasps(chunk), seed=seed + first, **parts)
         if isinstance(policy, torch.nn.Module):
             policy.to(env.device)
-        if make_primer := getattr(policy, "make_tensordict_primer", None):
-            env.append_transform(make_primer())
         with torch.no_grad(), set_exploration_type(ExplorationType.DETERMINISTIC):
-            rollout = env.rollout(grasp.steps, policy, break_when_any_done=False)
+            rollout = with_memory(env, policy).rollout(grasp.steps, policy, break_when_any_done=False)
         # the stacked observation is most of the memory, and nobody looks at it afterwards
         episodes.append(rollout.exclude("observation", ("next", "observation")).cpu())
     return cast(TensorDictBase, torch.cat(episodes))

@@ -12,17 +12,18 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
-from typing import cast
 
 import numpy as np
 import torch
-from torch import nn
+from torch import Tensor, nn
 
 from forcegrasp.assets import DEFAULT_GRIPPER
 from forcegrasp.config import ActionConfig, TrainConfig
 from forcegrasp.controllers import ForcePI
+from forcegrasp.controllers.policy import network_of
+from forcegrasp.controllers.recurrent import RecurrentNetwork
 from forcegrasp.deploy import Contract, ForcePIGains, GraspController, GripperInterface, OnnxPolicy
-from forcegrasp.deploy.contract_file import FORCE_PI, INPUT, NETWORK_FILE, OUTPUT, write_contract
+from forcegrasp.deploy.contract_file import FORCE_PI, INPUT, MEMORY, NETWORK_FILE, NEXT_MEMORY, OUTPUT, write_contract
 from forcegrasp.errors import ConfigError, DeployError
 from forcegrasp.physics import Gripper, load_gripper
 from forcegrasp.physics.completion import complete
@@ -76,8 +77,10 @@ def export_policy(name: str | Path, out: str | Path, ceiling_n: float | None = N
     if gripper:
         raise ConfigError(f"gripper={gripper}: {name} was trained on {config.gripper}; leave gripper= out")
     contract = _named(name, config, ceiling_n)
-    mean = cast(nn.Sequential, policy[0].module)[0]  # of the Gaussian; its deviation is for training
-    network, versions = to_onnx(mean, contract.observation_size)
+    mean = network_of(policy)  # of the Gaussian; its deviation is for training
+    if isinstance(mean, RecurrentNetwork):
+        contract = dataclasses.replace(contract, memory=mean.size)
+    network, versions = to_onnx(mean, contract)
     difference = largest_difference(mean, OnnxPolicy(network, contract), contract)
     if not difference <= TOLERANCE:
         raise DeployError(f"{name}: the exported network acts differently ({difference:.1g}); train the policy anew")
@@ -149,8 +152,8 @@ def interface_of(gripper: Gripper) -> GripperInterface:
     return GripperInterface(gripper.name, gripper.unit, positions, forces)
 
 
-def to_onnx(network: nn.Module, size: int) -> tuple[bytes, dict[str, str]]:
-    """A network of ``(1, size)`` as ONNX, and the versions of what made it.
+def to_onnx(network: nn.Module, contract: Contract) -> tuple[bytes, dict[str, str]]:
+    """A network of one observation, and of the memory if it has one, as ONNX, and the versions of what made it.
 
     Raises:
       DeployError: if the packages for it are missing.
@@ -161,12 +164,13 @@ def to_onnx(network: nn.Module, size: int) -> tuple[bytes, dict[str, str]]:
         import onnxscript  # noqa: F401
     except ImportError as error:
         raise DeployError("exporting a policy needs an extra: pip install 'forcegrasp[onnx]'") from error
+    remembers = contract.memory > 0
     with _quiet():
         program = torch.onnx.export(
             network.eval(),
-            (torch.zeros(1, size),),
-            input_names=[INPUT],
-            output_names=[OUTPUT],
+            (torch.zeros(1, contract.observation_size), *[torch.zeros(1, contract.memory)] * remembers),
+            input_names=[INPUT, *[MEMORY] * remembers],
+            output_names=[OUTPUT, *[NEXT_MEMORY] * remembers],
             opset_version=OPSET,
             dynamo=True,
             verbose=False,
@@ -181,7 +185,7 @@ def to_onnx(network: nn.Module, size: int) -> tuple[bytes, dict[str, str]]:
 
 
 def largest_difference(mean: nn.Module, exported: OnnxPolicy, contract: Contract) -> float:
-    """The largest difference in action over random observations; NaN if one is not finite."""
+    """The largest difference in action over random observations, one grasp's; NaN if one is not finite."""
     ends = np.cumsum([len(contract.columns(part)) for part in contract.parts])
     values = np.random.default_rng(0).normal(scale=2.0, size=(CHECKS, int(ends[-1]))).astype(np.float32)
     exported.reset()
@@ -191,8 +195,19 @@ def largest_difference(mean: nn.Module, exported: OnnxPolicy, contract: Contract
     padded = np.concatenate([values[:1]] * first + [values])
     stacked = np.concatenate([padded[k : k + CHECKS] for k in range(contract.frames)], axis=1)
     with torch.no_grad():
-        expected = mean(torch.from_numpy(stacked)).numpy()
+        expected = _actions(mean, torch.from_numpy(stacked)).numpy()
     return float(np.abs(actual - expected).max())  # which passes a NaN on
+
+
+def _actions(mean: nn.Module, observations: Tensor) -> Tensor:
+    """What torch does with the observations of one grasp, ``(T, n) -> (T, motors)``."""
+    if not isinstance(mean, RecurrentNetwork):
+        return mean(observations)
+    memory, actions = torch.zeros(1, mean.size), []
+    for observation in observations.split(1):
+        action, memory = mean(observation, memory)
+        actions.append(action)
+    return torch.cat(actions)
 
 
 def median_step_us(controller: GraspController) -> float:

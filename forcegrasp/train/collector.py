@@ -25,7 +25,7 @@ from torchrl.modules import ProbabilisticActor
 
 from forcegrasp.config import CollectorConfig, TrainConfig
 from forcegrasp.curriculum import CurriculumHook, CurriculumValues, LinearSchedule
-from forcegrasp.env import GraspEnv, build_env
+from forcegrasp.env import GraspEnv, build_env, with_memory
 from forcegrasp.models.model_file import Model
 from forcegrasp.train import cluster
 from forcegrasp.train.episodes import can_collect, collect
@@ -51,9 +51,10 @@ class GraspCollector(Collector):
         plain: dict[str, Any] = {
             "reset_at_each_iter": True,
             "track_traj_ids": False,
-            "auto_register_policy_transforms": False,
+            "auto_register_policy_transforms": False,  # it would add some twice
         }
-        super().__init__(create_env_fn, policy, **plain | options)
+        env = create_env_fn if isinstance(create_env_fn, TransformedEnv) else create_env_fn()
+        super().__init__(with_memory(env, policy), policy, **plain | options)
         self.curriculum = CurriculumHook(schedule, self.env)
 
     def iterator(self) -> Iterator[TensorDictBase]:

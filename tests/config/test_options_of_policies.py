@@ -43,6 +43,14 @@ TINY_TRAINING = TINY_GRASP | {
     "ppo.initial_action": -1.0,
     "ppo.log_std": -1.0,
     "ppo.value_weight": 10.0,  # lest its gradient stays below the largest norm
+    "sac.total_frames": 180,
+    "sac.grasps": 2,
+    "sac.hidden": [8],
+    "sac.initial_action": -1.0,
+    "sac.log_std": -1.0,
+    "sac.buffer": 150,
+    "sac.updates": 3,
+    "sac.minibatch": 16,
     "curriculum.end_fraction": 1.0,
     "log.checkpoint_every": 1,
     "log.histograms_every": 0,
@@ -82,11 +90,16 @@ RAY = ("collector.kind", "collector.workers", "collector.address")
 #: Options that are nothing without a teacher.
 TEACHING = ("ppo.teacher_weight_end", "ppo.teacher_feedback", "ppo.teacher_caution")
 
+#: SAC; and the options that are nothing to PPO, or not alone.
+SAC = {"learner": "sac", "collector.ahead": False}
+OTHERWISE = ("learner", "sac.")
+
 #: The same, for the options of training alone.
 TRAIN_CASES: dict[str, Any] = {
     "seed": 1,
     "gripper": "franka_hand",
     "model": str(MODEL),
+    "learner": "sac",
     **SHARED_CASES,
     "observation.parts": ["position", "force"],
     "observation.frames": 2,
@@ -116,6 +129,7 @@ TRAIN_CASES: dict[str, Any] = {
     "ppo.initial_action": -0.8,
     "ppo.mirrored": False,
     "ppo.squeeze_together": True,
+    "ppo.memory": 3,
     "ppo.epochs": 3,
     "ppo.minibatch": 30,
     "ppo.learning_rate": 1e-3,
@@ -131,6 +145,22 @@ TRAIN_CASES: dict[str, Any] = {
     "ppo.teacher_weight_end": 1.0,
     "ppo.teacher_feedback": 1.0,
     "ppo.teacher_caution": 3.0,
+    "sac.total_frames": 181,
+    "sac.grasps": 3,
+    "sac.hidden": [8, 8],
+    "sac.log_std": -2.0,
+    "sac.initial_action": -0.8,
+    "sac.mirrored": False,
+    "sac.squeeze_together": True,
+    "sac.buffer": 80,
+    "sac.updates": 2,
+    "sac.minibatch": 15,
+    "sac.learning_rate": 1e-3,
+    "sac.discount": 0.9,
+    "sac.target_rate": 0.1,
+    "sac.entropy_weight": 0.1,
+    "sac.entropy_target": -1.0,
+    "sac.critic": "observation",
     "collector.kind": "ray",
     "collector.workers": 2,
     "collector.address": "auto",
@@ -295,11 +325,25 @@ def test_the_same_evaluation_finds_the_same(tmp_path, plain_evaluation, learned)
 
 @pytest.mark.parametrize(
     "name",
-    [n for n in TRAIN_CASES if n not in ("reward.forces", *TEACHING, *ELSEWHERE, *RAY)],
+    [n for n in TRAIN_CASES if n not in ("reward.forces", *TEACHING, *ELSEWHERE, *RAY) and not n.startswith(OTHERWISE)],
 )
 def test_option_of_train(name, tmp_path, plain_training):
     different = trained(tmp_path, **{name: TRAIN_CASES[name]})
     assert different != plain_training
+
+
+@pytest.fixture(scope="module")
+def plain_sac(tmp_path_factory):
+    return trained(tmp_path_factory.mktemp("sac") / "run", **SAC)
+
+
+def test_another_algorithm_learns_something_else(plain_sac, plain_training):
+    assert plain_sac != plain_training
+
+
+@pytest.mark.parametrize("name", [name for name in TRAIN_CASES if name.startswith("sac.")])
+def test_option_of_sac(name, tmp_path, plain_sac):
+    assert trained(tmp_path, **SAC | {name: TRAIN_CASES[name]}) != plain_sac
 
 
 class JoinedError(Exception):

@@ -163,6 +163,21 @@ def test_recommended_differs_from_ib_in_what_its_file_says():
     }
 
 
+def test_recurrent_differs_from_recommended_in_the_memory_and_what_it_wants():
+    assert changed(train("experiment=recommended"), train("experiment=recurrent")) == {
+        "observation.frames": 1,
+        "ppo.memory": 64,
+        "ppo.epochs": 4,
+        "ppo.minibatch": 2400,
+    }
+
+
+def test_sac_learns_the_task_of_recommended():
+    different = changed(train("experiment=recommended"), train("experiment=sac"))
+    task = {name for name in different if name.partition(".")[0] not in ("ppo", "sac")}
+    assert task == {"learner", "observation.frames", "log.checkpoint_every"}
+
+
 @pytest.mark.parametrize(
     ("experiment", "without"),
     [

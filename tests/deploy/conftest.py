@@ -9,9 +9,10 @@ from pathlib import Path
 
 import pytest
 import torch
+from torch import nn
 
 from forcegrasp.config import ActionConfig, GraspConfig, PhysicsConfig, PPOConfig, SensorConfig, TrainConfig
-from forcegrasp.controllers.policy import policy_of
+from forcegrasp.controllers.policy import network_of, policy_of
 from forcegrasp.physics import default_gripper, load_gripper
 from forcegrasp.runs.export import export_policy
 from forcegrasp.runs.run_dir import RunDir
@@ -35,11 +36,10 @@ def make_run(tmp_path_factory) -> Make:
         with torch.no_grad():
             for tensor in policy.parameters():  # much of [-1, 1], and beyond
                 tensor.normal_(0.0, 0.4)
-            mirrored = config.ppo.mirrored and gripper.is_symmetric
-            wrappers = ["net"] * (mirrored + config.ppo.squeeze_together)
-            policy[0].module[0].get_submodule(".".join(wrappers))[-1].bias.fill_(-1.0)
+            last = [module for module in network_of(policy).modules() if isinstance(module, nn.Linear)][-1]
+            last.bias.fill_(-1.0)
         run = RunDir.create(tmp_path_factory.mktemp("deploy") / "run", config, [])
-        run.save(0, {f"policy.{name}": tensor for name, tensor in policy.state_dict().items()}, {}, keep=1)
+        run.save(0, {f"policy.{name}": tensor.clone() for name, tensor in policy.state_dict().items()}, {}, keep=1)
         return run.path, config
 
     return make

@@ -14,7 +14,8 @@ from torchrl.envs import check_env_specs
 from torchrl.envs.transforms import Transform
 
 from forcegrasp.config import ObservationConfig, PPOConfig, TrainConfig, validate
-from forcegrasp.controllers.policy import Mirrored, policy_of
+from forcegrasp.controllers.mean_network import Mirrored
+from forcegrasp.controllers.policy import policy_of
 from forcegrasp.deploy import GraspController
 from forcegrasp.env import build_env
 from forcegrasp.errors import ConfigError, DeployError

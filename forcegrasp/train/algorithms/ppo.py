@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import ClassVar, cast
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar, cast
 
 import torch
 from jaxtyping import Float
@@ -129,18 +129,18 @@ class PPO(Algorithm):
         if self.teacher:
             self.teacher.label(batch)
         advantage, then = batch["advantage"], batch["action_log_prob"]
-        now = log_prob(batch["action"], *self._gaussian(batch["observation"]))
+        now = log_prob(batch["action"], *self.gaussian(batch))
         normal = (advantage - advantage.mean()) / (advantage.std() + 1e-8)
         batch["advantage"], batch["action_log_prob"] = normal * (now - then).exp().unsqueeze(-1), now
 
     def learn(self, batch: TensorDictBase) -> dict[str, float]:
         """The passes over a batch that is prepared, minibatch by minibatch; returns what :meth:`update` does."""
-        frames = Frames(batch, self._read())
+        frames, size = self.samples(batch)
         sums: dict[str, Tensor] = {}
         updates = 0
         for _ in range(self.config.epochs):
             order = torch.randperm(len(frames), generator=self.shuffle, device=self.shuffle.device)
-            for ids in order.split(self.config.minibatch):
+            for ids in order.split(size):
                 objective, told = self._losses(frames[ids])
                 self.optimizer.zero_grad(set_to_none=True)
                 objective.backward()
@@ -156,23 +156,28 @@ class PPO(Algorithm):
             "entropy": float(entropy(batch["scale"])),
         }
 
-    def _gaussian(self, observation: Tensor) -> tuple[Tensor, Tensor]:
-        """Mean and standard deviation of the actions, ``(*B, motors)`` each."""
-        return cast(TensorDictModule, self.policy[0]).module(observation)
+    def samples(self, batch: TensorDictBase) -> tuple[Any, int]:
+        """What minibatches of a batch ``(n, T)`` are drawn from, as entries by name, and how many of these one has."""
+        return Frames(batch, self.read), self.config.minibatch
 
-    def _read(self) -> tuple[NestedKey, ...]:
-        """The entries of a batch that an update reads."""
+    def gaussian(self, frames: Any) -> tuple[Tensor, Tensor]:
+        """Mean and standard deviation of the policy's actions, ``(*B, motors)`` each."""
+        return cast(TensorDictModule, self.policy[0]).module(frames["observation"])
+
+    @property
+    def read(self) -> list[NestedKey]:
+        """The entries of a prepared batch that are learned from."""
         learned = ("action", "action_log_prob", "advantage", "value_target")
         taught = ("taught_action", "taught_unit") if self.teacher else ()
-        return tuple(dict.fromkeys(("observation", *self.value.in_keys, *learned, *taught)))
+        return list(dict.fromkeys((*self.policy.in_keys, *self.value.in_keys, *learned, *taught)))
 
-    def _losses(self, frames: dict[NestedKey, Tensor]) -> tuple[Tensor, dict[str, Tensor]]:
+    def _losses(self, frames: Mapping[NestedKey, Tensor]) -> tuple[Tensor, dict[str, Tensor]]:
         """What a gradient step lowers on a minibatch, and its parts and diagnostics."""
         options = self.config
-        loc, scale = self._gaussian(frames["observation"])
+        loc, scale = self.gaussian(frames)
         value = self.value.module(*(frames[key] for key in self.value.in_keys))
-        log_ratio = log_prob(frames["action"], loc, scale) - frames["action_log_prob"].squeeze(-1)
-        told = clipped_loss(log_ratio, frames["advantage"].squeeze(-1), options.clip)
+        log_ratio = log_prob(frames["action"], loc, scale).flatten() - frames["action_log_prob"].flatten()
+        told = clipped_loss(log_ratio, frames["advantage"].flatten(), options.clip)
         told["loss_critic"] = options.value_weight * (value - frames["value_target"]).square().mean()
         # value errors in units of the horizon: in units of reward they would drown the policy's
         objective = told["loss_objective"] + told["loss_critic"] / self.horizon**2

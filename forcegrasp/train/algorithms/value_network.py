@@ -1,13 +1,15 @@
-"""The network that estimates a state's value, from what the policy sees or also from the grasp's true state."""
+"""Networks that estimate a state's or an action's value, from what the policy sees or also from the true state."""
 
 from __future__ import annotations
+
+from typing import cast
 
 import torch
 from tensordict.nn import TensorDictModule
 from torch import Tensor, nn
 from torchrl.modules import MLP
 
-from forcegrasp.config import PPOConfig
+from forcegrasp.config import PPOConfig, SACConfig
 from forcegrasp.physics.gripper import Gripper
 from forcegrasp.physics.gripper_file import default_gripper
 
@@ -53,6 +55,18 @@ class Value(nn.Module):
         return (position - side * object_position - radius) * 100
 
 
+class ActionValue(nn.Module):
+    """Value of an action in a state: a :class:`Value` that sees the action beside the observation."""
+
+    def __init__(self, value: Value) -> None:
+        super().__init__()
+        self.value = value
+        nn.init.zeros_(cast(nn.Linear, value.net[-1]).weight)  # else the policy follows what no reward has said
+
+    def forward(self, observation: Tensor, action: Tensor, *state: Tensor) -> Tensor:
+        return self.value(torch.cat([observation, action], dim=-1), *state)
+
+
 def _parameter_ranges(gripper: Gripper) -> list[tuple[float, float]]:
     """Where kappa, b2, radius, offset and goal force of a grasp usually lie, to bring them to about [-1, 1]."""
     training = gripper.training
@@ -72,3 +86,12 @@ def make_value(observation_size: int, config: PPOConfig, gripper: Gripper | None
     privileged = config.critic == "privileged"
     net = Value(observation_size, config.hidden, config.discount, privileged, gripper or default_gripper())
     return TensorDictModule(net, in_keys=["observation", *(PRIVILEGED if privileged else [])], out_keys=["state_value"])
+
+
+def make_action_value(observation_size: int, config: SACConfig, gripper: Gripper) -> TensorDictModule:
+    """As :func:`make_value`; reads ``action``, too, and writes ``state_action_value``."""
+    privileged, size = config.critic == "privileged", observation_size + len(gripper.motors)
+    # not in units of the horizon: a step of Adam would then outweigh what an action changes
+    net = ActionValue(Value(size, config.hidden, 0.0, privileged, gripper))
+    true_state = PRIVILEGED if privileged else []
+    return TensorDictModule(net, in_keys=["observation", "action", *true_state], out_keys=["state_action_value"])
