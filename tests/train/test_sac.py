@@ -41,7 +41,7 @@ def test_the_newest_transitions_are_kept(make):
 def test_targets_follow_slowly_and_the_weight_of_the_entropy_its_target(make):
     trainer = make(target_rate=0.1, updates=1)
     loss = trainer.algorithm.loss
-    net = ("module", "value", "net", "0", "weight")
+    net = ("module", "value", "net", "2", "weight")
     target = loss.target_qvalue_network_params[net].clone()
     log_alpha = loss.log_alpha.item()
     reported = trainer.algorithm.update(next_batch(trainer))
