@@ -30,6 +30,13 @@ class TrainConfig:
     seed: int = option(0, "seed of everything random", low=0, high=2**31 - 1)
     gripper: str = option(DEFAULT_GRIPPER, "gripper by name, or the path of a description")
     model: str = option("", "model file of forcegrasp fit or add: train with its effects, within fitted intervals")
+    randomise: str = option(
+        "auto",
+        "what differs from grasp to grasp beside `grasp`. catalogue: effects, gains, noise and the object's mass as a"
+        " robot nobody measured may have them, see docs/robots.md. model: what model= leaves open. auto: model if there"
+        " is one, else none",
+        choices=("auto", "none", "catalogue", "model"),
+    )
     physics: PhysicsConfig = field(default_factory=lambda: PhysicsConfig(tier="fast"))
     grasp: GraspConfig = field(default_factory=GraspConfig)
     sensors: SensorConfig = field(default_factory=SensorConfig)
@@ -46,10 +53,22 @@ class TrainConfig:
         """Options of the algorithm that learns."""
         return self.ppo
 
+    @property
+    def draws_robots(self) -> bool:
+        """Whether every grasp has another robot of the prior."""
+        return self.randomise == "catalogue"
+
     def check(self, path: str) -> None:
         """Refuses objects squeezed flat, models that engine or teacher can't have, and shares that workers can't."""
         check_no_effects(self.model, self.physics, f"{path}model={self.model}")
+        check_no_effects(self.draws_robots, self.physics, f"{path}randomise={self.randomise}")
         check_deformation(self.grasp.deformation_m, self.curriculum.radius_m, f"{path}curriculum.radius_m")
+        if self.randomise == "model" and not self.model:
+            raise ConfigError(f"{path}randomise=model: there is none to draw from; name one with model=FILE")
+        if self.randomise in ("none", "catalogue") and self.model:
+            raise ConfigError(
+                f"{path}randomise={self.randomise}: model={self.model} is drawn from, too; leave one of them out"
+            )
         if self.collector.kind == "ray" and self.physics.device != "cpu":
             device = f"{path}physics.device={self.physics.device}"
             raise ConfigError(f"{device}: Ray's workers have no GPU; use collector=direct")

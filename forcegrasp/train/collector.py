@@ -24,6 +24,8 @@ from forcegrasp.config import TrainConfig
 from forcegrasp.curriculum import CurriculumHook, CurriculumValues, LinearSchedule
 from forcegrasp.env import GraspEnv, build_env
 from forcegrasp.models.model_file import Model
+from forcegrasp.models.robots import DrawnRobots
+from forcegrasp.physics import load_gripper
 from forcegrasp.train import cluster
 
 
@@ -96,6 +98,7 @@ def training_env(config: TrainConfig, model: Model | None = None, worker: int = 
         action=config.action,
         reward=config.reward,
         model=model,
+        robots=DrawnRobots(load_gripper(config.gripper)) if config.draws_robots else None,
         seed=worker_seed(config.seed, worker),
     )
 

@@ -84,6 +84,7 @@ TRAIN_CASES: dict[str, Any] = {
     "seed": 1,
     "gripper": "franka_hand",
     "model": str(MODEL),
+    "randomise": "catalogue",
     **SHARED_CASES,
     "observation.parts": ["position", "force"],
     "observation.frames": 2,

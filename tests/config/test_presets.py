@@ -162,6 +162,10 @@ def test_recommended_differs_from_ib_in_what_its_file_says():
     }
 
 
+def test_catalogue_differs_from_recommended_in_the_robots_alone():
+    assert changed(train("experiment=recommended"), train("experiment=catalogue")) == {"randomise": "catalogue"}
+
+
 @pytest.mark.parametrize(
     ("experiment", "without"),
     [
