@@ -212,6 +212,12 @@ class EvaluateConfig:
     model: str = option(
         "", "model file of forcegrasp fit or add to simulate the grasps with; virtual_robot comes with the package"
     )
+    robots: int = option(
+        0,
+        "simulate the grasps with each of so many robots of docs/robots.md; odd numbers are a test to tune nothing on",
+        low=0,
+        high=10_000,
+    )
     physics: PhysicsConfig = field(default_factory=PhysicsConfig)
     grasp: GraspConfig = field(default_factory=GraspConfig)
     sensors: SensorConfig = field(default_factory=SensorConfig)
@@ -220,8 +226,13 @@ class EvaluateConfig:
     )
 
     def check(self, path: str) -> None:
-        """Refuses a model on an engine that knows no effects."""
+        """Refuses effects on an engine that knows none, and robots that are too few, or a model's as well."""
         check_no_effects(self.model, self.physics, f"{path}model={self.model}")
+        check_no_effects(self.robots, self.physics, f"{path}robots={self.robots}")
+        if 0 < self.robots < 4:
+            raise ConfigError(f"{path}robots={self.robots}: takes 4 at least, two of them for the test")
+        if self.robots and self.model:
+            raise ConfigError(f"{path}robots={self.robots}: model={self.model} is a robot, too; leave one of them out")
 
 
 @dataclass

@@ -151,6 +151,7 @@ EVALUATE_CASES: dict[str, Any] = {
     "gripper": "franka_hand",
     "seed": 1,
     "model": str(MODEL),
+    "robots": 4,
     **SHARED_CASES,
     "speed_threshold_m": 0.0,
 }
