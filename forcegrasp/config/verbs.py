@@ -268,7 +268,8 @@ class RenderConfig:
     policies: list[str] = option(
         ["force_pi"], "what to show: controllers and shipped policies by name, or run directories; policy= for one"
     )
-    out: str = option("", "file to write, NAME.gif; runs/render_TIME.gif if empty")
+    out: str = option("", "file to write, NAME.gif or NAME.mp4; runs/render_TIME.gif if empty, and none if live")
+    live: bool = option(False, "show the grasp as it is simulated, at the gripper's pace, in MuJoCo's viewer")
     gripper: str = option("", "gripper by name, or the path of a description; that of the policies if empty")
     seed: int = option(0, "seed of what is not given, and of the sensor noise", low=0, high=2**31 - 1)
     kappa: float | None = option(None, "softness of the object; 0 is hard", source="paper, Sec. 3", low=0, high=1)

@@ -29,7 +29,7 @@ MISTAKES = [
     (["effects", "backlash", "adhesion"], "one name at a time"),
     # presets
     (["train", "experiment=no_id"], "did you mean no_ib"),
-    (["train", "experiment="], "known: ib, ib_tuned, no_curriculum"),
+    (["train", "experiment="], "known: catalogue, ib, ib_tuned"),
     (["train", "physics=quick"], "known: fast, reference"),
     (["train", "reward=normalised"], "goal_normalised"),
     (["train", "sensors=noisy"], "authors, paper"),
@@ -176,8 +176,9 @@ MISTAKES = [
     (["render", "model=nowhere.yaml"], "nowhere.yaml"),
     (["render", "model=file"], "file"),
     (["render", "model=file", "b2=-9"], "the model brings its own"),
-    (["render", "out=grasp.mp4"], "GIF"),
+    (["render", "out=grasp.avi"], "videos are GIF or MP4; name a file that ends with .gif or .mp4"),
     (["render", "out=grasp"], ".gif"),
+    (["render", "live=true", "physics=warp"], "live=true: the viewer shows engine mujoco alone"),
     (["render", "-m", "seed=0,1"], "key=value"),
     # runs and files
     (["train", "resume=nowhere"], "nowhere: no such run directory"),

@@ -75,6 +75,8 @@ SHARED_CASES: dict[str, Any] = {
 
 #: They have tests of their own, as they want packages and hardware.
 ELSEWHERE = ("physics.engine", "physics.device")
+#: It wants a display: tests/evaluate/test_live.py.
+LIVE = ("live",)
 
 #: Options that are nothing without a teacher.
 TEACHING = ("ppo.teacher_weight_end", "ppo.teacher_feedback", "ppo.teacher_caution")
@@ -161,6 +163,7 @@ EVALUATE_CASES: dict[str, Any] = {
 RENDER_CASES: dict[str, Any] = {
     "policies": "[informed]",
     "out": "elsewhere.gif",
+    "live": True,
     "gripper": "franka_hand",
     "seed": 1,
     "kappa": 0.1,
@@ -413,7 +416,7 @@ def rendered(folder: Path, **values: Any) -> tuple:
     """What would be shown, what is said, where it is written, and with how many threads it was simulated."""
     shown, said = [], io.StringIO()
 
-    def show(episodes, sensors, gripper):
+    def show(episodes, sensors, gripper, mp4):
         shown.extend(episode["next", "force"].tolist() for episode in episodes.values())
         return b"GIF"
 
@@ -434,7 +437,7 @@ def test_the_same_rendering_shows_the_same(tmp_path, plain_rendering, run_path):
     assert rendered(tmp_path, policies=[str(run_path)]) == plain_rendering
 
 
-@pytest.mark.parametrize("name", [name for name in RENDER_CASES if name not in ("gripper", *ELSEWHERE)])
+@pytest.mark.parametrize("name", [name for name in RENDER_CASES if name not in ("gripper", *LIVE, *ELSEWHERE)])
 def test_option_of_render(name, tmp_path, plain_rendering, run_path):
     assert rendered(tmp_path, **{"policies": [str(run_path)], name: RENDER_CASES[name]}) != plain_rendering
 
