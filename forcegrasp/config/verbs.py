@@ -32,9 +32,8 @@ class TrainConfig:
     model: str = option("", "model file of forcegrasp fit or add: train with its effects, within fitted intervals")
     randomise: str = option(
         "auto",
-        "what differs from grasp to grasp beside `grasp`. catalogue: effects, gains, noise and the object's mass as a"
-        " robot nobody measured may have them, see docs/robots.md. model: what model= leaves open. auto: model if there"
-        " is one, else none",
+        "robots to train on. none: nominal. catalogue: see docs/robots.md. model: within its intervals. auto: model if"
+        " there is one, else none",
         choices=("auto", "none", "catalogue", "model"),
     )
     physics: PhysicsConfig = field(default_factory=lambda: PhysicsConfig(tier="fast"))
@@ -204,17 +203,15 @@ class EvaluateConfig:
     kappas: int = option(
         11, "softness values, evenly spaced over grasp.kappa", source="paper, Sec. 5", low=1, high=1001
     )
-    trials: int = option(
-        50, "grasps per softness value (or object) and policy; the paper had 200 (20)", low=2, high=1_000_000
-    )
-    gripper: str = option("", "gripper by name, or the path of a description; that of the policies if empty")
+    trials: int = option(50, "grasps per softness value (or object); the paper had 200 (20)", low=2, high=1_000_000)
+    gripper: str = option("", "gripper by name or description; that of the policies if empty")
     seed: int = option(1000, "seed of the grasps; the same grasps for every policy", low=0, high=2**31 - 1)
     model: str = option(
         "", "model file of forcegrasp fit or add to simulate the grasps with; virtual_robot comes with the package"
     )
     robots: int = option(
         0,
-        "simulate the grasps with each of so many robots of docs/robots.md; odd numbers are a test to tune nothing on",
+        "how many robots of docs/robots.md grasp; 0: the nominal one",
         low=0,
         high=10_000,
     )

@@ -14,12 +14,13 @@ from rich.progress import Progress
 
 from forcegrasp.config import EvaluateConfig, RewardConfig
 from forcegrasp.env.episodes import METRICS, summarise
-from forcegrasp.evaluate.grids import Grid, make_grid
+from forcegrasp.evaluate.grids import PAPER_OBJECTS, Grid, make_grid
 from forcegrasp.evaluate.policies import EvaluatedPolicy, gripper_of, load_policies
 from forcegrasp.evaluate.robot_figure import draw_robots
 from forcegrasp.evaluate.robot_report import print_robots, robots_markdown, write_robots_page
 from forcegrasp.evaluate.robot_statistics import describe_robots
 from forcegrasp.evaluate.rollouts import BATCH, roll_out
+from forcegrasp.evaluate.table1 import PAPER, nearest_to_table
 from forcegrasp.evaluate.trials_file import write_trials
 from forcegrasp.gpu import check_engine
 from forcegrasp.models.robots import FixedRobots, Robots, population
@@ -69,6 +70,8 @@ def compare_robots(config: EvaluateConfig, out: Path, console: Console) -> dict:
         "baseline": config.baseline if config.baseline in metrics else "",
     }
     report |= describe_robots(metrics, robots, report["baseline"], config.seed)
+    if config.objects == PAPER_OBJECTS and PAPER.keys() <= metrics.keys():
+        report["table1"] = nearest_to_table(metrics, robots)
     (out / "tables.md").write_text(robots_markdown(report), "utf-8")
     (out / "evaluation.json").write_text(json.dumps(report, indent=1, ensure_ascii=False) + "\n", "utf-8")
     write_trials(out / "trials.csv", everywhere, metrics)

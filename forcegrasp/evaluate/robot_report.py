@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import statistics
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -100,6 +101,13 @@ def robot_sentences(report: dict) -> list[str]:
             f" {kind} forces, to {one['with']:+.1f}."
             for one in certain
         ]
+    if "table1" in report:
+        near = report["table1"]
+        first = near["nearest"][0]
+        found.append(
+            f"The paper's Table 1: nearest is robot {first}, {near['distances'][first]:.2f} standard deviations of the"
+            f" paper's trials away (median {statistics.median(near['distances']):.2f}); {near['within_one']} are within 1."
+        )
     return found
 
 
@@ -140,6 +148,22 @@ def robot_sheets(report: dict) -> Iterator[Sheet]:
         ["one", "other", "metric", "effect", "robots", "with it", "without", "change [95 % interval]"],
         list(_effect_rows(report["effects"])),
     )
+    if "table1" in report:
+        shares = (
+            f"Robots nearest to the paper's Table 1 ({len(report['table1']['nearest'])}), and the others: who has what"
+        )
+        yield Sheet(
+            f"{shares} (* even if all effects are judged at once)",
+            ["effect", "nearest", "others", "p (Fisher)"],
+            [
+                [
+                    one["effect"],
+                    *(f"{100 * one[group]:.0f} %" for group in ("nearest", "others")),
+                    f"{one['p']:.3f}" + " *" * one["certain"],
+                ]
+                for one in report["table1"]["common"][:_MOST]
+            ],
+        )
     yield Sheet(
         "Force reward robot by robot: of actual forces (of measured forces)",
         ["robot", "half", *policies, "effects"],

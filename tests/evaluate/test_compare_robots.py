@@ -16,6 +16,7 @@ from forcegrasp.env.episodes import METRICS
 from forcegrasp.evaluate.compare_policies import evaluate
 from forcegrasp.evaluate.robot_report import robot_sentences, robot_sheets
 from forcegrasp.evaluate.robot_statistics import _welch, describe_robots
+from forcegrasp.evaluate.table1 import PAPER, nearest_to_table
 from forcegrasp.models.robots import population
 from forcegrasp.physics import default_gripper
 
@@ -115,3 +116,23 @@ def test_welch_is_as_scipy_has_it():
     change, error, freedom = _welch(one, other[:5])
     test = stats.ttest_ind(one, other[:5], equal_var=False)
     assert (change / error, freedom) == (pytest.approx(test.statistic), pytest.approx(test.df))
+
+
+def test_the_robot_of_the_papers_table_is_found():
+    def row(known: tuple) -> np.ndarray:
+        return (
+            np.repeat(np.array([*known, *[(0, 0)] * (6 - len(known))])[None, :, :1], 40, 0).repeat(2, 2).reshape(40, 12)
+        )
+
+    metrics = {
+        name: {"force_reward_measured": row(rewards).astype(float), "displacement_total_mm": row(moved).astype(float)}
+        for name, (rewards, moved) in PAPER.items()
+    }
+    metrics["ib"]["force_reward_measured"] += np.where(np.arange(40) == 7, 0.0, 3.0 + 30 * ~LAGS)[:, None]
+    found = nearest_to_table(metrics, ROBOTS)
+    assert (found["nearest"][0], found["distances"][7]) == (7, 0)
+    deviations = np.array([deviation for _, deviation in PAPER["ib"][0]])
+    other = int(np.flatnonzero(LAGS & (np.arange(40) != 7))[0])
+    assert found["distances"][other] == pytest.approx(np.sqrt(((3 / deviations) ** 2).sum() / 44))
+    assert found["common"][0]["effect"] == "force_lag"
+    assert len(found["nearest"]) == 4
