@@ -94,19 +94,19 @@ def robot_sentences(report: dict) -> list[str]:
     for metric, kind in _KINDS if report["order"] else ():
         shares = ", ".join(f"{100 * share:.0f} % ({half})" for half, share in report["order"][metric].items())
         found.append(f"The paper's order {' > '.join(PAPERS_ORDER)} holds by {kind} forces on {shares} of the robots.")
-    for metric, kind in _KINDS:
-        certain = [one for one in report["effects"] if one["metric"] == metric and one["certain"]]
-        found += [
-            f"{one['effect']} changes the lead of {one['one']} over {one['other']} by {one['change']:+.1f} points of"
-            f" {kind} forces, to {one['with']:+.1f}."
-            for one in certain
-        ]
+    first = next(iter(report["policies"]))
+    for one in report["effects"]:
+        if one["certain"] and (one["one"], one["metric"]) == (first, REWARD):
+            found.append(
+                f"{one['effect']} changes the lead of {first} over {one['other']} by {one['change']:+.1f} points of"
+                f" actual forces, to {one['with']:+.1f}."
+            )
     if "table1" in report:
         near = report["table1"]
-        first = near["nearest"][0]
+        first, median = near["nearest"][0], statistics.median(near["distances"])
         found.append(
             f"The paper's Table 1: nearest is robot {first}, {near['distances'][first]:.2f} standard deviations of the"
-            f" paper's trials away (median {statistics.median(near['distances']):.2f}); {near['within_one']} are within 1."
+            f" paper's trials away (median {median:.2f}); {near['within_one']} are within 1."
         )
     return found
 
@@ -119,11 +119,11 @@ def _against_baseline(report: dict, metric: str) -> list[dict]:
 
 def robot_sheets(report: dict) -> Iterator[Sheet]:
     """The population, differences, effects that make them, and every robot."""
-    policies = report["policies"]
+    policies, tested = report["policies"], len(report["halves"]["test"])
     yield _population(report, "test", half_interval, _mean)
     yield Sheet(
         f"Less {report['baseline']}, paired by robot, test half; worst robot; on how many more than {MARGIN:g} worse",
-        ["policy", *(f"{kind}\n{what}" for _, kind in _KINDS for what in ("", "worst", "worse on"))],
+        ["policy", *(cell for _, kind in _KINDS for cell in (f"by\n{kind}", "worst\n(robot)", f"worse\nof {tested}"))],
         list(_baseline_rows(report)) if report["baseline"] else [],
     )
     yield _population(report, "test", half_interval, half_interval)
@@ -198,7 +198,7 @@ def _baseline_rows(report: dict) -> Iterator[list[str]]:
             (
                 f"{one['mean']:+.1f} ± {(one['high'] - one['low']) / 2:.1f}",
                 f"{one['worst']:+.0f} ({one['worst_robot']})",
-                f"{one['beyond_margin']} of {len(report['halves']['test'])}",
+                str(one["beyond_margin"]),
             )
             for one in pair
         ]

@@ -29,7 +29,9 @@ EFFECTS = {
     "stiction": Prior(0.2, 1 / 3, 2, "found in a real drive (real-data.md); sizes assumed"),
     "force_limit": Prior(0.1, 2, 10, "assumed: firmware limits; tighter ones would leave the goals out of reach"),
     "motor_offset": Prior(0.2, 0.2, 1, "found in a real drive (real-data.md); sizes assumed"),
-    "load_friction": Prior(0.3, 0.2, 2, "gears lose 3 to 30 % of what they transmit, from spur to worm"),
+    "load_friction": Prior(
+        0.3, 0.2, 2, "gears lose 3 to 30 % of what they transmit, from one spur gear to several stages"
+    ),
     "presliding": Prior(0.15, 1 / 3, 3, "assumed: as Coulomb friction"),
     "direction_friction": Prior(0.15, 0.2, 1, "found in a real drive (real-data.md); sizes assumed"),
     "position_deadband": Prior(0.2, 0.2, 2, "found in a jaw (real-data.md); sizes assumed"),
@@ -51,13 +53,13 @@ EFFECTS = {
     "force_saturation": Prior(0.1, 2, 10, "assumed; lower ones would hide most goals"),
     "readout_skew": Prior(0.3, 0.2, 1.3, "found in logs of a jaw, up to a sample of 20 ms (real-data.md)"),
     "encoder_bias": Prior(0.3, 0.2, 2, "assumed: homing to 0.06 to 0.6 mm"),
-    "quantisation": Prior(0.7, 0.1, 1, "encoders of 10 to 14 bits over the travel; forces of 8 to 12 bits"),
+    "quantisation": Prior(0.7, 0.1, 1, "assumed: encoders of 9 to 12 bits over the travel, 25 to 250 steps a newton"),
     "object_body": Prior(1, 1, 1, "every object has a mass and a friction; the ranges are MASS and FRICTION"),
 }
 #: Factors of what the gripper's description says, drawn evenly in their logarithm.
 GAINS = (0.8, 1.25, "assumed; what training draws from its own range is drawn from that (the paper's b₂)")
 NOISE = (0.5, 2.0, "assumed: of positions and of forces apart")
-MASS = (0.25, 2.0, "0.1 to 0.8 kg where the scene has 0.4 kg: from an empty can to a full bottle")
+MASS = (0.25, 2.0, "0.1 to 0.8 kg where the scene has 0.4 kg: from a small box to a full bottle")
 FRICTION = (0.5, 1.5, "assumed: all contacts alike, from polished metal to rubber")
 #: Parameters that shape an effect and have no size (a Stribeck velocity) are drawn within this of the typical value.
 SHAPE = (0.5, 2.0)

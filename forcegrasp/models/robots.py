@@ -70,11 +70,16 @@ def draw_robots(gripper: Gripper, rng: np.random.Generator, count: int) -> Robot
     effects = []
     for effect, prior in _possible(gripper):
         chosen = rng.uniform(size=count) / prior.chance * len(effect.variants)
-        sizes = np.stack([_sizes(rng, p, prior, count) for p in effect.parameters], axis=1)
+        sizes = np.stack([_sizes(rng, effect, p, prior, count) for p in effect.parameters], axis=1)
         for number, variant in enumerate(effect.variants):
             present = (number <= chosen) & (chosen < number + 1)
             effects.append(EffectSetting(effect, variant, np.where(present[:, None], sizes, effect.null_values())))
     return Robots(gripper, tuple(effects), base, _factors(rng, NOISE, (count, 2)))
+
+
+def size_ranges(gripper: Gripper) -> dict[str, list[tuple[Parameter, float, float]]]:
+    """Effect → each of its parameters, with the smallest and the largest absolute value that is drawn."""
+    return {e.name: [(p, *_range(e, p, prior)) for p in e.parameters] for e, prior in _possible(gripper)}
 
 
 def population(gripper: Gripper, count: int) -> Robots:
@@ -109,7 +114,7 @@ class DrawnRobots:
         self.readings = np.zeros((plant.n, 4))  #: see :attr:`Robots.readings`, ``(rows, 4)``
         self._effects: list[Effect] = []
         for effect, prior in _possible(self.gripper):
-            largest = np.array([_range(p, prior)[1] for p in effect.parameters])
+            largest = np.array([_range(effect, p, prior)[1] for p in effect.parameters])
             values = np.repeat(effect.null_values()[None], plant.n, axis=0)
             self._effects += [effect(values.copy(), plant.dt, variant, largest) for variant in effect.variants]
         plant.attach([(effect, np.arange(plant.n)) for effect in self._effects])
@@ -153,17 +158,20 @@ def _present(setting: EffectSetting) -> np.ndarray:
     return (setting.values != setting.effect.null_values()).any(axis=1)
 
 
-def _range(parameter: Parameter, prior: Prior) -> tuple[float, float]:
+def _range(effect: type[Effect], parameter: Parameter, prior: Prior) -> tuple[float, float]:
     """Smallest and largest absolute value that is drawn."""
     own = {"mass_factor": MASS, "friction_factor": FRICTION}
     shapes = np.isfinite(parameter.null) and parameter.null != 0
     low, high = own.get(parameter.name, SHAPE if shapes else (prior.low, prior.high))[:2]
-    typical = abs(parameter.typical)
+    alike = effect.parameters if effect.per else (parameter,)  # left and right
+    typical = max(abs(p.typical) for p in alike)
     return max(low * typical, parameter.low), min(high * typical, parameter.high)
 
 
-def _sizes(rng: np.random.Generator, parameter: Parameter, prior: Prior, count: int) -> np.ndarray:
-    size = _log_uniform(rng, *_range(parameter, prior), count)
+def _sizes(
+    rng: np.random.Generator, effect: type[Effect], parameter: Parameter, prior: Prior, count: int
+) -> np.ndarray:
+    size = _log_uniform(rng, *_range(effect, parameter, prior), count)
     return size * rng.choice([-1, 1], count) if parameter.low < 0 else size
 
 
