@@ -64,6 +64,10 @@ def test_robots_of_any_gripper_are_within_bounds_and_have_effects_as_often_as_th
     for parameter, values in robots.base.items():
         assert values.std() > 0
         assert load_gripper(name).parameters[parameter].low <= values.min()
+    simulator = GraspSimulator(4, "fast", 1, DrawnRobots(load_gripper(name)), load_gripper(name))
+    for _ in range(8):
+        simulator.step(np.full_like(simulator.joint_position, -simulator.gripper.max_step))
+    assert len(np.unique(simulator.measured_position[:, 0])) == 4
 
 
 def test_a_robot_drawn_for_a_row_acts_as_the_same_one_given():
