@@ -30,7 +30,7 @@ def draw_robots(report: dict) -> Figure:
     above.set_xticks(places if len(places) <= 20 else [], order.astype(str) if len(places) <= 20 else [])
     above.set_xlabel("robots, by the mean of all policies (filled: test half)")
     above.set_ylabel(f"force reward ({report['steps']} at best)")
-    above.legend(fontsize=9, loc="lower left", bbox_to_anchor=(0, 1), ncols=7, frameon=False)
+    above.legend(fontsize=9, loc="lower left", bbox_to_anchor=(0, 1), ncols=8, frameon=False)
     for axes in below:
         for column, name in enumerate(names):
             if name != baseline:
