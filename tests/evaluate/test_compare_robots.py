@@ -78,7 +78,7 @@ def test_never_worse_is_said_of_those_that_are_not(found):
 
 def test_the_papers_order_is_counted():
     flat = np.full(40, 70.0)
-    ahead = report(ib=flat + 2 * (np.arange(40) % 4 == 0), no_ib=flat + 1, no_rand=flat)
+    ahead = report(ib=flat + 2 * (np.arange(40) % 4 == 0), no_ib=flat + 1, no_rand=flat - 1)
     assert ahead["order"]["force_reward_normalised"] == {"development": 0.5, "test": 0.0}
     assert "holds by actual forces on 50 % (development), 0 % (test)" in " ".join(robot_sentences(ahead))
     assert report(ib=flat, force_pi=flat + 1)["order"] == {}

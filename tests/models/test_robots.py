@@ -90,6 +90,11 @@ def test_mass_and_friction_of_the_object_count(parameter):
     before = forces(FixedRobots(robots))
     one.values[:, parameter] = 0.5
     assert (before != forces(FixedRobots(robots))).any()
+    plant = GraspSimulator(6, "fast", 1, FixedRobots(robots), default_gripper()).plant
+    for name in (("body_mass", "body_inertia"), ("geom_friction",))[parameter]:
+        there = plant.base(name) > 0
+        assert np.isin(plant.field(name)[there] / plant.base(name)[there], [0.5, 1.0]).all()
+        assert (plant.field(name)[there] < plant.base(name)[there]).any()
 
 
 def test_noise_and_rounding_are_those_of_each_robot():
