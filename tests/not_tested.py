@@ -9,7 +9,13 @@ from collections.abc import Iterable
 import pytest
 
 #: Top-level module → extra of pyproject.toml that brings it.
-EXTRAS = {"hydra_plugins": "cluster", "nbformat": "docs", "ray": "ray", "rosbags": "rosbag"}
+EXTRAS = {
+    "hydra_plugins": "cluster",
+    "imageio_ffmpeg": "video",
+    "nbformat": "docs",
+    "ray": "ray",
+    "rosbags": "rosbag",
+}
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:

@@ -15,7 +15,8 @@ NOTES = f"""
                    {", ".join(shipped_policies()) or "none"};
                    or controllers: force_pi (Lach et al. 2022), informed (a fixed rule), close, nothing
   plan=paper       the paper's simulation experiment; objects: its six objects in the training simulator;
-                   virtual_robot: the same on a gripper with effects that the training simulator does not have
+                   virtual_robot: the same on a gripper with effects that the training simulator does not have;
+                   robots: a hundred robots, each with effects of its own, see docs/robots.md
   out=DIR          where to write report.html and what it was made from; runs/evaluate_TIME by default
 """
 

@@ -30,6 +30,12 @@ class TrainConfig:
     seed: int = option(0, "seed of everything random", low=0, high=2**31 - 1)
     gripper: str = option(DEFAULT_GRIPPER, "gripper by name, or the path of a description")
     model: str = option("", "model file of forcegrasp fit or add: train with its effects, within fitted intervals")
+    randomise: str = option(
+        "auto",
+        "robots to train on. none: nominal. catalogue: see docs/robots.md. model: within its intervals. auto: model if"
+        " there is one, else none",
+        choices=("auto", "none", "catalogue", "model"),
+    )
     learner: str = option(
         "ppo",
         "the algorithm that learns, with the options of its section; PPO with ppo.memory is recurrent PPO",
@@ -52,10 +58,22 @@ class TrainConfig:
         """Options of the algorithm that learns."""
         return self.sac if self.learner == "sac" else self.ppo
 
+    @property
+    def draws_robots(self) -> bool:
+        """Whether every grasp has another robot of the prior."""
+        return self.randomise == "catalogue"
+
     def check(self, path: str) -> None:
         """Refuses objects squeezed flat, models that engine or teacher can't have, and shares that workers can't."""
         check_no_effects(self.model, self.physics, f"{path}model={self.model}")
+        check_no_effects(self.draws_robots, self.physics, f"{path}randomise={self.randomise}")
         check_deformation(self.grasp.deformation_m, self.curriculum.radius_m, f"{path}curriculum.radius_m")
+        if self.randomise == "model" and not self.model:
+            raise ConfigError(f"{path}randomise=model: there is none to draw from; name one with model=FILE")
+        if self.randomise in ("none", "catalogue") and self.model:
+            raise ConfigError(
+                f"{path}randomise={self.randomise}: model={self.model} is drawn from, too; leave one of them out"
+            )
         if self.collector.kind == "ray" and self.physics.device != "cpu":
             device = f"{path}physics.device={self.physics.device}"
             raise ConfigError(f"{device}: Ray's workers have no GPU; use collector=direct")
@@ -196,13 +214,17 @@ class EvaluateConfig:
     kappas: int = option(
         11, "softness values, evenly spaced over grasp.kappa", source="paper, Sec. 5", low=1, high=1001
     )
-    trials: int = option(
-        50, "grasps per softness value (or object) and policy; the paper had 200 (20)", low=2, high=1_000_000
-    )
-    gripper: str = option("", "gripper by name, or the path of a description; that of the policies if empty")
+    trials: int = option(50, "grasps per softness value (or object); the paper had 200 (20)", low=2, high=1_000_000)
+    gripper: str = option("", "gripper by name or description; that of the policies if empty")
     seed: int = option(1000, "seed of the grasps; the same grasps for every policy", low=0, high=2**31 - 1)
     model: str = option(
         "", "model file of forcegrasp fit or add to simulate the grasps with; virtual_robot comes with the package"
+    )
+    robots: int = option(
+        0,
+        "how many robots of docs/robots.md grasp; 0: the nominal one",
+        low=0,
+        high=10_000,
     )
     physics: PhysicsConfig = field(default_factory=PhysicsConfig)
     grasp: GraspConfig = field(default_factory=GraspConfig)
@@ -212,8 +234,13 @@ class EvaluateConfig:
     )
 
     def check(self, path: str) -> None:
-        """Refuses a model on an engine that knows no effects."""
+        """Refuses effects on an engine that knows none, and robots that are too few, or a model's as well."""
         check_no_effects(self.model, self.physics, f"{path}model={self.model}")
+        check_no_effects(self.robots, self.physics, f"{path}robots={self.robots}")
+        if 0 < self.robots < 4:
+            raise ConfigError(f"{path}robots={self.robots}: takes 4 at least, two of them for the test")
+        if self.robots and self.model:
+            raise ConfigError(f"{path}robots={self.robots}: model={self.model} is a robot, too; leave one of them out")
 
 
 @dataclass
@@ -249,7 +276,8 @@ class RenderConfig:
     policies: list[str] = option(
         ["force_pi"], "what to show: controllers and shipped policies by name, or run directories; policy= for one"
     )
-    out: str = option("", "file to write, NAME.gif; runs/render_TIME.gif if empty")
+    out: str = option("", "file to write, NAME.gif or NAME.mp4; runs/render_TIME.gif if empty, and none if live")
+    live: bool = option(False, "show the grasp as it is simulated, at the gripper's pace, in MuJoCo's viewer")
     gripper: str = option("", "gripper by name, or the path of a description; that of the policies if empty")
     seed: int = option(0, "seed of what is not given, and of the sensor noise", low=0, high=2**31 - 1)
     kappa: float | None = option(None, "softness of the object; 0 is hard", source="paper, Sec. 3", low=0, high=1)

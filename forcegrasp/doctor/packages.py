@@ -27,6 +27,7 @@ EXTRAS = {
     "rosbag": "measurement sets from ROS bags",
     "ray": "training with the grasps simulated on several machines, collector=ray",
     "cluster": "sweeps on SLURM, hydra/launcher=submitit_slurm",
+    "video": "forcegrasp render out=NAME.mp4",
     "warp": "physics=warp, grasps on a GPU",
 }
 #: Every module of another package that forcegrasp imports, but for those of extras.

@@ -21,9 +21,10 @@ from forcegrasp.config import (
     SensorConfig,
     validate,
 )
-from forcegrasp.env.grasp_env import GraspEnv
+from forcegrasp.env.grasp_env import READING_VARIATION, GraspEnv
 from forcegrasp.errors import ConfigError
 from forcegrasp.models.model_file import Model
+from forcegrasp.models.robots import DrawnRobots, FixedRobots
 from forcegrasp.models.variation import read_model_of, with_noise_of
 from forcegrasp.observation import PARTS
 from forcegrasp.physics import GraspParameters, Gripper, load_gripper
@@ -53,6 +54,7 @@ def build_env(
     reward: RewardConfig | None = None,
     sampler: Callable[[np.random.Generator, np.ndarray], GraspParameters] | None = None,
     model: Model | str | Path | None = None,
+    robots: DrawnRobots | FixedRobots | None = None,
     seed: int = 0,
 ) -> TransformedEnv:
     """Returns ``n`` grasps with ``observation`` ``(n, size · frames)`` in, ``action`` ``(n, motors)`` in [−1, 1] out.
@@ -60,7 +62,8 @@ def build_env(
     Readings come first (noise, then rounding), then what is computed from readings (contact, error), then memory, then
     the stacked observation; on the way back the action is denormalised, then biased. Parts left out use their defaults,
     and options left out the gripper's (by name, or the path of its description). A ``model`` fitted to measurements, or
-    its file, brings its base parameters and effects, drawn anew for every grasp, and the noise of its readings.
+    its file, brings its base parameters and effects, drawn anew for every grasp, and the noise of its readings; or
+    ``robots`` bring them.
 
     Raises:
       ConfigError: if an option is out of its range, the gripper reads no forces, or the model can't be read or is of
@@ -77,7 +80,7 @@ def build_env(
     for name, part in (("sensors", sensors), ("observation", observation), ("action", action)):
         validate(part, f"{name}.")
     parts = [PARTS[name] for name in observation.parts]
-    grasps = GraspEnv(n, physics, grasp, reward, sampler, model=known, gripper=gripper)
+    grasps = GraspEnv(n, physics, grasp, reward, sampler, model=known, gripper=gripper, robots=robots)
     transforms: list[Transform] = [
         ObservationNoise(
             in_keys=["measured_position", "measured_force"],
@@ -85,6 +88,7 @@ def build_env(
             std=[sensors.position_std_m, sensors.force_std_n],
             device=grasps.device,
             step=rounding_steps((found.effect, found.values) for found in known.effects).tolist() if known else None,
+            per_row=READING_VARIATION if robots else None,
         ),
         HadContact(sensors.contact_threshold_n, stall=gripper.stall),
         ForceError(),

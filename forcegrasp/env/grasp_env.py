@@ -15,8 +15,10 @@ from torchrl.envs import EnvBase
 
 from forcegrasp.config import GraspConfig, PhysicsConfig, RewardConfig, check_no_effects, validate
 from forcegrasp.env.reward import force_reward, normalised_force_reward, object_penalty, overshoot_penalty
+from forcegrasp.errors import ConfigError
 from forcegrasp.gpu.simulator import WarpGraspSimulator
 from forcegrasp.models.model_file import Model
+from forcegrasp.models.robots import DrawnRobots, FixedRobots
 from forcegrasp.models.variation import ModelVariation
 from forcegrasp.physics import GraspParameters, GraspSampler, GraspSimulator, Gripper, default_gripper
 from forcegrasp.physics.completion import complete
@@ -37,6 +39,8 @@ OBSERVATIONS = {
     ("reward_terms", "object"): (1, "r_obj, unweighted"),
     ("reward_terms", "overshoot"): (1, "r_over, unweighted"),
 }
+#: The entry that robots add: factors of the noise of positions and forces, and steps that they are rounded to.
+READING_VARIATION = "reading_variation"
 
 
 class GraspEnv(EnvBase):
@@ -56,6 +60,7 @@ class GraspEnv(EnvBase):
       model: a fitted model to draw grippers from, with the effects found in it; nominal by default. It overrides
         the range of b2.
       gripper: what grasps; the paper's by default.
+      robots: robots of that gripper to grasp with, instead of a model's; they, too, override the range of b2.
 
     Raises:
       ConfigError: if an option is out of its range.
@@ -72,15 +77,17 @@ class GraspEnv(EnvBase):
         seed: int = 0,
         model: Model | None = None,
         gripper: Gripper | None = None,
+        robots: DrawnRobots | FixedRobots | None = None,
     ) -> None:
         gripper = gripper or default_gripper()
         physics, grasp = physics or PhysicsConfig(), complete(grasp or GraspConfig(), gripper)
         reward = dataclasses.replace(reward or RewardConfig())
         for name, part in (("physics", physics), ("grasp", grasp), ("reward", reward)):
             validate(part, f"{name}.")
-        simulator = _simulator(gripper, n, physics, model)  # first: it says what is wrong with the device
+        simulator = _simulator(gripper, n, physics, model, robots)  # first: it says what is wrong with the device
         super().__init__(device=physics.device, batch_size=torch.Size([n]))
         self.gripper, self.simulator, self.reward_config = gripper, simulator, reward
+        self.robots = robots
         self.sampler = sampler or GraspSampler(grasp, gripper)
         self.episode_steps = grasp.steps
         self._drawn = self._column(simulator.parameters.as_array())
@@ -98,6 +105,8 @@ class GraspEnv(EnvBase):
         self.observation_spec = Composite(shape=(n,), device=self.device)
         for key, (size, _) in OBSERVATIONS.items():
             self.observation_spec[key] = unbounded(size if isinstance(size, int) else sizes[size])
+        if self.robots:
+            self.observation_spec[READING_VARIATION] = unbounded(4)
         self.observation_spec["reward_terms"].shape = torch.Size([n])
         self.reward_spec = unbounded(1)
         flag = Categorical(2, shape=torch.Size([n, 1]), dtype=torch.bool, device=self.device)
@@ -142,7 +151,7 @@ class GraspEnv(EnvBase):
             "object": object_penalty(speed, self.reward_config.speed_threshold_m),
             "overshoot": overshoot_penalty(force, goal, self.reward_config.overshoot_margin),
         }
-        return TensorDict(
+        state = TensorDict(
             {
                 "joint_position": column(simulator.joint_position),
                 "measured_position": column(simulator.measured_position),
@@ -157,6 +166,7 @@ class GraspEnv(EnvBase):
             },
             batch_size=self.batch_size,
         )
+        return state.set(READING_VARIATION, column(self.robots.readings)) if self.robots else state
 
     def _done(self) -> TensorDict:
         truncated = torch.as_tensor(self.simulator.steps >= self.episode_steps).unsqueeze(-1)
@@ -167,10 +177,16 @@ class GraspEnv(EnvBase):
 
 
 def _simulator(
-    gripper: Gripper, n: int, physics: PhysicsConfig, model: Model | None
+    gripper: Gripper,
+    n: int,
+    physics: PhysicsConfig,
+    model: Model | None,
+    robots: DrawnRobots | FixedRobots | None,
 ) -> GraspSimulator | WarpGraspSimulator:
-    check_no_effects(model, physics)
+    check_no_effects(model or robots, physics, "robots" if robots else "model")
+    if model is not None and robots is not None:
+        raise ConfigError("robots: a model is given, too; leave one of them out")
     if physics.engine == "warp":
         return WarpGraspSimulator(n, physics.tier, physics.device, gripper)
-    variation = None if model is None else ModelVariation(model)
+    variation = robots if model is None else ModelVariation(model)
     return GraspSimulator(n, physics.tier, physics.threads, variation, gripper)

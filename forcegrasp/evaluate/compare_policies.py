@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 from pathlib import Path
 
@@ -14,9 +13,10 @@ from rich.progress import track
 from tensordict import TensorDictBase
 
 from forcegrasp.config import EvaluateConfig, RewardConfig
-from forcegrasp.env.episodes import METRICS, summarise
+from forcegrasp.env.episodes import summarise
 from forcegrasp.evaluate.colours import policy_colours
-from forcegrasp.evaluate.grids import Grid, kappa_grid, object_grid, read_objects
+from forcegrasp.evaluate.compare_robots import compare_robots
+from forcegrasp.evaluate.grids import Grid, make_grid
 from forcegrasp.evaluate.page import write_page
 from forcegrasp.evaluate.plots import cell_boxes, force_traces
 from forcegrasp.evaluate.policies import gripper_of, load_policies
@@ -24,9 +24,9 @@ from forcegrasp.evaluate.rollouts import roll_out
 from forcegrasp.evaluate.statistics import Bootstrap
 from forcegrasp.evaluate.summary import print_summary, simulator_notes
 from forcegrasp.evaluate.tables import markdown
+from forcegrasp.evaluate.trials_file import write_trials
 from forcegrasp.gpu import check_engine
 from forcegrasp.models.variation import read_model_of, with_noise_of
-from forcegrasp.physics import Gripper
 from forcegrasp.physics.completion import complete
 
 #: Metrics of which more is better; of the others less is.
@@ -36,6 +36,8 @@ _MORE_IS_BETTER = ("force_reward_normalised", "force_reward_paper", "force_rewar
 def evaluate(config: EvaluateConfig, out: str | Path, console: Console | None = None) -> dict:
     """Rolls every policy out on the same grasps; prints a summary and writes everything into ``out``.
 
+    With ``config.robots`` it is :func:`~forcegrasp.evaluate.compare_robots.compare_robots`.
+
     Writes ``report.html``, ``evaluation.json`` (the returned summary), ``tables.md``, ``trials.csv`` (one row per
     trial), ``force_reward.png``, ``displacement.png``, ``overshoot.png``, and ``traces_<policy>.png``.
 
@@ -43,6 +45,8 @@ def evaluate(config: EvaluateConfig, out: str | Path, console: Console | None = 
       ConfigError, CheckpointError, MeasurementError, PhysicsError: with what to do about it.
     """
     out, console = Path(out), console or Console()
+    if config.robots:
+        return compare_robots(config, out, console)
     torch.set_num_threads(1)
     check_engine(config.physics)
     gripper = gripper_of(config.policies, config.gripper)
@@ -50,7 +54,7 @@ def evaluate(config: EvaluateConfig, out: str | Path, console: Console | None = 
     config = complete(config, with_noise_of(gripper, model))
     policies = load_policies(config.policies, gripper)
     baseline = config.baseline if config.baseline in {c.name for c in policies} else ""
-    grid, colours = _grid(config, gripper), policy_colours(c.name for c in policies)
+    grid, colours = make_grid(config, gripper), policy_colours(c.name for c in policies)
     out.mkdir(parents=True, exist_ok=True)
     metrics: dict[str, dict[str, np.ndarray]] = {}
     traces: dict[str, Figure] = {}
@@ -88,7 +92,7 @@ def evaluate(config: EvaluateConfig, out: str | Path, console: Console | None = 
     }
     (out / "tables.md").write_text(markdown(report), "utf-8")
     (out / "evaluation.json").write_text(json.dumps(report, indent=1, ensure_ascii=False) + "\n", "utf-8")
-    _write_trials(out / "trials.csv", grid, metrics)
+    write_trials(out / "trials.csv", grid, metrics)
     boxes = _boxes(metrics, grid, config.grasp.steps)
     for name, figure in boxes.items():
         figure.savefig(out / f"{name}.png", dpi=130)
@@ -113,13 +117,6 @@ def _boxes(metrics: dict[str, dict[str, np.ndarray]], grid: Grid, steps: int) ->
     }
 
 
-def _grid(config: EvaluateConfig, gripper: Gripper) -> Grid:
-    if config.objects:
-        objects = read_objects(config.objects, config.grasp, gripper)
-        return object_grid(objects, config.grasp, config.trials, config.seed, gripper)
-    return kappa_grid(config.grasp, config.kappas, config.trials, config.seed, gripper)
-
-
 def _spread(episodes: TensorDictBase, count: int = 6) -> TensorDictBase:
     """A few episodes from the first cell to the last."""
     return episodes[torch.linspace(0, len(episodes) - 1, count).long()]
@@ -136,15 +133,3 @@ def _describe(metrics: dict[str, dict[str, np.ndarray]], baseline: str, seed: in
             better = bootstrap.improvement(sign * v, sign * metrics[baseline][metric])
             described[name][metric]["improvement"] = better
     return described
-
-
-def _write_trials(path: Path, grid: Grid, metrics: dict[str, dict[str, np.ndarray]]) -> None:
-    columns = ["policy", "cell", "kappa", "b2", "radius_m", "offset_m", "goal_force_n", *METRICS]
-    cells = np.repeat(grid.cells, grid.trials)
-    with open(path, "w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file)
-        writer.writerow(columns)
-        for name, values in metrics.items():
-            per_trial = np.stack([values[metric].reshape(-1) for metric in METRICS], axis=1)
-            for cell, grasp, row in zip(cells, grid.grasps.as_array(), per_trial, strict=True):
-                writer.writerow([name, cell, *(f"{x:.9g}" for x in grasp), *(f"{x:.6g}" for x in row)])

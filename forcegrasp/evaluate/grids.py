@@ -11,7 +11,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
-from forcegrasp.config import GraspConfig
+from forcegrasp.config import EvaluateConfig, GraspConfig
 from forcegrasp.errors import ConfigError
 from forcegrasp.files.validate import counted, must, refusal, validate
 from forcegrasp.measure.yaml_file import Number, TextRecord, load_yaml
@@ -46,6 +46,14 @@ class GraspedObject:
     diameter_m: float
     kappa: float
     goal_force_n: tuple[float, float]
+
+
+def make_grid(config: EvaluateConfig, gripper: Gripper) -> Grid:
+    """The grasps that an evaluation asks for: of its objects if it names some, else by softness."""
+    if config.objects:
+        objects = read_objects(config.objects, config.grasp, gripper)
+        return object_grid(objects, config.grasp, config.trials, config.seed, gripper)
+    return kappa_grid(config.grasp, config.kappas, config.trials, config.seed, gripper)
 
 
 def kappa_grid(grasp: GraspConfig, kappas: int, trials: int, seed: int, gripper: Gripper | None = None) -> Grid:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from pathlib import Path
 
 import torch
@@ -9,6 +10,7 @@ import torch
 from forcegrasp.config import GraspConfig, RenderConfig
 from forcegrasp.env.episodes import summarise
 from forcegrasp.evaluate.grasp_figure import describe
+from forcegrasp.evaluate.live import LiveView
 from forcegrasp.evaluate.one_grasp import draw_one_grasp
 from forcegrasp.evaluate.policies import gripper_of, load_policies
 from forcegrasp.evaluate.rollouts import roll_out
@@ -17,37 +19,45 @@ from forcegrasp.models.variation import read_model_of, with_noise_of
 from forcegrasp.physics.completion import complete
 
 
-def render(config: RenderConfig, out: str | Path) -> dict[str, dict[str, float]]:
+def render(config: RenderConfig, out: str | Path | None) -> dict[str, dict[str, float]]:
     """Writes the video and prints what happened; returns every policy's metrics of the episode.
+
+    Args:
+      config: which policies, which grasp; and whether a viewer shows it as it is simulated.
+      out: the video, .gif or .mp4; None for none.
 
     Raises:
       ConfigError, CheckpointError, PhysicsError: with what to do about it.
       NoRendererError: where there is no OpenGL.
     """
-    out = Path(out)
     torch.set_num_threads(1)
     gripper = gripper_of(config.policies, config.gripper)
     model = read_model_of(gripper, config.model) if config.model else None
     config = complete(config, with_noise_of(gripper, model))
     grasp = draw_one_grasp(config, gripper)
-    episodes = {
-        evaluated.name: roll_out(
-            evaluated.policy,
-            grasp,
-            GraspConfig(steps=config.steps),
-            config.seed,
-            gripper=gripper,
-            physics=config.physics,
-            sensors=config.sensors,
-            model=model,
-            action=evaluated.action,
-            observation=evaluated.observation,
-        )[0]
-        for evaluated in load_policies(config.policies, gripper)
-    }
-    data = grasp_video(episodes, config.sensors, gripper=gripper)
-    out.parent.mkdir(parents=True, exist_ok=True)
-    out.write_bytes(data)
+    policies = load_policies(config.policies, gripper)
+    with LiveView(gripper.period_s) if config.live else contextlib.nullcontext() as view:
+        episodes = {
+            evaluated.name: roll_out(
+                evaluated.policy,
+                grasp,
+                GraspConfig(steps=config.steps),
+                config.seed,
+                callback=view,
+                gripper=gripper,
+                physics=config.physics,
+                sensors=config.sensors,
+                model=model,
+                action=evaluated.action,
+                observation=evaluated.observation,
+            )[0]
+            for evaluated in policies
+        }
+    if out is not None:
+        out = Path(out)
+        data = grasp_video(episodes, config.sensors, gripper=gripper, mp4=out.suffix.lower() == ".mp4")
+        out.parent.mkdir(parents=True, exist_ok=True)
+        out.write_bytes(data)
     found = {
         name: {
             metric: float(value[0])
@@ -65,5 +75,6 @@ def render(config: RenderConfig, out: str | Path) -> dict[str, dict[str, float]]
             f" object moved {metrics['displacement_until_grasped_mm']:.3f} mm until then,"
             f" {metrics['displacement_total_mm']:.3f} mm in all"
         )
-    print(f"video: {out}")
+    if out is not None:
+        print(f"video: {out}")
     return found

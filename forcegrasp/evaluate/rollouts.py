@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, cast
 
 import numpy as np
 import torch
 from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
+from torchrl.envs import TransformedEnv
 from torchrl.envs.utils import ExplorationType, set_exploration_type
 
 from forcegrasp.config import GraspConfig
@@ -19,7 +21,12 @@ BATCH = 256
 
 
 def roll_out(
-    policy: TensorDictModuleBase, grasps: GraspParameters, grasp: GraspConfig, seed: int = 0, **parts: Any
+    policy: TensorDictModuleBase,
+    grasps: GraspParameters,
+    grasp: GraspConfig,
+    seed: int = 0,
+    callback: Callable[[TransformedEnv, TensorDictBase], None] | None = None,
+    **parts: Any,
 ) -> TensorDictBase:
     """Runs one deterministic episode of every grasp and returns them whole, batch ``(n, T)``, on the CPU.
 
@@ -28,6 +35,7 @@ def roll_out(
       grasps: what to grasp.
       grasp: has the length of an episode.
       seed: seed of the sensor noise.
+      callback: called after every control step, with the environment and its state.
       **parts: the rest of the environment's configuration, see :func:`~forcegrasp.env.build_env`.
 
     Raises:
@@ -40,7 +48,10 @@ def roll_out(
         if isinstance(policy, torch.nn.Module):
             policy.to(env.device)
         with torch.no_grad(), set_exploration_type(ExplorationType.DETERMINISTIC):
-            rollout = with_memory(env, policy).rollout(grasp.steps, policy, break_when_any_done=False)
+            env = with_memory(env, policy)
+            rollout = env.rollout(grasp.steps, policy, callback, break_when_any_done=False)
+            if callback is not None:  # which torchrl does not call after the last step
+                callback(env, rollout[:, -1])
         # the stacked observation is most of the memory, and nobody looks at it afterwards
         episodes.append(rollout.exclude("observation", ("next", "observation")).cpu())
     return cast(TensorDictBase, torch.cat(episodes))

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import importlib
 import io
+import tempfile
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -24,6 +27,8 @@ if TYPE_CHECKING:
     from PIL import Image
     from tensordict import TensorDictBase
 
+#: How long the end is shown, seconds.
+LAST_S = 1
 #: How much of what has not happened yet shines through.
 _AHEAD = 0.15
 
@@ -34,8 +39,9 @@ def grasp_video(
     every: int = 2,
     colours: dict[str, str] | None = None,
     gripper: Gripper | None = None,
+    mp4: bool = False,
 ) -> bytes:
-    """Shows recorded episodes, one below the other, as an animated GIF.
+    """Shows recorded episodes, one below the other, as an animated GIF, or as an MP4 (H.264).
 
     Args:
       episodes: title → one episode ``(T,)`` of an env's rollout; all of the same length.
@@ -43,12 +49,12 @@ def grasp_video(
       every: control steps per picture.
       colours: title → colour; the titles are names of policies, and have theirs, if not given.
       gripper: that is seen; the paper's by default.
+      mp4: the format, which the package imageio-ffmpeg writes.
 
     Raises:
       NoRendererError: where there is no OpenGL.
+      ModuleNotFoundError: if imageio-ffmpeg is needed and not installed.
     """
-    from PIL import Image
-
     from forcegrasp.evaluate.grasp_figure import draw_grasps, from_the_start
     from forcegrasp.evaluate.plots import figure_pixels
 
@@ -70,12 +76,33 @@ def grasp_video(
                 ]
             )
     pictures = [np.concatenate(parts) for parts in zip(*rows, strict=True)]
+    return _mp4(pictures, gripper.period_s * every) if mp4 else _gif(pictures, gripper.period_s * every)
+
+
+def _gif(pictures: list[np.ndarray], seconds: float) -> bytes:
+    """Pictures that last so long each; the last one longer, to look at the end."""
+    from PIL import Image
+
     palette = _palette(pictures)
     images = [Image.fromarray(picture).quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures]
     data = io.BytesIO()
-    durations = [round(1000 * gripper.period_s) * every] * (len(images) - 1) + [1000]  # a moment to look at the end
+    durations = [round(1000 * seconds)] * (len(images) - 1) + [LAST_S * 1000]
     images[0].save(data, "GIF", save_all=True, append_images=images[1:], duration=durations, loop=0)
     return data.getvalue()
+
+
+def _mp4(pictures: list[np.ndarray], seconds: float) -> bytes:
+    """The same for players that want a film; its sides are even, as the codec has them."""
+    ffmpeg = importlib.import_module("imageio_ffmpeg")  # an extra
+    height, width = (side // 2 * 2 for side in pictures[0].shape[:2])
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "grasp.mp4"
+        film = ffmpeg.write_frames(path, (width, height), fps=1 / seconds, macro_block_size=2)
+        film.send(None)
+        for picture in (*pictures, *pictures[-1:] * round(LAST_S / seconds)):
+            film.send(np.ascontiguousarray(picture[:height, :width]))
+        film.close()
+        return path.read_bytes()
 
 
 def _palette(pictures: list[np.ndarray]) -> Image.Image:

@@ -1,1 +1,1 @@
-"""The model file, and what a training draws from it."""
+"""The model file, what a training draws from it, and robots nobody measured."""

@@ -53,12 +53,12 @@ class ReadingEffects:
             force[effect.rows] = effect.read_force(force[effect.rows])
 
 
-def with_noise(value: Any, std: float, normal: Any, step: float = 0.0) -> Any:
+def with_noise(value: Any, std: Any, normal: Any, step: float = 0.0) -> Any:
     """A reading: noise added, and then rounded as the converter does.
 
     Args:
       value: what comes out of the effects; a numpy array or a torch tensor.
-      std: of the noise, in the value's unit.
+      std: of the noise, in the value's unit; a number, or an array that broadcasts.
       normal: standard normal numbers of the value's shape.
       step: of the converter, in the value's unit; 0 rounds nothing.
     """

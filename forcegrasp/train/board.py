@@ -69,6 +69,7 @@ def layout(algorithm: type[Algorithm]) -> dict[str, dict[str, list]]:
 def evaluate_command(run: RunDir, config: TrainConfig) -> str:
     """What to type to compare a run with the hand-written controller, in the simulator that it was trained in."""
     words = [f"policies=[{run.path},force_pi]", *([f"model={run.model_path}"] if config.model else [])]
+    words = ["plan=robots", *words] if config.draws_robots else words
     return shlex.join(["forcegrasp", "evaluate", *words])
 
 
@@ -76,6 +77,7 @@ def card(run: RunDir, config: TrainConfig) -> str:
     """What this run is, how to go on with it and what the names mean, as Markdown."""
     meanings = "\n".join(f"* `{name}`: {meaning}" for name, meaning in METRICS.items())
     simulator = f"the model `{config.model}`, kept as `{run.model_path}`" if config.model else "the nominal gripper"
+    simulator = "another robot in every grasp" if config.draws_robots else simulator
     title = f"{experiment(run.path) or 'training'}, seed {config.seed}" + (config.model and f", model {config.model}")
     return f"""# {title}
 

@@ -27,6 +27,8 @@ from forcegrasp.config import CollectorConfig, TrainConfig
 from forcegrasp.curriculum import CurriculumHook, CurriculumValues, LinearSchedule
 from forcegrasp.env import GraspEnv, build_env, with_memory
 from forcegrasp.models.model_file import Model
+from forcegrasp.models.robots import DrawnRobots
+from forcegrasp.physics import load_gripper
 from forcegrasp.train import cluster
 from forcegrasp.train.episodes import can_collect, collect
 
@@ -113,6 +115,7 @@ def training_env(config: TrainConfig, model: Model | None = None, worker: int = 
         action=config.action,
         reward=config.reward,
         model=model,
+        robots=DrawnRobots(load_gripper(config.gripper)) if config.draws_robots else None,
         seed=worker_seed(config.seed, worker),
     )
 

@@ -26,6 +26,7 @@ class ObservationNoise(Transform):
       seed: seed of the generator.
       device: where the noise is drawn; that of the readings, lest it be copied there.
       step: one step per key that readings are rounded to, after the noise, in that key's unit; 0 rounds nothing.
+      per_row: an entry, ``(*B, 2 keys)``: a factor of ``std`` for each key, then for each a step in place of ``step``.
     """
 
     def __init__(
@@ -36,12 +37,14 @@ class ObservationNoise(Transform):
         seed: int = 0,
         device: torch.device | str = "cpu",
         step: Sequence[float] | None = None,
+        per_row: NestedKey | None = None,
     ) -> None:
         if not len(in_keys) == len(out_keys) == len(std):
             raise ValueError(f"needs one out_key and one std per in_key; got {in_keys}, {out_keys}, {std}")
         super().__init__(in_keys=in_keys, out_keys=out_keys)
         self.std = [float(s) for s in std]
         self.step = [float(s) for s in step or [0.0] * len(std)]
+        self.per_row = per_row
         self.generator = torch.Generator(device)
         self.set_seed(seed)
 
@@ -50,11 +53,20 @@ class ObservationNoise(Transform):
         self.generator.manual_seed(seed)
 
     def _call(self, next_tensordict: TensorDictBase) -> TensorDictBase:
-        for in_key, out_key, std, step in zip(self.in_keys, self.out_keys, self.std, self.step, strict=True):
+        rows = None if self.per_row is None else next_tensordict[self.per_row].chunk(2, dim=-1)
+        for i, (in_key, out_key, std, step) in enumerate(
+            zip(self.in_keys, self.out_keys, self.std, self.step, strict=True)
+        ):
             value = next_tensordict[in_key]
             device = self.generator.device
             noise = torch.randn(value.shape, generator=self.generator, dtype=value.dtype, device=device)
-            next_tensordict.set(out_key, with_noise(value, std, noise.to(value.device), step))
+            if rows is None:
+                reading = with_noise(value, std, noise.to(value.device), step)
+            else:
+                factor, steps = (part[..., i : i + 1] for part in rows)
+                reading = with_noise(value, std * factor, noise.to(value.device))
+                reading = torch.where(steps > 0, steps * (reading / steps).round(), reading)
+            next_tensordict.set(out_key, reading)
         return next_tensordict
 
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:

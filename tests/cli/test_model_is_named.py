@@ -65,6 +65,8 @@ def test_hint_and_card_name_the_model(tmp_path):
     assert evaluate_command(run, config) in text
     assert "model" not in card(run, TrainConfig()).splitlines()[0]
     assert "the nominal gripper" in card(run, TrainConfig())
+    assert "another robot in every grasp" in card(run, TrainConfig(randomise="catalogue"))
+    assert "plan=robots" in evaluate_command(run, TrainConfig(randomise="catalogue"))
 
 
 def test_a_run_is_judged_as_the_hint_says_or_told(tiny, tmp_path, monkeypatch, capsys):

@@ -83,6 +83,8 @@ SHARED_CASES: dict[str, Any] = {
 
 #: They have tests of their own, as they want packages and hardware.
 ELSEWHERE = ("physics.engine", "physics.device")
+#: It wants a display: tests/evaluate/test_live.py.
+LIVE = ("live",)
 
 #: Options of who collects with Ray.
 RAY = ("collector.kind", "collector.workers", "collector.address")
@@ -99,6 +101,7 @@ TRAIN_CASES: dict[str, Any] = {
     "seed": 1,
     "gripper": "franka_hand",
     "model": str(MODEL),
+    "randomise": "catalogue",
     "learner": "sac",
     **SHARED_CASES,
     "observation.parts": ["position", "force"],
@@ -184,6 +187,7 @@ EVALUATE_CASES: dict[str, Any] = {
     "gripper": "franka_hand",
     "seed": 1,
     "model": str(MODEL),
+    "robots": 4,
     **SHARED_CASES,
     "speed_threshold_m": 0.0,
 }
@@ -193,6 +197,7 @@ EVALUATE_CASES: dict[str, Any] = {
 RENDER_CASES: dict[str, Any] = {
     "policies": "[informed]",
     "out": "elsewhere.gif",
+    "live": True,
     "gripper": "franka_hand",
     "seed": 1,
     "kappa": 0.1,
@@ -459,7 +464,7 @@ def rendered(folder: Path, **values: Any) -> tuple:
     """What would be shown, what is said, where it is written, and with how many threads it was simulated."""
     shown, said = [], io.StringIO()
 
-    def show(episodes, sensors, gripper):
+    def show(episodes, sensors, gripper, mp4):
         shown.extend(episode["next", "force"].tolist() for episode in episodes.values())
         return b"GIF"
 
@@ -480,7 +485,7 @@ def test_the_same_rendering_shows_the_same(tmp_path, plain_rendering, run_path):
     assert rendered(tmp_path, policies=[str(run_path)]) == plain_rendering
 
 
-@pytest.mark.parametrize("name", [name for name in RENDER_CASES if name not in ("gripper", *ELSEWHERE)])
+@pytest.mark.parametrize("name", [name for name in RENDER_CASES if name not in ("gripper", *LIVE, *ELSEWHERE)])
 def test_option_of_render(name, tmp_path, plain_rendering, run_path):
     assert rendered(tmp_path, **{"policies": [str(run_path)], name: RENDER_CASES[name]}) != plain_rendering
 

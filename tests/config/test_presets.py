@@ -178,6 +178,10 @@ def test_sac_learns_the_task_of_recommended():
     assert task == {"learner", "observation.frames", "log.checkpoint_every"}
 
 
+def test_catalogue_differs_from_recommended_in_the_robots_alone():
+    assert changed(train("experiment=recommended"), train("experiment=catalogue")) == {"randomise": "catalogue"}
+
+
 @pytest.mark.parametrize(
     ("experiment", "without"),
     [

@@ -132,6 +132,8 @@ def test_choices_are_closed(verb, name, meta, default):
         config = with_option(verb, name, [choice] if listed else choice)
         if name == "physics.device":
             config.physics.engine = "warp"  # the other engine knows one device
+        if (name, choice) == ("randomise", "model"):
+            config.model = "virtual_robot"  # without one there is none to draw from
         validate(config)
         for wrong in (choice.upper(), choice + "s", ""):
             message = refused(verb, name, [wrong] if listed else wrong)

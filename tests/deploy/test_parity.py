@@ -9,6 +9,7 @@ from torchrl.envs.utils import ExplorationType, set_exploration_type
 
 from forcegrasp.config import (
     ActionConfig,
+    CollectorConfig,
     GraspConfig,
     ObservationConfig,
     PhysicsConfig,
@@ -46,7 +47,7 @@ VARIANTS = {
     },
     "memory, not mirrored": {"ppo": PPOConfig(hidden=[8], memory=5, mirrored=False)},
     "memory of one motor": {"ppo": PPOConfig(hidden=[8], memory=5), "gripper": "franka_hand", "grasp": GraspConfig()},
-    "SAC": {"learner": "sac", "sac": SACConfig(hidden=[16])},
+    "SAC": {"learner": "sac", "sac": SACConfig(hidden=[16]), "collector": CollectorConfig(ahead=False)},
 } | {name: {"gripper": name, "grasp": GraspConfig()} for name in [*shipped_grippers(), "one_sensor"]}
 
 

@@ -25,6 +25,7 @@ SOUND = {
         'onnx>=1.19; extra == "onnx"',
         'ray==2.60.0; extra == "ray"',
         'hydra-submitit-launcher==1.2.0; extra == "cluster"',
+        'imageio-ffmpeg>=0.6; extra == "video"',
         'mujoco-warp==4.0.0; extra == "warp"',
         'pytest; extra == "dev"',
     ),
@@ -40,6 +41,7 @@ SOUND = {
     "onnx": ("1.23.2",),
     "ray": ("2.60.0",),
     "hydra-submitit-launcher": ("1.2.0",),
+    "imageio-ffmpeg": ("0.8.1",),
     "mujoco-warp": ("4.0.0",),
 }
 

@@ -131,7 +131,7 @@ def test_extras_are_notes(environment):
     del environment["rosbags"]
     environment["onnx"].version = "1.0"
     lines = [finding.line() for finding in check_extras()]
-    assert [finding.level for finding in check_extras()] == ["note", "note", "fine", "fine", "fine"]
+    assert [finding.level for finding in check_extras()] == ["note", "note", "fine", "fine", "fine", "fine"]
     assert "onnx 1.0 is installed, >=1.19 is needed; if you want it: pip install 'forcegrasp[onnx]'" in lines[0]
     assert "rosbags is not installed; if you want it: pip install 'forcegrasp[rosbag]'" in lines[1]
     environment["forcegrasp"].requires = []

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import io
+import tempfile
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,6 +12,7 @@ import torch
 from PIL import Image
 from tensordict import TensorDict
 
+from forcegrasp.cli.main import main
 from forcegrasp.config import GraspConfig, SensorConfig, TrainConfig
 from forcegrasp.controllers import make_controller
 from forcegrasp.env import build_env
@@ -25,7 +28,7 @@ from forcegrasp.evaluate.grasp_layout import (
     TOP_EDGE,
     WIDTH,
 )
-from forcegrasp.evaluate.video import grasp_video
+from forcegrasp.evaluate.video import _mp4, grasp_video
 from forcegrasp.physics import default_gripper
 from forcegrasp.physics.completion import complete
 from forcegrasp.physics.scene_renderer import NoRendererError
@@ -129,3 +132,36 @@ def test_training_goes_on_without_a_renderer(tmp_path, monkeypatch, capsys):
     assert run.load()[1]["frames"] == 6
     assert capsys.readouterr().err.count("no video") == 1
     assert not list(run.figures.iterdir())
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")  # its reader leaves pipes open
+def test_mp4_has_the_same_pictures_and_lasts_as_long():
+    ffmpeg = pytest.importorskip("imageio_ffmpeg")
+    pictures = [np.full((51, 64, 3), shade, np.uint8) for shade in (40, 120, 200)]
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "film.mp4"
+        path.write_bytes(_mp4(pictures, 0.5))
+        frames = ffmpeg.read_frames(path)
+        facts = next(frames)
+        shades = [np.frombuffer(frame, np.uint8).mean() for frame in frames]
+    assert (facts["codec"], facts["size"], facts["fps"]) == ("h264", (64, 50), 2.0)
+    np.testing.assert_allclose(shades, [40, 120, 200, 200, 200], atol=3)
+
+
+def test_mp4_without_its_package_is_told_in_a_line(monkeypatch, capsys, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("forcegrasp.cli.render.find_spec", lambda name: None)
+    assert main(["render", "out=grasp.mp4"]) == 2
+    told = "out=grasp.mp4: needs imageio-ffmpeg: pip install 'forcegrasp[video]'; or name a .gif"
+    assert told in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_files_name_is_the_format(monkeypatch, tmp_path):
+    asked = []
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("forcegrasp.cli.render.find_spec", lambda name: name)
+    monkeypatch.setattr("forcegrasp.evaluate.render.grasp_video", lambda *_, mp4, **__: asked.append(mp4) or b"")
+    for name in ("grasp.mp4", "grasp.gif"):
+        assert main(["render", "steps=2", "physics=fast", f"out={name}"]) == 0
+    assert asked == [True, False]

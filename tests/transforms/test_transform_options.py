@@ -37,6 +37,7 @@ CHANGED = [
     (ObservationNoise, "std", [0.2]),
     (ObservationNoise, "seed", 1),
     (ObservationNoise, "step", [0.25]),
+    (ObservationNoise, "per_row", "spare"),
     (HadContact, "threshold", 0.7),
     (HadContact, "stall", 0.2),
     (HadContact, "in_key", "spare"),

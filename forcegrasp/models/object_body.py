@@ -1,0 +1,34 @@
+"""What a grasped object is, besides its size and softness."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from forcegrasp.effects.base import Effect, Parameter
+from forcegrasp.physics.plant import Plant
+
+
+class ObjectBody(Effect):
+    """An object of another mass, and other friction wherever something touches it, than the scene's.
+
+    It is drawn with a robot; no log of a grasp tells it apart from softness and friction, so no diagnosis looks for it.
+    """
+
+    name = "object_body"
+    stage = "object"
+    family = "contact"
+    needs_object = True
+    symptom = "the first finger pushes a light object further"
+    formula = "m = a m₀, I = a I₀, μ = c μ₀"
+    source = "own"
+    parameters = (
+        Parameter("mass_factor", "mass a", "1", 0.01, 100.0, 1.0, null=1.0),
+        Parameter("friction_factor", "friction c", "1", 0.0, 10.0, 1.0, null=1.0),
+    )
+
+    def change_model(self, plant: Plant, which: np.ndarray) -> None:
+        rows, body = self.rows[which], plant.model.geom_bodyid[plant.object_geoms[0]]
+        mass, friction = self["mass_factor"][which], self["friction_factor"][which]
+        plant.field("body_mass")[rows, body] *= mass[:, 0]
+        plant.field("body_inertia")[rows, body] *= mass
+        plant.field("geom_friction")[rows, :, 0] *= friction

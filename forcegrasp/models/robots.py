@@ -1,0 +1,183 @@
+"""Robots of one gripper, each with effects, gains, noise and objects of its own, drawn from the prior."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from forcegrasp.effects.base import Effect, Parameter
+from forcegrasp.effects.for_gripper import effects_of
+from forcegrasp.effects.setting import EffectSetting
+from forcegrasp.models.object_body import ObjectBody
+from forcegrasp.models.robot_prior import EFFECTS, FRICTION, GAINS, MASS, NOISE, SHAPE, Prior
+from forcegrasp.physics.gripper import Gripper
+from forcegrasp.physics.plant import Plant
+from forcegrasp.physics.sensors import rounding_steps
+from forcegrasp.short_repr import ShortRepr
+
+#: Seed of the robots that policies are compared on, together with a robot's number.
+POPULATION = 20231
+
+
+@dataclass(frozen=True, repr=False)
+class Robots(ShortRepr):
+    """``n`` robots of one gripper."""
+
+    gripper: Gripper
+    effects: tuple[EffectSetting, ...]  #: all that any may have; values ``(n, parameters)``, null for who has it not
+    base: dict[str, np.ndarray]  #: base parameters of the gripper, ``(n,)`` each
+    noise: np.ndarray  #: factors of the noise of positions and forces, ``(n, 2)``
+
+    def __len__(self) -> int:
+        return len(self.noise)
+
+    def __getitem__(self, rows: np.ndarray) -> Robots:
+        effects = tuple(EffectSetting(e.effect, e.variant, e.values[rows]) for e in self.effects)
+        return Robots(self.gripper, effects, {name: v[rows] for name, v in self.base.items()}, self.noise[rows])
+
+    @property
+    def readings(self) -> np.ndarray:
+        """Factors of the noise of positions and forces, then the steps that they are rounded to, ``(n, 4)``."""
+        steps = rounding_steps((e.effect, e.values) for e in self.effects)
+        return np.concatenate([self.noise, np.broadcast_to(steps, self.noise.shape)], axis=1)
+
+    def has(self, effect: str) -> np.ndarray:
+        """Which robots have an effect, in whichever variant, ``(n,)``."""
+        found = [_present(e) for e in self.effects if e.effect.name == effect]
+        return np.any(found, axis=0) if found else np.zeros(len(self), bool)
+
+    def sizes(self, robot: int) -> Iterator[tuple[str, float]]:
+        """Everything that makes a robot what it is: name and value."""
+        yield from ((name, float(values[robot])) for name, values in self.base.items())
+        yield from zip(("position_noise_factor", "force_noise_factor"), map(float, self.noise[robot]), strict=True)
+        for setting in self.effects:
+            if _present(setting)[robot]:
+                where = f"{setting.effect.name} {setting.variant}".strip()
+                for p, value in zip(setting.effect.parameters, setting.values[robot], strict=True):
+                    yield f"{where}.{p.name}", float(value)
+
+
+def draw_robots(gripper: Gripper, rng: np.random.Generator, count: int) -> Robots:
+    """Draws robots from the prior, independent of one another in everything."""
+    base = {}
+    for name, p in gripper.parameters.items():
+        if p.scope == "gripper":
+            ranged = name == gripper.training.servo_gain
+            values = rng.uniform(*gripper.training.servo_gain_range, count) if ranged else 0
+            base[name] = values if ranged else np.clip(p.nominal * _factors(rng, GAINS, count), p.low, p.high)
+    effects = []
+    for effect, prior in _possible(gripper):
+        chosen = rng.uniform(size=count) / prior.chance * len(effect.variants)
+        sizes = np.stack([_sizes(rng, effect, p, prior, count) for p in effect.parameters], axis=1)
+        for number, variant in enumerate(effect.variants):
+            present = (number <= chosen) & (chosen < number + 1)
+            effects.append(EffectSetting(effect, variant, np.where(present[:, None], sizes, effect.null_values())))
+    return Robots(gripper, tuple(effects), base, _factors(rng, NOISE, (count, 2)))
+
+
+def size_ranges(gripper: Gripper) -> dict[str, list[tuple[Parameter, float, float]]]:
+    """Effect → each of its parameters, with the smallest and the largest absolute value that is drawn."""
+    return {e.name: [(p, *_range(e, p, prior)) for p in e.parameters] for e, prior in _possible(gripper)}
+
+
+def population(gripper: Gripper, count: int) -> Robots:
+    """The robots that policies are compared on: number k is the same one whatever the count.
+
+    Those of even numbers are for development; on those of odd numbers nobody tunes anything.
+    """
+    drawn = [draw_robots(gripper, np.random.default_rng([POPULATION, k]), 1) for k in range(count)]
+    effects = [
+        EffectSetting(one.effect, one.variant, np.concatenate([robot.effects[i].values for robot in drawn]))
+        for i, one in enumerate(drawn[0].effects)
+    ]
+    base = {name: np.concatenate([robot.base[name] for robot in drawn]) for name in drawn[0].base}
+    return Robots(gripper, tuple(effects), base, np.concatenate([robot.noise for robot in drawn]))
+
+
+class DrawnRobots:
+    """Another robot from the prior for every grasp.
+
+    Every effect is attached to every row and is null where a robot has it not, which changes no bit: rows keep their
+    effects' memory whichever others are reset.
+
+    Args:
+      gripper: whose robots they are.
+    """
+
+    def __init__(self, gripper: Gripper) -> None:
+        self.gripper = gripper
+
+    def attach(self, plant: Plant) -> None:
+        """Prepares a plant, once."""
+        self.readings = np.zeros((plant.n, 4))  #: see :attr:`Robots.readings`, ``(rows, 4)``
+        self._effects: list[Effect] = []
+        for effect, prior in _possible(self.gripper):
+            largest = np.array([_range(effect, p, prior)[1] for p in effect.parameters])
+            values = np.repeat(effect.null_values()[None], plant.n, axis=0)
+            self._effects += [effect(values.copy(), plant.dt, variant, largest) for variant in effect.variants]
+        plant.attach([(effect, np.arange(plant.n)) for effect in self._effects])
+
+    def draw(self, rng: np.random.Generator, ids: np.ndarray) -> dict[str, np.ndarray]:
+        """Draws robots for these rows, and returns their base parameters, each ``(len(ids),)``."""
+        robots = draw_robots(self.gripper, rng, len(ids))
+        for effect, setting in zip(self._effects, robots.effects, strict=True):
+            effect.values[ids] = setting.values
+        self.readings[ids] = robots.readings
+        return robots.base
+
+
+class FixedRobots:
+    """Given robots, one for each row.
+
+    Args:
+      robots: as many as the plant has rows.
+    """
+
+    def __init__(self, robots: Robots) -> None:
+        self.robots, self.readings = robots, robots.readings
+
+    def attach(self, plant: Plant) -> None:
+        """Puts effects into a plant, each on the rows whose robots have it."""
+        found = [(setting, np.flatnonzero(_present(setting))) for setting in self.robots.effects]
+        plant.attach([(e.effect(e.values[rows], plant.dt, e.variant), rows) for e, rows in found if len(rows)])
+
+    def draw(self, rng: np.random.Generator, ids: np.ndarray) -> dict[str, np.ndarray]:
+        """Base parameters of these rows' robots, each ``(len(ids),)``."""
+        return {name: values[ids] for name, values in self.robots.base.items()}
+
+
+def _possible(gripper: Gripper) -> list[tuple[type[Effect], Prior]]:
+    """Effects that a robot with this gripper may have."""
+    there = [effect for name, effect in effects_of(gripper).items() if name in EFFECTS]
+    return [(effect, EFFECTS[effect.name]) for effect in [*there, ObjectBody]]
+
+
+def _present(setting: EffectSetting) -> np.ndarray:
+    return (setting.values != setting.effect.null_values()).any(axis=1)
+
+
+def _range(effect: type[Effect], parameter: Parameter, prior: Prior) -> tuple[float, float]:
+    """Smallest and largest absolute value that is drawn."""
+    own = {"mass_factor": MASS, "friction_factor": FRICTION}
+    shapes = np.isfinite(parameter.null) and parameter.null != 0
+    low, high = own.get(parameter.name, SHAPE if shapes else (prior.low, prior.high))[:2]
+    alike = effect.parameters if effect.per else (parameter,)  # left and right
+    typical = max(abs(p.typical) for p in alike)
+    return max(low * typical, parameter.low), min(high * typical, parameter.high)
+
+
+def _sizes(
+    rng: np.random.Generator, effect: type[Effect], parameter: Parameter, prior: Prior, count: int
+) -> np.ndarray:
+    size = _log_uniform(rng, *_range(effect, parameter, prior), count)
+    return size * rng.choice([-1, 1], count) if parameter.low < 0 else size
+
+
+def _factors(rng: np.random.Generator, ends: tuple[float, float, str], size: int | tuple[int, int]) -> np.ndarray:
+    return _log_uniform(rng, *ends[:2], size)
+
+
+def _log_uniform(rng: np.random.Generator, low: float, high: float, size: int | tuple[int, int]) -> np.ndarray:
+    return np.exp(rng.uniform(np.log(low), np.log(high), size))

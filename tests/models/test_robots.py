@@ -1,0 +1,119 @@
+"""Robots of the prior: always the same by number, within their ranges, and each of their parts counts."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from forcegrasp.config import PhysicsConfig
+from forcegrasp.effects import catalogue
+from forcegrasp.effects.setting import EffectSetting
+from forcegrasp.env import build_env
+from forcegrasp.errors import ConfigError
+from forcegrasp.models.object_body import ObjectBody
+from forcegrasp.models.robot_prior import EFFECTS
+from forcegrasp.models.robots import DrawnRobots, FixedRobots, Robots, draw_robots, population
+from forcegrasp.physics import GraspSimulator, default_gripper, load_gripper, shipped_grippers
+
+ROWS = np.arange(6)
+
+
+def forces(robots: DrawnRobots | FixedRobots, n: int = 6, ids: np.ndarray = ROWS, steps: int = 40) -> np.ndarray:
+    """Readings of a grasp that closes for a while, ``(steps, n, channels)``."""
+    simulator = GraspSimulator(n, "fast", 1, robots, default_gripper())
+    simulator.reset(simulator.parameters[ids], ids, np.random.default_rng(5))
+    found = []
+    for _ in range(steps):
+        simulator.step(np.full((n, 2), -0.002))
+        found.append(np.concatenate([simulator.measured_force, simulator.measured_position], axis=1))
+    return np.array(found)
+
+
+def plain(**changes) -> Robots:
+    """Six robots with no effect, of which some things are changed."""
+    drawn = draw_robots(default_gripper(), np.random.default_rng(0), 6)
+    nulls = [EffectSetting(e.effect, e.variant, np.repeat(e.effect.null_values()[None], 6, 0)) for e in drawn.effects]
+    return dataclasses.replace(drawn, effects=tuple(nulls), **changes)
+
+
+def test_a_number_is_always_the_same_robot():
+    few, many = population(default_gripper(), 3), population(default_gripper(), 5)
+    for robot in range(3):
+        assert dict(few.sizes(robot)) == dict(many.sizes(robot))
+    assert dict(few.sizes(0)) != dict(few.sizes(1))
+    assert many[np.array([4])].base["position_gain"] == many.base["position_gain"][4]
+
+
+def test_every_effect_of_a_robot_has_a_prior():
+    robots = {n for n, e in catalogue().items() if not (e.of_set or e.servo_only)}
+    assert set(EFFECTS) == robots | {ObjectBody.name}
+    assert all(0 < p.chance <= 1 and 0 < p.low <= p.high and p.why for p in EFFECTS.values())
+
+
+@pytest.mark.parametrize("name", shipped_grippers())
+def test_robots_of_any_gripper_are_within_bounds_and_have_effects_as_often_as_they_should(name):
+    robots = draw_robots(load_gripper(name), np.random.default_rng(1), 2000)
+    for setting in robots.effects:
+        present = (setting.values != setting.effect.null_values()).any(axis=1)
+        for p, values in zip(setting.effect.parameters, setting.values.T, strict=True):
+            assert ((p.low <= values[present]) & (values[present] <= p.high)).all()
+        share = EFFECTS[setting.effect.name].chance / len(setting.effect.variants)
+        assert present.mean() == pytest.approx(share, abs=0.04)
+    for parameter, values in robots.base.items():
+        assert values.std() > 0
+        assert load_gripper(name).parameters[parameter].low <= values.min()
+    simulator = GraspSimulator(4, "fast", 1, DrawnRobots(load_gripper(name)), load_gripper(name))
+    for _ in range(8):
+        simulator.step(np.full_like(simulator.joint_position, -simulator.gripper.max_step))
+    assert len(np.unique(simulator.measured_position[:, 0])) == 4
+
+
+def test_a_robot_drawn_for_a_row_acts_as_the_same_one_given():
+    """Also where other rows have effects that it has not, and whichever rows are reset."""
+    drawn = forces(DrawnRobots(default_gripper()))
+    given = FixedRobots(draw_robots(default_gripper(), np.random.default_rng(5), 6))
+    np.testing.assert_array_equal(drawn, forces(given))
+    assert len(np.unique(drawn[-1], axis=0)) == 6
+    some = np.array([1, 4])
+    again = forces(DrawnRobots(default_gripper()), ids=some)[:, some]
+    pair = FixedRobots(draw_robots(default_gripper(), np.random.default_rng(5), 2))
+    np.testing.assert_array_equal(again, forces(pair, 2, np.arange(2)))
+
+
+@pytest.mark.parametrize("parameter", range(2))
+def test_mass_and_friction_of_the_object_count(parameter):
+    robots = plain()
+    one = robots.effects[-1] if robots.effects[-1].effect is ObjectBody else None
+    assert one
+    before = forces(FixedRobots(robots))
+    one.values[:, parameter] = 0.5
+    assert (before != forces(FixedRobots(robots))).any()
+    plant = GraspSimulator(6, "fast", 1, FixedRobots(robots), default_gripper()).plant
+    for name in (("body_mass", "body_inertia"), ("geom_friction",))[parameter]:
+        there = plant.base(name) > 0
+        assert np.isin(plant.field(name)[there] / plant.base(name)[there], [0.5, 1.0]).all()
+        assert (plant.field(name)[there] < plant.base(name)[there]).any()
+
+
+def test_noise_and_rounding_are_those_of_each_robot():
+    robots = plain(noise=np.array([[1, 0.0]] * 3 + [[0, 2.0]] * 3))
+    rounding = next(e for e in robots.effects if e.effect.after_noise)
+    rounding.values[-1] = 0.001, 0.5
+    env = build_env(6, physics=PhysicsConfig(tier="fast", threads=1), robots=FixedRobots(robots))
+    after = env.rollout(30).get("next")
+    position = (after["sensed_position"] - after["measured_position"]).numpy()
+    force = (after["sensed_force"] - after["measured_force"]).numpy()
+    np.testing.assert_allclose(position[:3].std((1, 2)), 2.7e-5, rtol=0.4)
+    np.testing.assert_allclose(force[3:5].std((1, 2)), 2 * 0.013, rtol=0.4)
+    assert not force[:3].any()
+    assert not position[3:5].any()
+    steps = after["sensed_force"][-1].numpy() / 0.5
+    np.testing.assert_allclose(steps, steps.round(), atol=1e-6)
+    env.close()
+
+
+def test_a_model_and_robots_are_one_too_many():
+    with pytest.raises(ConfigError, match="robots: a model is given, too; leave one of them out"):
+        build_env(2, model="virtual_robot", robots=DrawnRobots(default_gripper()))
