@@ -10,7 +10,7 @@ from tools.measured_code import ROOT, outdated, without_sentences
 from tools.results.blocks import BLOCKS, Block
 from tools.results.notes import Note, Notes, stamps
 from tools.results.policies import POLICIES
-from tools.results.settings import Settings, digests
+from tools.results.settings import TRIAL, Settings, digests
 
 
 def write_pages(settings: Settings, notes: Notes, say: Callable[[str], None]) -> None:
@@ -29,7 +29,7 @@ def write_pages(settings: Settings, notes: Notes, say: Callable[[str], None]) ->
 
 def _with(block: Block, page: str, settings: Settings, made: list[Note]) -> str:
     """The page with this block written anew."""
-    trial = ", a TRIAL that says nothing" if settings.trial else ""
+    trial = TRIAL if settings.trial else ""
     said = "\n\n".join(stamps(made, block.name, f", {settings.seeds} seeds{trial}"))
 
     def written(found: re.Match[str]) -> str:

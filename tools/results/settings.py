@@ -18,6 +18,10 @@ CODE = {
 CODE["diagnosis"] = (*CODE["training"], "diagnosis", "identify", "measure", "replay")
 
 
+#: What figures of a trial are marked with.
+TRIAL = ", a TRIAL that says nothing"
+
+
 @dataclass(frozen=True)
 class Settings:
     """What was asked for.

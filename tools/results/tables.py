@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
@@ -10,7 +11,7 @@ import numpy as np
 from forcegrasp.evaluate.curve_groups import interval
 from forcegrasp.evaluate.statistics import QUANTILES
 from forcegrasp.evaluate.tables import SHARES
-from tools.results.policies import CONTROLLERS, MEASURED, REWARD
+from tools.results.policies import CONTROLLERS, MEASURED, REWARD, SWEEPS
 from tools.results.seeds import Figures, by_experiment, read_evaluation, seeds_of
 
 #: Of a table's columns or rows: its name → the figures of each of its seeds; a controller has one.
@@ -154,9 +155,17 @@ def ablation(out: Path, sweep: str = "ablation", figures: tuple[str, ...] = (*_O
         for who, seeds in found.items()
     ]
     rows.append(["hand-written (`force_pi`)", *_figures([report["policies"]["force_pi"]], figures), ""])
-    grasps = f"On the same {len(report['cells'])} × {report['trials']} grasps of the reference tier"
+    seeds = len(next(iter(found.values())))
+    trained = f"`forcegrasp train -m {SWEEPS[sweep]}`, {seeds} seeds, {_frames(out, sweep):,} frames"
+    grasps = f"evaluated on the same {len(report['cells'])} × {report['trials']} grasps of the reference tier"
     header = ["experiment", *(_ROWS[name][0] for name in figures), "each seed's force reward"]
-    return f"{grasps}. {_SEEDS}:\n\n" + table(header, rows)
+    return f"{trained}; {grasps}. {_SEEDS}:\n\n" + table(header, rows)
+
+
+def _frames(out: Path, sweep: str) -> int:
+    """Control steps of each training of a sweep."""
+    curves = json.loads((out / f"evaluate-{sweep}" / "curves" / "curves.json").read_text("utf-8"))
+    return max(run["frames"] for group in curves["groups"].values() for run in group["runs"])
 
 
 def _figures(seeds: list[Figures], names: Iterable[str]) -> list[str]:
@@ -165,7 +174,7 @@ def _figures(seeds: list[Figures], names: Iterable[str]) -> list[str]:
 
 def parts(out: Path) -> str:
     """What each part of the observation is worth."""
-    return ablation(out, "parts", _OF_SWEEPS)
+    return f"What each part of the observation is worth.\n\n{ablation(out, 'parts', _OF_SWEEPS)}"
 
 
 def printed(out: Path) -> str:
