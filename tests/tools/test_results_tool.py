@@ -258,10 +258,10 @@ def texts(folder) -> dict[str, str]:
     return {str(path.relative_to(folder)): path.read_text() for path in folder.rglob("*.md")}
 
 
-def test_tables_are_replaced_and_nothing_else_of_a_page(results, repository):
+def test_tables_are_replaced_and_nothing_else_of_a_page(results, repository, every):
     before = texts(repository)
     said: list[str] = []
-    pages.write_pages(Settings(out=results), Notes(results), said.append)
+    pages.write_pages(Settings(out=results), Notes(results), every, said.append)
     assert not said
     after = texts(repository)
     for name in {block.page for block in blocks.BLOCKS}:
@@ -276,7 +276,7 @@ def test_tables_are_replaced_and_nothing_else_of_a_page(results, repository):
     assert "| force reward, normalised form | 102.0 ± 2.0 | 102.0 ± 2.0 | 102.0 ± 2.0 | 90.0 |" in page
     assert "| crushed [% of the grasps] | 102.0 ± 2.0 | 102.0 ± 2.0 | 90.0 | 120.0 |" in page
     assert "| peak force [N] | 102.000 ± 1.963; 103.000; 104.000 |" in page
-    assert "| ib | 102.0 | 101.0 |" in page
+    assert "| κ | 0.0 | 1.0 |\n|---|---|---|\n| ib | 102.0 | 101.0 |" in page
     stamp = f"Measured with commit `c0ffee`, digest `{digests()['training']}`"
     assert f"{stamp}: `python -m tools.results --only paper`, 5 seeds." in page
     assert "![Object movement by softness](figures/paper_displacement.png)" in page
@@ -289,24 +289,27 @@ def test_tables_are_replaced_and_nothing_else_of_a_page(results, repository):
     robot = "| `ib` | 102.0 ± 2.0 | 102.0 ± 2.0 | 102.0 ± 2.0 | 102.00 ± 1.96 | 109 ± 13; 1.7 ± 0.9 mm |"
     assert robot in after["docs/transfer.md"]
     again = texts(repository)
-    pages.write_pages(Settings(out=results), Notes(results), said.append)
+    pages.write_pages(Settings(out=results), Notes(results), every, said.append)
     assert texts(repository) == again
 
 
-def test_what_is_not_measured_stays_on_the_page(results, repository):
+def test_what_is_not_measured_stays_on_the_page(results, repository, every):
     before = texts(repository)
     (results / "notes" / "train-parts.json").unlink()
     said: list[str] = []
-    pages.write_pages(Settings(out=results), Notes(results), said.append)
+    pages.write_pages(Settings(out=results), Notes(results), every, said.append)
     assert said == ["docs/ablations.md, parts: stays as it is, without evaluate-parts"]
+    said.clear()
+    pages.write_pages(Settings(out=results), Notes(results), ["train-ib", "evaluate-ib"], said.append)
+    assert not said
     mark = pages._marked("parts")
     assert mark.search(texts(repository)["docs/ablations.md"])[2] == mark.search(before["docs/ablations.md"])[2]
 
 
 @pytest.mark.parametrize("few", [{"seeds": 2}, {"frames": 1000}, {"trials": 2}])
-def test_figures_of_a_trial_never_come_into_the_repository(few, results, repository):
+def test_figures_of_a_trial_never_come_into_the_repository(few, results, repository, every):
     settings, before = Settings(out=results, **few), texts(repository)
-    pages.write_pages(settings, Notes(results), lambda text: None)
+    pages.write_pages(settings, Notes(results), every, lambda text: None)
     assert texts(repository) == before
     assert "a TRIAL that says nothing." in (results / "pages" / "docs" / "results.md").read_text()
     everything = stages(settings)
@@ -322,11 +325,11 @@ def test_what_a_trial_ships_is_not_what_comes_with_the_package(every):
     assert any(word.startswith("policies=[runs/results/pages/forcegrasp/policies/ib,") for word in trial)
 
 
-def test_check_has_a_line_for_each_table_and_card_of_other_code(results, repository):
+def test_check_has_a_line_for_each_table_and_card_of_other_code(results, repository, every):
     found = pages.check(repository)
     assert len(found) == len(blocks.BLOCKS) + len(POLICIES)
     assert not [line for line in found if "its marks are not on the page" in line]
-    pages.write_pages(Settings(out=results), Notes(results), lambda text: None)
+    pages.write_pages(Settings(out=results), Notes(results), every, lambda text: None)
     assert all("card.md" in line for line in pages.check(repository))
     page = repository / "README.md"
     page.write_text(page.read_text().replace(digests()["training"], "another"))

@@ -73,7 +73,9 @@ def main(arguments: list[str] | None = None) -> int:
             if "pages" not in _words(options.skip):
                 from tools.results.pages import write_pages
 
-                write_pages(settings, notes, say)
+                write_pages(settings, notes, [stage.name for stage in chosen], say)
+    except KeyboardInterrupt:  # while it measured how fast the machine is, or wrote pages
+        return execute.INTERRUPTED
     except (ForcegraspError, ValueError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 2

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from pathlib import Path
 
 from tools.measured_code import ROOT, outdated, without_sentences
@@ -13,9 +13,9 @@ from tools.results.policies import POLICIES
 from tools.results.settings import TRIAL, Settings, digests
 
 
-def write_pages(settings: Settings, notes: Notes, say: Callable[[str], None]) -> None:
-    """Writes every block whose stages are done; those of a trial into pages of its own."""
-    for block in BLOCKS:
+def write_pages(settings: Settings, notes: Notes, chosen: Collection[str], say: Callable[[str], None]) -> None:
+    """Writes every block of the chosen stages that is done; those of a trial into pages of its own."""
+    for block in (one for one in BLOCKS if not set(one.stages).isdisjoint(chosen)):
         made = notes.behind(block.stages)
         if made is None:
             missing = [name for name in block.stages if notes.behind([name]) is None]

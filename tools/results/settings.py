@@ -9,7 +9,7 @@ from tools.measured_code import ROOT, digest
 
 SEEDS = 5
 #: Kinds of figures → the packages of forcegrasp, and the presets, whose every line can change them.
-CODE = {
+CODE: dict[str, tuple[str, ...]] = {
     "training": (
         *("assets", "conf", "config", "controllers", "curriculum", "effects", "env", "models", "observation.py"),
         *("physics", "train", "transforms", "evaluate/grids.py", "evaluate/rollouts.py", "evaluate/statistics.py"),

@@ -63,8 +63,8 @@ def over_seeds(values: Iterable[float], digits: int, factor: float = 1.0) -> str
 
 def table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     """In Markdown."""
-    lines = [header, ["---"] * len(header), *rows]
-    return "\n".join(f"| {' | '.join(line)} |".replace("|  |", "| |") for line in lines)
+    head, *lines = (f"| {' | '.join(line)} |".replace("|  |", "| |") for line in (header, *rows))
+    return "\n".join([head, "|" + "---|" * len(header), *lines])
 
 
 def columns(out: Path, names: Sequence[str], where: str = "softness") -> Columns:
