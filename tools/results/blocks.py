@@ -33,7 +33,8 @@ def _evaluated(*names: str) -> tuple[str, ...]:
     return (*(f"evaluate-{name}" for name in names), _CONTROLLERS)
 
 
-_RESULTS, _ABLATIONS = "docs/results.md", "docs/ablations.md"
+_RESULTS, _ABLATIONS, _TRANSFER = "docs/results.md", "docs/ablations.md", "docs/transfer.md"
+_ON_ROBOT = tuple(policy.name for policy in POLICIES if policy.name != "recommended")
 BLOCKS = (
     Block(_RESULTS, "paper", _evaluated("ib", "no_ib", "no_rand"), tables.paper),
     Block(_RESULTS, "paper-softness", _evaluated("ib", "no_ib", "no_rand"), tables.paper_softness),
@@ -47,7 +48,9 @@ BLOCKS = (
     Block(_ABLATIONS, "curves-picture", ("pictures",)),
     Block(_ABLATIONS, "ablation", ("evaluate-ablation",), tables.ablation),
     Block(_ABLATIONS, "parts", ("evaluate-parts",), tables.parts),
-    Block("docs/transfer.md", "transfer", _evaluated(*(p.name for p in POLICIES)), tables.transfer),
+    Block(_TRANSFER, "transfer", _evaluated(*_ON_ROBOT), tables.transfer),
+    Block(_TRANSFER, "transfer-objects", _evaluated(*_ON_ROBOT), tables.transfer_objects),
+    Block(_TRANSFER, "transfer-picture", ("render-transfer",)),
     Block("docs/quickstart.md", "paper-pictures", ("pictures",)),
     Block("README.md", "force-reward-picture", ("pictures",)),
 )

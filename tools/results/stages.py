@@ -25,7 +25,7 @@ def stages(settings: Settings) -> dict[str, Stage]:
         *(stage for policy in POLICIES for stage in _of_policy(policy, settings)),
         *(stage for sweep, options in SWEEPS.items() for stage in _of_sweep(sweep, options, settings)),
         _controllers(settings),
-        _pictures(settings),
+        *_pictures(settings),
         *_other_programs(settings),
     ]
     return {stage.name: stage for stage in every if not (stage.writes_docs and settings.trial)}
@@ -158,25 +158,40 @@ def _controllers(settings: Settings) -> Stage:
     )
 
 
-def _pictures(settings: Settings) -> Stage:
-    """Pictures of the policies that were shipped, which a trial's are not."""
+def _shipped(settings: Settings, *names: str) -> str:
+    """Policies that were shipped, which a trial's are not, and controllers."""
+    folder = settings.shown("pages", "forcegrasp", "policies") + "/" if settings.trial else ""
+    policies = {policy.name for policy in POLICIES}
+    return f"policies=[{','.join(folder * (name in policies) + name for name in names)}]"
 
-    def named(*names: str) -> str:
-        shipped = {policy.name for policy in POLICIES}
-        folder = settings.shown("pages", "forcegrasp", "policies") + "/" if settings.trial else ""
-        return f"policies=[{','.join(folder * (name in shipped) + name for name in names)}]"
 
+def _pictures(settings: Settings) -> Iterator[Stage]:
+    """Those of the policies that were shipped."""
+    draw = ("python", "-m", "tools.results.pictures", settings.shown(), _into(settings))
     paper, users = ("ib", "no_ib", "no_rand", "force_pi"), ("recommended", "ib", "force_pi", "informed")
-    return Stage(
+    yield Stage(
         "pictures",
         "box plots, force traces and learning curves of the pages",
         (
-            _evaluate("pictures", settings, "paper", named(*paper), f"trials={TRIALS}"),
-            _evaluate("pictures", settings, "users", named(*users), f"trials={TRIALS}"),
-            ("python", "-m", "tools.results.pictures", settings.shown(), _into(settings)),
+            _evaluate("pictures", settings, "paper", _shipped(settings, *paper), f"trials={TRIALS}"),
+            _evaluate("pictures", settings, "users", _shipped(settings, *users), f"trials={TRIALS}"),
+            draw,
         ),
         needs=("ship-recommended", "ship-ib", "ship-no_ib", "ship-no_rand", "evaluate-ablation"),
         evaluated=_episodes(len(paper) + len(users), SOFTNESS, TRIALS, settings),
+    )
+    who = _shipped(settings, "ib_virtual_robot", "ib", "force_pi")
+    grasp = ("kappa=0.4", "radius_m=0.0158", "offset_m=-0.0037", "goal_force_n=0.76")
+    video = settings.shown("render-transfer", "grasp.gif")
+    yield Stage(
+        "render-transfer",
+        "one grasp on the virtual robot; needs OpenGL",
+        (
+            ("forcegrasp", "render", who, "model=virtual_robot", *grasp, f"out={video}"),
+            (*draw, video, "transfer_grasp.png"),
+        ),
+        needs=("ship-ib_virtual_robot", "ship-ib"),
+        code="diagnosis",
     )
 
 
@@ -194,6 +209,11 @@ def _other_programs(settings: Settings) -> Iterator[Stage]:
     yield stage("readme-pictures", "moving pictures of the README", 0.1, readme, needs=("ship-ib",))
     yield stage("paper-figures", "docs/calibration.md", 0.1, ("python", "tools/paper_figures.py"))
     yield stage("physics-figures", "figures of docs/physics.md", 0.1, ("python", "tools/physics_figures.py"))
+    yield stage("object-motion-gap", "a figure of docs/real-table.md", 0.2, ("python", "tools/object_motion_gap.py"))
+    yield stage("real-table", "a figure of docs/real-table.md", 0.1, ("python", "tools/real_table.py"))
+    yield stage("tutorial", "docs/tutorial.md and its notebook", 0.2, ("python", "tools/tutorial_notebook.py"))
+    yield stage("compare-page", "docs/compare-your-data.md", 0.3, ("python", "tools/tutorial_figures.py"))
+    yield stage("effect-pages", "docs/effects", 0.3, ("python", "tools/effect_pages.py"))
     yield stage("grippers", "docs/grippers.md", 6, *grippers)
     yield stage("hidden-effects", "docs/hidden-effects.md", 8, *hidden)
     if settings.real_data:

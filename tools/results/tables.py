@@ -26,6 +26,13 @@ _PAPERS_ROBOT = {
     "no_ib": "89 ± 23; 2.6 ± 0.8 mm",
     "no_rand": "66 ± 30; 2.5 ± 1.1 mm",
 }
+#: The same by object, from the softest to the hardest, and the average.
+_PAPERS_OBJECTS = {
+    "paper: baseline": "92 ± 15, 96 ± 14, 114 ± 5, 118 ± 7, 108 ± 7, 115 ± 10, 107 ± 10",
+    "paper: π^IB": "96 ± 15, 103 ± 7, 109 ± 17, 115 ± 16, 105 ± 15, 120 ± 10, 109 ± 13",
+    "paper: π^NO-IB": "77 ± 10, 74 ± 26, 88 ± 33, 98 ± 34, 101 ± 16, 106 ± 17, 89 ± 23",
+    "paper: π^NO-RAND": "82 ± 12, 97 ± 15, 57 ± 37, 53 ± 39, 49 ± 33, 40 ± 41, 66 ± 30",
+}
 _SEEDS = "Mean over seeds ± half of its 95 % t-interval; a hand-written controller has no seeds"
 #: Figure → heading, digits, factor.
 _ROWS = {
@@ -204,3 +211,17 @@ def transfer(out: Path) -> str:
     on_robot = ("robot, actual forces", "robot, measured forces", "object moved on the robot [mm]")
     header = ["", "training simulator", *on_robot, "paper, real robot"]
     return f"Normalised force reward of 150. {_SEEDS}:\n\n" + table(header, rows)
+
+
+def transfer_objects(out: Path) -> str:
+    """By object on the virtual robot, as in the paper's Table 1."""
+    found = columns(out, [name for name in _ON_ROBOT if name != "ib_virtual_robot"], "robot")
+
+    def cells(seeds: list[Figures]) -> list[str]:
+        parts = zip(*([*one[MEASURED]["by_cell"], one[MEASURED]] for one in seeds), strict=True)
+        return [" ± ".join(f"{np.mean([of[kind] for of in part]):.0f}" for kind in ("mean", "std")) for part in parts]
+
+    rows = [[f"`{name}`", *cells(seeds)] for name, seeds in found.items()]
+    rows += [[name, *text.split(", ")] for name, text in _PAPERS_OBJECTS.items()]
+    told = "By object, measured forces, as in the paper's table: mean ± standard deviation of grasps"
+    return f"{told}, both the mean over seeds:\n\n" + table(["", *_cells(out, "robot"), "average"], rows)
