@@ -2,7 +2,7 @@
 
     python tools/check.py               all of it; make check does the same in its own environment
     python tools/check.py style types   these parts alone
-    python tools/check.py --skip hidden-effects   all but that: its page is measured anew before a release, in hours
+    python tools/check.py --skip hidden-effects --skip results   all but these: measured anew before a release, in hours
 
 Ends with a table. Exit status: 0 if all parts are in order.
 """
@@ -25,6 +25,7 @@ PARTS = {
     "types": [["pyright", "--pythonpath", sys.executable]],
     "docs": [["sphinx-build", "--quiet", "--fail-on-warning", "--keep-going", "--fresh-env", "docs", "build/docs"]],
     "hidden-effects": [["python", "tools/hidden_effects.py", "check"]],
+    "results": [["python", "-m", "tools.results", "check"]],
     "tests": [["python", "-m", "pytest", "-q", "-n", "auto", "--dist", "loadfile", "--no-loadscope-reorder"]],
 }
 
@@ -44,7 +45,11 @@ def main() -> int:
 
 def examine(program: str, *arguments: str) -> tuple[str, float, str]:
     """Runs one command and shows what it says; returns its name, how long it took, and a verdict."""
-    shown = (Path(word).stem for word in arguments if word in ("check", "format", "pytest") or word.endswith(".py"))
+    shown = (
+        word.removesuffix(".py").rpartition("/")[2]
+        for word in arguments
+        if word in ("check", "format", "pytest") or word.startswith("tools")
+    )
     name = " ".join([program, *shown])
     found = Path(sys.executable) if program == "python" else PROGRAMS / program
     print(f"\n== {name}", flush=True)

@@ -13,6 +13,8 @@ from forcegrasp.runs.provenance import git_hash
 ROOT = Path(__file__).resolve().parents[1]
 #: Packages on which a diagnosis depends.
 PACKAGES = ("identify", "diagnosis", "effects", "replay")
+#: What of a package can change a figure.
+_SUFFIXES = (".py", ".yaml", ".xml", ".json")
 _SAID = "Measured with"
 _SENTENCE = re.compile(rf"^{_SAID} .*$", re.MULTILINE)
 
@@ -22,23 +24,40 @@ def stamp() -> dict[str, str]:
     return {"commit": git_hash() or "none", "digest": digest()}
 
 
-def digest(root: Path = ROOT / "forcegrasp") -> str:
-    """Twelve digits that change with any line of the packages: a commit says little of a tree with changes."""
-    found = hashlib.sha256()
-    for path in sorted(path for package in PACKAGES for path in (root / package).rglob("*.py")):
-        found.update(f"{path.relative_to(root).as_posix()} {path.stat().st_size}\n".encode() + path.read_bytes())
+def digest(root: Path = ROOT / "forcegrasp", packages: Iterable[str] = PACKAGES) -> str:
+    """Twelve digits that change with any line of the packages: a commit says little of a tree with changes.
+
+    Args:
+      root: where the packages lie; one that is not there lies beside it, as the presets of ``conf`` do.
+      packages: their names, or those of single files.
+    """
+    found, files = hashlib.sha256(), {}
+    for package in packages:
+        top = root / package if (root / package).exists() else root.parent / package
+        for path in [top] if top.is_file() else top.rglob("*"):
+            if path.suffix in _SUFFIXES:
+                files[Path(package, path.relative_to(top))] = path
+    for name, path in sorted(files.items()):
+        found.update(f"{name.as_posix()} {path.stat().st_size}\n".encode() + path.read_bytes())
     return found.hexdigest()[:12]
+
+
+def sentence(commit: str, of_code: str, what: str) -> str:
+    """For a page: which code measured what stands there."""
+    if not of_code:
+        return f"{_SAID} code that was not noted: {what}."
+    return f"{_SAID} commit `{commit[:12]}{'+' * commit.endswith('+')}`, digest `{of_code}`: {what}."
 
 
 def sentences(rows: Iterable[dict]) -> list[str]:
     """For the page: which code its results are of."""
     counted = Counter((row.get("commit", ""), row.get("digest", "")) for row in rows)
-    return [
-        f"{_SAID} commit `{commit[:12]}{'+' * commit.endswith('+')}`, digest `{of_code}`: {sets} sets."
-        if of_code
-        else f"{_SAID} code that was not noted: {sets} sets."
-        for (commit, of_code), sets in counted.most_common()
-    ]
+    return [sentence(commit, of_code, f"{sets} sets") for (commit, of_code), sets in counted.most_common()]
+
+
+def without_sentences(text: str) -> str:
+    """What a page says besides, without empty lines at its ends."""
+    return _SENTENCE.sub("", text).strip("\n")
 
 
 def outdated(page: str, now: str) -> list[str]:

@@ -11,6 +11,7 @@ import json
 import shlex
 import shutil
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 
 from forcegrasp.runs.policy import load_policy
@@ -19,22 +20,28 @@ from forcegrasp.runs.run_dir import RunDir
 POLICIES = Path(__file__).resolve().parent.parent / "forcegrasp" / "policies"
 
 
-def ship(source: Path, name: str, evaluation: Path, what: str) -> None:
-    """Writes ``forcegrasp/policies/NAME``: the policy's weights alone, its config, and its card."""
-    run, folder = RunDir.open(source), POLICIES / name
+def ship(source: Path, name: str, evaluation: Path, what: str, into: Path = POLICIES, more: Iterable[str] = ()) -> None:
+    """Writes ``forcegrasp/policies/NAME``: the policy's weights alone, its config, and its card.
+
+    Args:
+      into: folder of the policies.
+      more: lines at the end of the card.
+    """
+    run, folder = RunDir.open(source), into / name
     report = json.loads((evaluation / "evaluation.json").read_text())
     figures = report["policies"][source.resolve().name]
     tensors, facts = run.load()
     shutil.rmtree(folder, ignore_errors=True)
-    folder.mkdir()
+    folder.mkdir(parents=True)
     shutil.copy(run.config_path, folder / "config.yaml")
     shipped = RunDir(folder)
     shipped.checkpoints.mkdir()
     policy = {key: value for key, value in tensors.items() if key.startswith("policy.")}
     shipped.save(facts["frames"], policy, {"batches": facts["batches"]}, keep=1)
     made = json.loads((source / "run.json").read_text())
-    (folder / "card.md").write_text(_card(name, what, made, facts["frames"], report, figures))
-    load_policy(name)
+    card = _card(name, what, made, facts["frames"], report, figures)
+    (folder / "card.md").write_text(card + "".join(f"\n{line}\n" for line in more))
+    load_policy(str(folder))
     print(f"shipped {folder}")
 
 

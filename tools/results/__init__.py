@@ -1,0 +1,1 @@
+"""The figures of this house, from one command: ``python -m tools.results``."""

@@ -1,0 +1,50 @@
+"""Copies pictures of the results to where pages show them.
+
+python -m tools.results.pictures RESULTS INTO              box plots, traces and learning curves
+python -m tools.results.pictures RESULTS INTO VIDEO NAME   the last picture of a video
+"""
+
+from __future__ import annotations
+
+import shutil
+import sys
+from pathlib import Path
+
+from PIL import Image
+
+from tools.measured_code import ROOT
+
+#: Picture in the results → name in docs/figures.
+PICTURES = {
+    "pictures/paper/force_reward.png": "paper_softness.png",
+    "pictures/paper/displacement.png": "paper_displacement.png",
+    "pictures/users/force_reward.png": "force_reward.png",
+    "pictures/users/overshoot.png": "overshoot.png",
+    "pictures/users/traces_recommended.png": "traces_recommended.png",
+    "pictures/users/traces_ib.png": "traces.png",
+    "evaluate-ablation/curves/curves.png": "ablation_curves.png",
+}
+
+
+def main(out: Path, into: Path) -> None:
+    """Copies all of them."""
+    figures = into / "docs" / "figures"
+    figures.mkdir(parents=True, exist_ok=True)
+    for source, name in PICTURES.items():
+        shutil.copy(out / source, figures / name)
+
+
+def last_picture(video: Path, picture: Path) -> None:
+    """Where all of an episode's traces are drawn."""
+    picture.parent.mkdir(parents=True, exist_ok=True)
+    with Image.open(video) as moving:
+        moving.seek(getattr(moving, "n_frames", 1) - 1)
+        moving.convert("RGB").save(picture)
+
+
+if __name__ == "__main__":
+    results, target, *of_video = (ROOT / word for word in sys.argv[1:])
+    if of_video:
+        last_picture(of_video[0], target / "docs" / "figures" / of_video[1].name)
+    else:
+        main(results, target)
