@@ -26,9 +26,9 @@ class RecurrentPolicy(ProbabilisticActor):
 
     def make_tensordict_primer(self) -> Transform:
         """What an environment needs: it marks where an episode starts, and the memories are zero there."""
-        spec, keys = Unbounded((1, self.gru.hidden_size)), cast("list[str]", self.in_keys)
+        spec, keys = Unbounded(torch.Size([1, self.gru.hidden_size])), cast("list[str]", self.in_keys)
         memories: Any = {key: spec for key in keys if key.endswith("memory")}
-        return Compose(InitTracker(), cast(Any, TensorDictPrimer)(memories, expand_specs=True))
+        return cast(Any, Compose)(InitTracker(), TensorDictPrimer(memories, expand_specs=True))
 
     @property
     def gru(self) -> nn.GRU:
