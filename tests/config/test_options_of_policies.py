@@ -158,7 +158,7 @@ TRAIN_CASES: dict[str, Any] = {
     "sac.buffer": 80,
     "sac.updates": 2,
     "sac.minibatch": 15,
-    "sac.learning_rate": 1e-3,
+    "sac.learning_rate": 3e-3,
     "sac.discount": 0.9,
     "sac.target_rate": 0.1,
     "sac.entropy_weight": 0.1,
