@@ -218,7 +218,7 @@ class CollectorConfig:
     ahead: bool = option(
         True,
         "collect the next batch while the last one is learned from, by the policy before that update, so that no core"
-        " waits; false: by the newest policy",
+        " waits; false, and with SAC: by the newest policy",
     )
 
     def check(self, path: str) -> None:

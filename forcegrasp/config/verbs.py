@@ -32,13 +32,12 @@ class TrainConfig:
     model: str = option("", "model file of forcegrasp fit or add: train with its effects, within fitted intervals")
     randomise: str = option(
         "auto",
-        "robots to train on. none: nominal. catalogue: see docs/robots.md. model: within its intervals. auto: model if"
-        " there is one, else none",
+        "robots to train on, see docs/robots.md; auto: model, if there is one",
         choices=("auto", "none", "catalogue", "model"),
     )
     learner: str = option(
         "ppo",
-        "the algorithm that learns, with the options of its section; PPO with ppo.memory is recurrent PPO",
+        "algorithm that learns; ppo.memory makes PPO recurrent",
         choices=("ppo", "sac"),
     )
     physics: PhysicsConfig = field(default_factory=lambda: PhysicsConfig(tier="fast"))
@@ -82,11 +81,6 @@ class TrainConfig:
             raise ConfigError(
                 f"{option}={self.ppo.teacher_weight:g}: the teacher knows the nominal gripper alone; with model= train"
                 f" experiment=ib_tuned, or add {option}=0"
-            )
-        if self.learner == "sac" and self.collector.ahead and self.collector.kind == "direct":
-            raise ConfigError(
-                f"{path}learner=sac: it draws numbers while it learns, and so does what collects ahead: add"
-                f" {path}collector.ahead=false"
             )
         grasps, workers, name = self.algorithm.grasps, self.collector.workers, self.algorithm.name
         if grasps % workers:

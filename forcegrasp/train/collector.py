@@ -23,7 +23,7 @@ from torchrl.envs import TransformedEnv
 from torchrl.envs.transforms import Transform
 from torchrl.modules import ProbabilisticActor
 
-from forcegrasp.config import CollectorConfig, TrainConfig
+from forcegrasp.config import TrainConfig
 from forcegrasp.curriculum import CurriculumHook, CurriculumValues, LinearSchedule
 from forcegrasp.env import GraspEnv, build_env, with_memory
 from forcegrasp.models.model_file import Model
@@ -180,18 +180,21 @@ def _as_one(batch: TensorDictBase) -> TensorDictBase:
 
 
 class NextBatch:
-    """The batch that comes next. With ``ahead`` a thread collects it while the one before is learned from.
+    """The batch that comes next. Within :func:`collecting` a thread collects it while the one before is learned from.
 
     Args:
       collector: who collects it.
-      config: how many workers that has, and whether they collect ahead.
+      workers: how many that has.
+      may_be_ahead: whether they collect ahead.
 
     Attributes:
+      ahead: whether the thread does; outside it is off, lest it draws random numbers that nobody waits for.
       begun: every generator's state and the policy's weights as it was begun, as tensors and as JSON; None before.
     """
 
-    def __init__(self, collector: GraspCollector | RayCollector, config: CollectorConfig) -> None:
-        self.collector, self.config = collector, config
+    def __init__(self, collector: GraspCollector | RayCollector, workers: int, may_be_ahead: bool) -> None:
+        self.collector, self.workers, self.may_be_ahead = collector, workers, may_be_ahead
+        self.ahead = False
         self.begun: tuple[dict[str, Tensor], dict[str, Any]] | None = None
         self._thread = ThreadPoolExecutor(1, initializer=torch.set_num_threads, initargs=(1,))
         self._batches: Iterator[TensorDictBase] | None = None
@@ -201,8 +204,8 @@ class NextBatch:
         weights = {name: value.clone() for name, value in weights.items()}
         tensors, facts = random_states(self.collector)
         self.begun = tensors | {COLLECTING + name: value for name, value in weights.items()}, facts
-        self._values = self.collector.map_fn("prepare", [(frames, weights)] * self.config.workers)[0]
-        self._collected = self._thread.submit(self._collect) if self.config.ahead else None
+        self._values = self.collector.map_fn("prepare", [(frames, weights)] * self.workers)[0]
+        self._collected = self._thread.submit(self._collect) if self.ahead else None
 
     def get(self) -> tuple[TensorDictBase, CurriculumValues, float]:
         """Waits for it; returns it, the curriculum's values in it, and how many seconds it took to collect."""
@@ -222,11 +225,12 @@ class NextBatch:
 
 @contextlib.contextmanager
 def collecting(batches: NextBatch) -> Iterator[None]:
-    """Ends the collector afterwards, and Ray with it.
+    """Collects ahead, if that is asked for; ends the collector afterwards, and Ray with it.
 
     Raises:
       ForcegraspError: of a worker as of this process; and if a worker is lost.
     """
+    batches.ahead = batches.may_be_ahead
     direct = isinstance(batches.collector, GraspCollector)
     try:
         with contextlib.nullcontext() if direct else cluster.translate_ray_errors():

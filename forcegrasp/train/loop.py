@@ -60,7 +60,8 @@ class Trainer:
         total, frames = self.algorithm.total_frames, self.algorithm.frames_per_batch
         self.schedule = LinearSchedule(config.curriculum, config.grasp, config.reward, total)
         self.collector = make_collector(config, self.env, self.policy, self.schedule, frames, model)
-        self.next_batch = NextBatch(self.collector, config.collector)
+        ahead = config.collector.ahead and not self.algorithm.DRAWS
+        self.next_batch = NextBatch(self.collector, config.collector.workers, ahead)
         self._begin_with: dict[str, Tensor] = {}
 
     @property
@@ -71,13 +72,14 @@ class Trainer:
     def collect(self) -> tuple[TensorDictBase, CurriculumValues, float]:
         """The next batch, the curriculum's values in it, and how many seconds it took to collect.
 
-        With ``collector.ahead`` the batch after it is begun, by the policy as it is now.
+        Within ``collecting(trainer.next_batch)``, and with ``collector.ahead``, the batch after it is begun, by the
+        policy as it is now.
         """
         if self.next_batch.begun is None:
             self._begin(self.frames)
         collected = self.next_batch.get()
         after = self.frames + collected[0].numel()
-        if self.config.collector.ahead and after < self.algorithm.total_frames:
+        if self.next_batch.ahead and after < self.algorithm.total_frames:
             self._begin(after)
         return collected
 

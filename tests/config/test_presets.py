@@ -175,7 +175,7 @@ def test_recurrent_differs_from_recommended_in_the_memory_and_what_it_wants():
 def test_sac_learns_the_task_of_recommended():
     different = changed(train("experiment=recommended"), train("experiment=sac"))
     task = {name for name in different if name.partition(".")[0] not in ("ppo", "sac")}
-    assert task == {"learner", "observation.frames", "curriculum.enabled", "log.checkpoint_every"}
+    assert task == {"learner", "observation.frames", "curriculum.enabled", "log.checkpoint_every", "collector.ahead"}
 
 
 def test_catalogue_differs_from_recommended_in_the_robots_alone():

@@ -9,7 +9,6 @@ from torchrl.envs.utils import ExplorationType, set_exploration_type
 
 from forcegrasp.config import (
     ActionConfig,
-    CollectorConfig,
     GraspConfig,
     ObservationConfig,
     PhysicsConfig,
@@ -47,7 +46,7 @@ VARIANTS = {
     },
     "memory, not mirrored": {"ppo": PPOConfig(hidden=[8], memory=5, mirrored=False)},
     "memory of one motor": {"ppo": PPOConfig(hidden=[8], memory=5), "gripper": "franka_hand", "grasp": GraspConfig()},
-    "SAC": {"learner": "sac", "sac": SACConfig(hidden=[16]), "collector": CollectorConfig(ahead=False)},
+    "SAC": {"learner": "sac", "sac": SACConfig(hidden=[16])},
 } | {name: {"gripper": name, "grasp": GraspConfig()} for name in [*shipped_grippers(), "one_sensor"]}
 
 

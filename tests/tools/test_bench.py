@@ -12,7 +12,7 @@ from forcegrasp.env.gymnasium_view import GraspGymnasiumEnv
 from tools.bench import learning
 from tools.bench.__main__ import main
 from tools.bench.case import STEPS, Case, Learning, Measured
-from tools.bench.levels import LEVELS
+from tools.bench.levels import BATCHES, LEVELS
 from tools.bench.peers import PEERS, missing
 from tools.bench.plain_grasp import PlainGrasp
 from tools.bench.results import Results
@@ -45,7 +45,8 @@ def test_plain_grasp_is_the_same_problem(form):
 
 @pytest.mark.parametrize("name", LEVELS)
 def test_levels_count_their_steps(name):
-    assert LEVELS[name](Case(name, "fast", 2, 1))() == 2 * STEPS
+    batches = BATCHES if name == "training" else 1
+    assert LEVELS[name](Case(name, "fast", 2, 1))() == 2 * STEPS * batches
 
 
 def test_program_measures_draws_and_reads_again(tmp_path, monkeypatch, capsys):

@@ -12,6 +12,7 @@ from forcegrasp.cli.options import compose
 from forcegrasp.env.build import seed_env
 from forcegrasp.physics import load_gripper
 from forcegrasp.physics.completion import complete
+from forcegrasp.train.collector import collecting
 from forcegrasp.train.episodes import can_collect, collect
 from forcegrasp.train.loop import Trainer
 
@@ -89,11 +90,12 @@ def test_ahead_the_policy_is_one_update_behind():
     def scales(ahead: bool) -> list[float]:
         made = trainer(f"collector.ahead={ahead}", "ppo.total_frames=144", "ppo.learning_rate=0.1", "ppo.minibatch=9")
         found = []
-        for _ in range(4):
-            batch = made.collect()[0]
-            found.append(float(batch["scale"][0, 0, 0]))
-            made.algorithm.update(batch)
-            made.frames += batch.numel()
+        with collecting(made.next_batch):
+            for _ in range(4):
+                batch = made.collect()[0]
+                found.append(float(batch["scale"][0, 0, 0]))
+                made.algorithm.update(batch)
+                made.frames += batch.numel()
         return found
 
     by_turns, ahead = scales(False), scales(True)

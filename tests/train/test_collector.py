@@ -59,16 +59,19 @@ class SideBySide:
             yield torch.cat([self.turn(w, next, batches).clone() for w, batches in enumerate(collecting)])
 
 
+@contextlib.contextmanager
+def collecting(batches: NextBatch) -> Iterator[None]:
+    """As a training does, but for shutting down the double."""
+    batches.ahead = batches.may_be_ahead
+    try:
+        yield
+    finally:
+        batches.end()
+
+
 @pytest.fixture
 def side_by_side(monkeypatch) -> None:
     """Trainings use that double in place of Ray."""
-
-    @contextlib.contextmanager
-    def collecting(batches: NextBatch) -> Iterator[None]:
-        with contextlib.ExitStack() as stack:
-            stack.callback(batches.end)
-            yield
-
     monkeypatch.setattr("forcegrasp.train.loop.make_collector", SideBySide)
     monkeypatch.setattr("forcegrasp.train.loop.collecting", collecting)
 
@@ -107,7 +110,7 @@ def test_one_worker_trains_as_this_process_does(tiny, tmp_path, trained, monkeyp
     direct = trained(tmp_path / "direct", tiny())
     with monkeypatch.context() as patch:
         patch.setattr("forcegrasp.train.loop.make_collector", SideBySide)
-        patch.setattr("forcegrasp.train.loop.collecting", lambda _: contextlib.nullcontext())
+        patch.setattr("forcegrasp.train.loop.collecting", collecting)
         worker = trained(tmp_path / "worker", tiny(collector={"kind": "ray"}))
     (one, facts), (other, its_facts) = direct.load(), worker.load()
     assert one.keys() == other.keys()

@@ -22,9 +22,8 @@ CASES = {
 
 @pytest.mark.parametrize("name", CASES)
 def test_resumed_run_equals_the_uninterrupted_one(name, tiny, trained, metrics, tmp_path):
-    sac = "SAC" in name
-    config = tiny(log={"checkpoint_every": 2, "keep": 99}, collector={"ahead": not sac}, **CASES[name])
-    config.learner = "sac" if sac else "ppo"
+    config = tiny(log={"checkpoint_every": 2, "keep": 99}, **CASES[name])
+    config.learner = "sac" if "SAC" in name else "ppo"
     whole = trained(tmp_path / "whole", config)
     first, second, last = sorted(path.name for path in whole.checkpoints.glob("frames_*"))
     run = RunDir.create(tmp_path / "run", config, [])

@@ -14,7 +14,7 @@ SAC = {"total_frames": 300, "grasps": 2, "hidden": [8], "buffer": 150, "updates"
 @pytest.fixture
 def make(tiny):
     def made(**options) -> Trainer:
-        config = tiny(sac=SAC | options, collector={"ahead": False})
+        config = tiny(sac=SAC | options)
         config.learner = "sac"
         return Trainer(config)
 

@@ -33,16 +33,18 @@ def tuned(tier: str) -> TrainConfig:
 def ours(tier: str, grasps: int, report: Report) -> None:
     """This project's training; ``grasps`` is the experiment's own."""
     from forcegrasp.env.episodes import summarise
+    from forcegrasp.train.collector import collecting
     from forcegrasp.train.loop import Trainer
 
     trainer = Trainer(config := tuned(tier))
-    while trainer.frames < config.ppo.total_frames:
-        batch = trainer.collect()[0]
-        reward = float(summarise(batch, config.sensors)["force_reward_normalised"].mean())
-        report(trainer.frames + batch.numel(), reward)
-        trainer.algorithm.set_progress(trainer.frames / config.ppo.total_frames)
-        trainer.algorithm.update(batch)
-        trainer.frames += batch.numel()
+    with collecting(trainer.next_batch):
+        while trainer.frames < config.ppo.total_frames:
+            batch = trainer.collect()[0]
+            reward = float(summarise(batch, config.sensors)["force_reward_normalised"].mean())
+            report(trainer.frames + batch.numel(), reward)
+            trainer.algorithm.set_progress(trainer.frames / config.ppo.total_frames)
+            trainer.algorithm.update(batch)
+            trainer.frames += batch.numel()
 
 
 def sb3(tier: str, grasps: int, report: Report, closing: bool) -> None:

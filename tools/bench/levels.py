@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from forcegrasp.train.loop import Trainer
 
 Run = Callable[[], int]
+#: Of the training that is timed.
+BATCHES = 6
 
 
 def raw_engine(case: Case) -> Run:
@@ -91,13 +93,18 @@ def collection(case: Case) -> Run:
 
 
 def training(case: Case) -> Run:
-    """Collection, and PPO's updates on each batch."""
+    """A short training: collection, and PPO's updates on each batch beside it."""
     trainer = _closing_trainer(case)
+    trainer.next_batch.ahead = True
+    trainer.algorithm.total_frames = BATCHES * trainer.algorithm.frames_per_batch
 
     def run() -> int:
-        batch = trainer.collect()[0]
-        trainer.algorithm.update(batch)
-        return batch.numel()
+        trainer.frames = 0
+        while trainer.frames < trainer.algorithm.total_frames:  # nothing is collected ahead for another turn
+            batch = trainer.collect()[0]
+            trainer.algorithm.update(batch)
+            trainer.frames += batch.numel()
+        return trainer.frames
 
     return run
 

@@ -32,6 +32,8 @@ class Algorithm(ABC):
     CHARTS: ClassVar[dict[str, dict[str, tuple[str, ...]]]]
     #: How to read these metrics, as Markdown.
     ADVICE: ClassVar[str]
+    #: Whether updates draw from torch's own generator, as collecting does: then the two take turns.
+    DRAWS: ClassVar[bool] = False
 
     def __init__(self, config: TrainConfig, env: TransformedEnv, gripper: Gripper) -> None:
         self.total_frames = config.algorithm.total_frames

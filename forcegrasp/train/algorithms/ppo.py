@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, cast
 
 import torch
-from jaxtyping import Float
 from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModule
 from tensordict.utils import NestedKey
@@ -23,14 +22,14 @@ from forcegrasp.train.algorithms.teacher import Teacher, imitation_loss
 from forcegrasp.train.algorithms.value_network import Value, make_value
 
 
-def clipped_loss(log_ratio: Float[Tensor, " n"], advantage: Float[Tensor, " n"], clip: float) -> dict[str, Tensor]:
+def clipped_loss(log_ratio: Tensor, advantage: Tensor, clip: float) -> dict[str, Tensor]:
     """The clipped surrogate (Schulman et al. 2017, eq. 7) and its diagnostics, as torchrl's ``ClipPPOLoss`` has them.
 
     Its tensordicts, and modules with parameters put into them, take three times as long as these few numbers.
 
     Args:
-      log_ratio: logarithm of the probability of each action now over that when it was taken.
-      advantage: of each action.
+      log_ratio: logarithm of the probability of each action now over that when it was taken, ``(n,)``.
+      advantage: of each action, ``(n,)``.
       clip: ε.
     """
     clipped = log_ratio.clamp(math.log1p(-clip), math.log1p(clip))

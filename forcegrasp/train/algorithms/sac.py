@@ -41,6 +41,8 @@ class SAC(Algorithm):
     ADVICE = """`entropy` should come to the motors' number times `sac.entropy_target`, and `alpha`, its weight, settle;
   `loss_actor` is about minus the value, so it falls as the policy improves; `buffer` counts the transitions kept"""
 
+    DRAWS = True
+
     def __init__(self, config: TrainConfig, env: TransformedEnv, gripper: Gripper) -> None:
         super().__init__(config, env, gripper)
         self.config = options = config.sac
