@@ -103,16 +103,20 @@ def _folder(option: str, value: str) -> str:
     return value
 
 
-@functools.cache
 def register_schemas() -> None:
     """Makes the config dataclasses known to Hydra: as VERB_schema where conf/VERB.yaml adds presets, else as VERB."""
-    from hydra.core.config_store import ConfigStore
-
     from forcegrasp.cli import run_name
 
     run_name.register()
     for verb, schema in SCHEMAS.items():
-        ConfigStore.instance().store(f"{verb}_schema" if _own_file(verb) else verb, node=schema)
+        _store(verb, schema)
+
+
+@functools.cache
+def _store(verb: str, schema: type) -> None:
+    from hydra.core.config_store import ConfigStore
+
+    ConfigStore.instance().store(f"{verb}_schema" if _own_file(verb) else verb, node=schema)
 
 
 def _own_file(verb: str) -> str:
