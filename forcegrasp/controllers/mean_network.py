@@ -18,14 +18,24 @@ from forcegrasp.physics.gripper import Gripper
 _MOST = 0.99
 
 
-def mirror_order(sizes: Sequence[int]) -> list[int]:
-    """Where each number of an observation is found in its mirror image.
+class Mirror(nn.Module):
+    """An observation's mirror image, with left and right swapped.
 
     Args:
       sizes: of the observation's parts in their order: 2 for a pair, 1 for a number that is the same in the mirror.
     """
-    starts = accumulate(sizes, initial=0)
-    return [start + k for start, size in zip(starts, sizes, strict=False) for k in reversed(range(size))]
+
+    order: Tensor
+
+    def __init__(self, sizes: Sequence[int]) -> None:
+        super().__init__()
+        starts = accumulate(sizes, initial=0)
+        order = [start + k for start, size in zip(starts, sizes, strict=False) for k in reversed(range(size))]
+        self.register_buffer("order", torch.tensor(order), persistent=False)
+
+    def forward(self, observation: Tensor) -> Tensor:
+        """``(*B, size) -> (*B, size)``."""
+        return observation[..., self.order]
 
 
 class Mirrored(nn.Module):
@@ -36,20 +46,16 @@ class Mirrored(nn.Module):
 
     Args:
       net: ``(*B, size) -> (*B, 2)``; its output is the pair (left, right).
-      sizes: of the observation's parts, see :func:`mirror_order`.
+      sizes: of the observation's parts, see :class:`Mirror`.
     """
-
-    order: Tensor
 
     def __init__(self, net: nn.Module, sizes: Sequence[int]) -> None:
         super().__init__()
-        self.net = net
-        self.register_buffer("order", torch.tensor(mirror_order(sizes)), persistent=False)
+        self.net, self.mirror = net, Mirror(sizes)
 
     def forward(self, observation: Tensor) -> Tensor:
         """Both actions, ``(*B, 2)``."""
-        swapped = observation[..., self.order]
-        own, mirrored = self.net(torch.stack([observation, swapped])).unbind(0)
+        own, mirrored = self.net(torch.stack([observation, self.mirror(observation)])).unbind(0)
         return (own + mirrored.flip(-1)) / 2
 
 

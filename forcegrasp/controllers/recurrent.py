@@ -14,7 +14,7 @@ from torchrl.envs.transforms import Compose, InitTracker, TensorDictPrimer, Tran
 from torchrl.modules import GRUModule, IndependentNormal, ProbabilisticActor
 
 from forcegrasp.config import PPOConfig
-from forcegrasp.controllers.mean_network import make_mean, mirror_order
+from forcegrasp.controllers.mean_network import Mirror, make_mean
 from forcegrasp.physics.gripper import Gripper
 
 
@@ -34,24 +34,6 @@ class RecurrentPolicy(ProbabilisticActor):
     def gru(self) -> nn.GRU:
         """What both memories share."""
         return cast(Any, self[0])[-2].gru
-
-
-class Mirror(nn.Module):
-    """An observation's mirror image, with left and right swapped.
-
-    Args:
-      sizes: of the observation's parts, see :func:`~forcegrasp.controllers.mean_network.mirror_order`.
-    """
-
-    order: Tensor
-
-    def __init__(self, sizes: Sequence[int]) -> None:
-        super().__init__()
-        self.register_buffer("order", torch.tensor(mirror_order(sizes)), persistent=False)
-
-    def forward(self, observation: Tensor) -> Tensor:
-        """``(*B, size) -> (*B, size)``."""
-        return observation[..., self.order]
 
 
 class Head(nn.Module):

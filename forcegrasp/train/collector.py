@@ -62,11 +62,9 @@ class GraspCollector(Collector):
     def iterator(self) -> Iterator[TensorDictBase]:
         """Batches without end, by :mod:`forcegrasp.train.episodes` where it does the same as the base class."""
         actor = cast(ProbabilisticActor, self.policy)
-        if not can_collect(self.env, actor):
-            yield from super().iterator()
-        steps = self.frames_per_batch
-        while True:
-            yield collect(cast(TransformedEnv, self.env), actor, steps)
+        while can_collect(self.env, actor):
+            yield collect(cast(TransformedEnv, self.env), actor, self.frames_per_batch)
+        yield from super().iterator()
 
     def prepare(self, frames: int, weights: dict[str, Tensor]) -> CurriculumValues:
         """Applies the curriculum after so many frames, and the learner's weights."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from typing import ClassVar
 
+import torch
 from tensordict import TensorDictBase
 from torch import Tensor
 from torchrl.envs import TransformedEnv
@@ -34,6 +35,8 @@ class Algorithm(ABC):
     ADVICE: ClassVar[str]
     #: Whether updates draw from torch's own generator, as collecting does: then the two take turns.
     DRAWS: ClassVar[bool] = False
+    #: Of all that learns; its moments are saved.
+    optimizer: torch.optim.Optimizer
 
     def __init__(self, config: TrainConfig, env: TransformedEnv, gripper: Gripper) -> None:
         self.total_frames = config.algorithm.total_frames
@@ -51,7 +54,10 @@ class Algorithm(ABC):
 
     def state_dict(self) -> dict[str, Tensor]:
         """All of its state that changes while training; the policy's is named ``policy.…``, by which it is loaded."""
-        return {f"policy.{k}": v for k, v in self.policy.state_dict().items()}
+        tensors = {f"policy.{k}": v for k, v in self.policy.state_dict().items()}
+        for index, moments in self.optimizer.state_dict()["state"].items():
+            tensors |= {f"optimizer.{index}.{k}": v for k, v in moments.items()}
+        return tensors
 
     def load_state_dict(self, tensors: dict[str, Tensor]) -> None:
         """The inverse of :meth:`state_dict`; more entries do no harm.
@@ -60,6 +66,11 @@ class Algorithm(ABC):
           KeyError, RuntimeError: if these are not the tensors of such an algorithm.
         """
         self.policy.load_state_dict(part_of(tensors, "policy."))
+        optimizer = self.optimizer.state_dict()
+        for key, value in part_of(tensors, "optimizer.").items():
+            index, moment = key.split(".")
+            optimizer["state"].setdefault(int(index), {})[moment] = value
+        self.optimizer.load_state_dict(optimizer)
 
 
 def part_of(tensors: dict[str, Tensor], prefix: str) -> dict[str, Tensor]:

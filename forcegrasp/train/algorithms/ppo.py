@@ -25,7 +25,7 @@ from forcegrasp.train.algorithms.value_network import Value, make_value
 def clipped_loss(log_ratio: Tensor, advantage: Tensor, clip: float) -> dict[str, Tensor]:
     """The clipped surrogate (Schulman et al. 2017, eq. 7) and its diagnostics, as torchrl's ``ClipPPOLoss`` has them.
 
-    Its tensordicts, and modules with parameters put into them, take three times as long as these few numbers.
+    Its tensordicts, and modules with parameters put into them, would take longer than these few numbers.
 
     Args:
       log_ratio: logarithm of the probability of each action now over that when it was taken, ``(n,)``.
@@ -189,18 +189,11 @@ class PPO(Algorithm):
 
     def state_dict(self) -> dict[str, Tensor]:
         tensors = super().state_dict() | {f"value.{k}": v for k, v in self.value.state_dict().items()}
-        for index, moments in self.optimizer.state_dict()["state"].items():
-            tensors |= {f"optimizer.{index}.{k}": v for k, v in moments.items()}
         return tensors | {"rng.shuffle": self.shuffle.get_state()}
 
     def load_state_dict(self, tensors: dict[str, Tensor]) -> None:
         super().load_state_dict(tensors)
         self.value.load_state_dict(part_of(tensors, "value."))
-        optimizer = self.optimizer.state_dict()
-        for key, value in part_of(tensors, "optimizer.").items():
-            index, moment = key.split(".")
-            optimizer["state"].setdefault(int(index), {})[moment] = value
-        self.optimizer.load_state_dict(optimizer)
         self.shuffle.set_state(tensors["rng.shuffle"])
 
     @property

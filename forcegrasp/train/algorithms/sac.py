@@ -90,8 +90,6 @@ class SAC(Algorithm):
     def state_dict(self) -> dict[str, Tensor]:
         tensors = super().state_dict()
         tensors |= {f"loss.{k}": v for k, v in self.loss.state_dict().items() if not k.startswith(_POLICY)}
-        for index, moments in self.optimizer.state_dict()["state"].items():
-            tensors |= {f"optimizer.{index}.{k}": v for k, v in moments.items()}
         if len(self.buffer):
             kept = self.buffer[:].select(*self.keys).flatten_keys("/")
             tensors |= {f"buffer.{key}": value for key, value in kept.items()}
@@ -103,11 +101,6 @@ class SAC(Algorithm):
         super().load_state_dict(tensors)
         policy = {k: v for k, v in self.loss.state_dict().items() if k.startswith(_POLICY)}
         self.loss.load_state_dict(policy | part_of(tensors, "loss."))
-        optimizer = self.optimizer.state_dict()
-        for key, value in part_of(tensors, "optimizer.").items():
-            index, moment = key.split(".")
-            optimizer["state"].setdefault(int(index), {})[moment] = value
-        self.optimizer.load_state_dict(optimizer)
         self.buffer.empty()
         if kept := part_of(tensors, "buffer."):
             self.buffer.extend(TensorDict(kept, len(kept["action"])).unflatten_keys("/"))
