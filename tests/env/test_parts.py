@@ -87,9 +87,9 @@ def test_the_environment_shows_it(grip_width):
 def test_a_policy_is_loaded_and_keeps_the_grasps_own_numbers_in_its_mirror(run):
     policy, _ = load_policy(run.path)
     (mirrored,) = [module for module in policy.modules() if isinstance(module, Mirrored)]
-    assert mirrored.order.tolist() == [0, 2, 1, 3, 4, 6, 5, 7]
+    assert mirrored.mirror.order.tolist() == [0, 2, 1, 3, 4, 6, 5, 7]
     observation = torch.arange(8.0)
-    swapped = observation[mirrored.order]
+    swapped = observation[mirrored.mirror.order]
     torch.testing.assert_close(mirrored(observation), mirrored(swapped).flip(-1))
 
 
