@@ -5,13 +5,15 @@
     python tools/hidden_effects.py report                          writes docs/hidden-effects.md from the results
     python tools/hidden_effects.py check                           fails if that page is of other code than the present
 
-The recorder is tests/independent: it shares no code with the effects under test. A set takes about a minute.
+The recorder is tests/independent: it shares no code with the effects under test. Sets come in random order, so that a
+part of them is a fair sample of all. A set takes about a minute of one core.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import random
 import re
 import shutil
 import sys
@@ -51,22 +53,36 @@ PAIRS_OF_SERVOS = (
 )
 
 
+#: What every real rig has: objects measured to 0.3 mm, encoders, gains, a little friction, a clock, heavy-tailed noise.
+MESS: dict[str, dict[str, float]] = {
+    "encoder_bias": {"left": 1e-4, "right": -6e-5},
+    "force_gain_asymmetry": {"right_excess": 0.03},
+    "smooth_friction": {"level": 0.008},
+}
+MESSY_JITTER_S = 0.0015
+
+
 @dataclass(frozen=True)
 class Job:
     """One set to record and diagnose."""
 
-    group: str  #: "none", "one", "other reading", "two" or "outside"; "servo none", "servo one", "servo two"
+    group: str  #: see :func:`jobs`
     hidden: tuple[str, ...]  #: names in the recorder
     size: str
     seed: int
     contact: str = "mujoco"
     grasps: int = 24
+    noise: str = "white"
+    spoiled: str = ""
 
     @property
     def name(self) -> str:
         """What the result is filed under."""
         parts = ["+".join(self.hidden) or "none", self.size, f"s{self.seed}", self.contact, f"n{self.grasps}"]
-        return "_".join(["servo", *filter(None, parts[:3])] if self.is_servo else filter(None, parts))
+        if self.is_servo:
+            return "_".join(["servo", *filter(None, parts[:3])])
+        parts += [self.noise if self.noise != "white" else "", self.spoiled, "messy" if self.group == "messy" else ""]
+        return "_".join(filter(None, parts))
 
     @property
     def is_servo(self) -> bool:
@@ -75,18 +91,43 @@ class Job:
 
 
 def jobs() -> list[Job]:
-    """The whole campaign, most informative sets first."""
-    from tests.independent.rig import CATALOGUE, OUTSIDE, VARIANTS
+    """The whole campaign, in random order."""
+    from tests.independent.rig import CATALOGUE, OTHERWISE, OUTSIDE, VARIANTS
+    from tests.independent.spoiled import SPOILED
 
-    found = [Job("none", (), "", seed) for seed in range(1, 13)]
+    rng = random.Random(0)
+
+    def several(count: int) -> tuple[str, ...]:
+        while True:  # of what gives way between motor and pad the rig has one at a time
+            names = tuple(sorted(rng.sample(sorted(CATALOGUE), count)))
+            if not {"backlash", "finger_compliance"} <= set(names):
+                return names
+
+    found = [Job("none", (), "", seed) for seed in range(1, 21)]
+    for noise in ("heavy", "slow", "outliers", "louder", "quieter"):
+        found += [Job("noise", (), "", seed, noise=noise) for seed in range(21, 27)]
     for seed, size in enumerate(("medium", "small", "large"), 1):
         found += [Job("one", (name,), size, seed) for name in CATALOGUE]
+        found += [Job("law", (name,), size, seed) for name in OTHERWISE]
         found += [Job("outside", (name,), size, seed) for name in OUTSIDE if size != "small"]
-    found += [Job("two", pair, "medium", seed) for seed, pair in enumerate(PAIRS, 1)]
     found += [Job("other reading", (name,), "medium", 2) for name in VARIANTS]
-    found += [Job("none", (), "", 1, contact) for contact in ("mujoco_multiccd", "penalty", "hertz")]
     found += [Job("one", (name,), "medium", 4, grasps=10) for name in CATALOGUE]
-    return found + list(_servo_jobs())
+    found += [Job("one", (name,), "small", 5, grasps=48) for name in rng.sample(sorted(CATALOGUE), 8)]
+    found += [Job("one", (name,), "large", 6, grasps=6) for name in rng.sample(sorted(CATALOGUE), 16)]
+    for contact in ("mujoco_multiccd", "mujoco_rubbing", "penalty", "hertz"):
+        found += [Job("contact", (), "", seed, contact) for seed in range(1, 5)]
+        found += [Job("contact", (name,), "medium", 7, contact) for name in rng.sample(sorted(CATALOGUE), 6)]
+    found += [Job("several", pair, "medium", seed) for seed, pair in enumerate(PAIRS, 1)]
+    found += [Job("several", several(count), "medium", 10 * count + k) for count in (2, 3, 4, 5) for k in range(15)]
+    for spoiled in sorted(set(SPOILED) - {"", "calliper"}):
+        found += [Job("spoiled", (), "", seed, spoiled=spoiled) for seed in range(30, 38)]
+    mess = {"noise": "heavy", "spoiled": "calliper"}
+    found += [Job("messy", (), "", seed, **mess) for seed in range(40, 55)]
+    found += [Job("messy", (name,), "medium", 60 + k, **mess) for k, name in enumerate(sorted(CATALOGUE))]
+    found += [Job("messy", several(count), "medium", 100 * count + k, **mess) for count in (2, 3) for k in range(15)]
+    found += _servo_jobs()
+    rng.shuffle(found)
+    return found
 
 
 def _servo_jobs() -> Iterator[Job]:
@@ -99,16 +140,21 @@ def _servo_jobs() -> Iterator[Job]:
 
 def right_names(job: Job) -> set[str]:
     """What a right diagnosis names."""
-    from tests.independent.catalogue import VARIANT_OF
+    from tests.independent.catalogue import OTHERWISE, VARIANT_OF
     from tests.independent.slide import CALLED
 
-    return set() if job.group == "outside" else {(VARIANT_OF | CALLED).get(name, name) for name in job.hidden}
+    if job.group == "outside":
+        return set()
+    called = VARIANT_OF | CALLED | {name: answer for name, (answer, _) in OTHERWISE.items()}
+    also = {"object_friction"} if job.contact == "mujoco_rubbing" else set()
+    return {called.get(name, name) for name in job.hidden} | also
 
 
 def run_job(job: Job) -> dict:
     """Records and diagnoses one set."""
     from forcegrasp.cli.measuring import refuse_table
     from forcegrasp.diagnosis.diagnose_set import diagnose_set
+    from forcegrasp.errors import MeasurementError
     from forcegrasp.identify.fitted_model import model_of
     from forcegrasp.identify.loading import load
     from forcegrasp.replay import replay
@@ -121,9 +167,22 @@ def run_job(job: Job) -> dict:
         if job.is_servo:
             truth = slide.record(folder / "set", chosen, job.seed)
         else:
-            truth = rig.record(folder / "set", chosen, job.seed, job.grasps, contact=job.contact)
+            messy = job.group == "messy"
+            truth = rig.record(
+                folder / "set",
+                {**MESS, **chosen} if messy else chosen,
+                job.seed,
+                job.grasps,
+                contact=job.contact,
+                noise=job.noise,
+                jitter_s=MESSY_JITTER_S if messy else 0.0,
+                spoiled=job.spoiled,
+            )
         started, busy = time.perf_counter(), time.process_time()
-        loaded = refuse_table(load(folder / "set"), "fit")
+        try:
+            loaded = refuse_table(load(folder / "set"), "fit")
+        except MeasurementError as refusal:  # what is wrong with the set was told before anything was fitted
+            return {"name": job.name, **asdict(job), "verdict": "refused", "left": str(refusal)}
         diagnosis, _ = diagnose_set(loaded, None, [], 0, lambda text: None)
         seconds, processor = time.perf_counter() - started, time.process_time() - busy
         model = model_of(diagnosis.fit, diagnosis.target, loaded, diagnosis.numerical)
@@ -144,6 +203,7 @@ def run_job(job: Job) -> dict:
         "seconds": seconds,
         "processor_s": processor,
         "intervals": [] if job.is_servo else _intervals(model, truth),
+        "moved": "" if diagnosis.fault is None else diagnosis.fault.words,
     }
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from . import drive, outside, sensing, touch
+from . import drive, otherwise, outside, sensing, touch
 from .effect import Effect
 
 Sizes = dict[str, dict[str, float]]
@@ -23,6 +23,9 @@ CLASSES: dict[str, type[Effect]] = {
     "command_delay": drive.CommandDelay,
     "rate_limit": drive.RateLimit,
     "actuator_lag": drive.ActuatorLag,
+    "second_order_drive": otherwise.SecondOrderDrive,
+    "restless_delay": otherwise.RestlessDelay,
+    "soft_rate": otherwise.SoftRate,
     "encoder_bias_in_loop": sensing.EncoderBiasInLoop,
     "force_limit": drive.ForceLimit,
     "coulomb_friction": drive.CoulombFriction,
@@ -34,6 +37,9 @@ CLASSES: dict[str, type[Effect]] = {
     "position_deadband": drive.PositionDeadband,
     "back_emf": drive.BackEmf,
     "swinging_load": drive.SwingingLoad,
+    "smooth_friction": otherwise.SmoothFriction,
+    "smooth_stribeck": otherwise.SmoothStribeck,
+    "tilt": otherwise.Tilt,
     "motor_cogging": outside.MotorCogging,
     "motor_fade": outside.MotorFade,
     "directional_gain": outside.DirectionalGain,
@@ -41,22 +47,32 @@ CLASSES: dict[str, type[Effect]] = {
     "backlash": drive.Backlash,
     "backlash_loose": drive.LooseBacklash,
     "finger_compliance": drive.FingerCompliance,
+    "damped_finger": otherwise.DampedFinger,
+    "ringing_finger": otherwise.RingingFinger,
     "stiffening_contact": touch.StiffeningContact,
     "viscoelastic_contact": touch.ViscoelasticContact,
     "adhesion": touch.Adhesion,
     "object_friction": touch.ObjectFriction,
+    "hertz_pads": otherwise.HertzPads,
+    "suction": otherwise.Suction,
+    "smooth_table": otherwise.SmoothTable,
     "tip_inertia": outside.TipInertia,
     "force_crosstalk": sensing.ForceCrosstalk,
     "force_hysteresis": sensing.ForceHysteresis,
     "force_deadzone": sensing.ForceDeadzone,
     "force_threshold": sensing.ForceThreshold,
+    "soft_deadzone": otherwise.SoftDeadzone,
+    "wide_hysteresis": otherwise.WideHysteresis,
     "force_gain_asymmetry": sensing.ForceGainAsymmetry,
     "curved_force_gain": outside.CurvedForceGain,
     "force_saturation": sensing.ForceSaturation,
+    "soft_saturation": otherwise.SoftSaturation,
+    "second_order_sensor": otherwise.SecondOrderSensor,
     "force_lag": sensing.ForceLag,
     "force_delay": sensing.ForceDelay,
     "force_bias": sensing.ForceBias,
     "force_drift": sensing.ForceDrift,
+    "settling_drift": otherwise.SettlingDrift,
     "readout_skew": sensing.ReadoutSkew,
     "encoder_bias": sensing.EncoderBias,
     "eccentric_encoder": outside.EccentricEncoder,
@@ -112,6 +128,26 @@ VARIANT_OF = {
     "backlash_loose": "backlash", "force_threshold": "force_deadzone", "encoder_bias_in_loop": "encoder_bias"
 }  # fmt: skip
 
+#: Effects of the catalogue by another law: the right answer, and sizes.
+OTHERWISE: dict[str, tuple[str, Sizes]] = {
+    "smooth_friction": ("coulomb_friction", _sizes("level", 0.02, 0.05, 0.1)),
+    "smooth_stribeck": ("stiction", _sizes("breakaway", 0.03, 0.06, 0.15, sliding=0.4)),
+    "tilt": ("motor_offset", _sizes("weight", 0.02, 0.05, 0.1)),
+    "second_order_drive": ("actuator_lag", CATALOGUE["actuator_lag"]),
+    "restless_delay": ("command_delay", CATALOGUE["command_delay"]),
+    "soft_rate": ("rate_limit", CATALOGUE["rate_limit"]),
+    "damped_finger": ("finger_compliance", CATALOGUE["finger_compliance"]),
+    "ringing_finger": ("finger_compliance", CATALOGUE["finger_compliance"]),
+    "hertz_pads": ("stiffening_contact", CATALOGUE["stiffening_contact"]),
+    "suction": ("adhesion", CATALOGUE["adhesion"]),
+    "smooth_table": ("object_friction", CATALOGUE["object_friction"]),
+    "soft_deadzone": ("force_deadzone", CATALOGUE["force_deadzone"]),
+    "wide_hysteresis": ("force_hysteresis", _sizes("width", 0.03, 0.08, 0.2)),
+    "soft_saturation": ("force_saturation", _sizes("full_scale", 4.0, 2.0, 1.0)),
+    "second_order_sensor": ("force_lag", CATALOGUE["force_lag"]),
+    "settling_drift": ("force_drift", _sizes("left", 0.03, 0.08, 0.25, right=0.6)),
+}
+
 OUTSIDE: dict[str, Sizes] = {
     "swinging_load": _sizes("share", 0.1, 0.3, 1.0),  # elastic_transmission, which is one of servos alone
     "motor_cogging": _sizes("amplitude", 0.01, 0.03, 0.1),
@@ -127,7 +163,7 @@ OUTSIDE: dict[str, Sizes] = {
 
 def build_effects(chosen: dict[str, str | dict]) -> dict[str, Effect]:
     """Effects from sizes or parameters, in the order in which they act."""
-    sizes = CATALOGUE | VARIANTS | OUTSIDE
+    sizes = CATALOGUE | VARIANTS | OUTSIDE | {name: sizes for name, (_, sizes) in OTHERWISE.items()}
     unknown = set(chosen) - set(CLASSES)
     if unknown:
         raise ValueError(f"no effect {sorted(unknown)}: choose from {sorted(CLASSES)}")

@@ -16,19 +16,22 @@ from pathlib import Path
 import numpy as np
 import yaml
 
-from .catalogue import CATALOGUE, OUTSIDE, VARIANTS, build_effects
+from .catalogue import CATALOGUE, OTHERWISE, OUTSIDE, VARIANTS, build_effects
 from .effect import Effect, State
+from .noises import NOISES
 from .penalty import PenaltyPlant
 from .plan import Setup, draw_setup
 from .scene import PAD_FACE_M, SAMPLE_S, STEP_S, MujocoPlant, Servo
+from .spoiled import SPOILED, Sheet
 
-__all__ = ["CATALOGUE", "OUTSIDE", "VARIANTS", "Recording", "Truth", "draw_setup", "record", "simulate"]
+__all__ = ["CATALOGUE", "OTHERWISE", "OUTSIDE", "VARIANTS", "Recording", "Truth", "draw_setup", "record", "simulate"]
 
 POSITION_STD_M, FORCE_STD_N = 2.7e-5, 0.013
 
 PLANTS: dict[str, Callable] = {
     "mujoco": MujocoPlant,
     "mujoco_multiccd": partial(MujocoPlant, multiccd=True),
+    "mujoco_rubbing": partial(MujocoPlant, friction=4.0),
     "penalty": PenaltyPlant,
     "hertz": partial(PenaltyPlant, power=1.5),
 }
@@ -56,8 +59,10 @@ class Truth:
     objects: dict[str, dict[str, float]]  # name → radius, rho, f_alpha
     grasps: list[dict]  # object, offset and session of each
     effects: dict[str, dict[str, float]]  # name → the rig's own parameters
-    position_std_m: float
+    position_std_m: float  # of white noise
     force_std_n: float
+    noise: str
+    spoiled: str
 
 
 def record(
@@ -67,8 +72,10 @@ def record(
     grasps: int = 24,
     plan: str = "rich",
     contact: str = "mujoco",
-    noise: bool = True,
+    noise: str = "white",
     samples: int = 150,
+    jitter_s: float = 0.0,
+    spoiled: str = "",
 ) -> Truth:
     """Writes a measurement set to ``folder``, and beside it, as ``<folder>.truth.json``, what is hidden in it.
 
@@ -77,31 +84,45 @@ def record(
       seed: of the base parameters, plan and noise; sets of one seed differ in their effects only.
       plan: "rich" or "close_and_hold".
       contact: one of :data:`PLANTS`; all but the first are another contact law than the model's.
+      noise: one of :data:`NOISES`; the set states the standard deviations of white noise.
+      jitter_s: samples are taken up to so much earlier or later than their time stamps say.
+      spoiled: what is wrong with the set, one of :data:`SPOILED`.
     """
     folder = Path(folder)
     setup = draw_setup(seed, grasps, plan, samples)
     hidden = build_effects(effects or {})
-    recording = simulate(setup, hidden, seed, contact, noise)
-    _write(folder, setup, recording)
+    recording = simulate(setup, hidden, seed, contact, noise, jitter_s)
+    sheet = Sheet(
+        SAMPLE_S, [setup.things[i].name for i in setup.thing], setup.per_grasp("radius"), setup.offset,
+        setup.commands, recording.q, recording.f,
+    )  # fmt: skip
+    _write(folder, SPOILED[spoiled](sheet, np.random.default_rng([seed, 4])), setup.session)
     placed = zip(setup.thing, setup.offset, setup.session, strict=True)
     truth = Truth(
         seed, plan, contact, setup.servo.gain, setup.servo.b2,
         {t.name: {"radius_m": t.radius, "rho_m": t.rho, "f_alpha": t.f_alpha} for t in setup.things},
         [{"object": setup.things[i].name, "offset_m": float(o), "session": int(day)} for i, o, day in placed],
         {name: _parameters(effect) for name, effect in hidden.items()},
-        POSITION_STD_M if noise else 0.0, FORCE_STD_N if noise else 0.0,
+        POSITION_STD_M, FORCE_STD_N, noise, spoiled,
     )  # fmt: skip
     folder.with_name(folder.name + ".truth.json").write_text(json.dumps(asdict(truth), indent=1))
     return truth
 
 
 def simulate(
-    setup: Setup, effects: dict[str, Effect], seed: int = 0, contact: str = "mujoco", noise: bool = True
+    setup: Setup,
+    effects: dict[str, Effect],
+    seed: int = 0,
+    contact: str = "mujoco",
+    noise: str = "white",
+    jitter_s: float = 0.0,
 ) -> Recording:
     """Runs all grasps of a set side by side."""
     n, samples = setup.commands.shape[:2]
     rng = np.random.default_rng([seed, 2])
-    noise_q, noise_f = rng.normal(0, [[[[POSITION_STD_M]]], [[[FORCE_STD_N]]]], (2, n, samples, 2)) * noise
+    noise_q, noise_f = NOISES[noise](rng, (2, n, samples, 2)) * [[[[POSITION_STD_M]]], [[[FORCE_STD_N]]]]
+    late_s = np.random.default_rng([seed, 5]).uniform(-jitter_s, jitter_s, samples + 1)
+    ends = np.round((SAMPLE_S * np.arange(samples + 1) + late_s) / STEP_S).astype(int)
     for i, effect in enumerate(effects.values()):
         effect.start(n, np.random.default_rng([seed, 3, i]))
     hooks = _Hooks(effects.values())
@@ -120,7 +141,7 @@ def simulate(
         f.append(reading[1])
         o.append(s.o)
         sent = send(setup.commands[:, k], reading[0])
-        for _ in range(round(SAMPLE_S / STEP_S)):
+        for _ in range(ends[k + 1] - ends[k]):
             s.setpoint = drive(sent, s)
             hand.step()
             force = sense(s.f, s)
@@ -192,7 +213,7 @@ def _parameters(effect: Effect) -> dict[str, float]:
     return {f.name: float(getattr(effect, f.name)) for f in fields(effect) if f.init}
 
 
-def _write(folder: Path, setup: Setup, recording: Recording) -> None:
+def _write(folder: Path, sheet: Sheet, session: np.ndarray) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     meta = {
         "format": "forcegrasp-measurements/1", "kind": "grasps", "gripper": "tiago",
@@ -203,16 +224,16 @@ def _write(folder: Path, setup: Setup, recording: Recording) -> None:
     with (folder / "grasps.csv").open("w", newline="") as file:
         rows = csv.writer(file)
         rows.writerow(["grasp", "object", "session", "object_radius_m", "object_offset_m"])
-        for grasp, (i, offset) in enumerate(zip(setup.thing, setup.offset, strict=True)):
-            thing = setup.things[i]
-            rows.writerow([grasp, thing.name, f"session_{setup.session[grasp]}", thing.radius, float(offset)])
+        columns = zip(sheet.label, session, sheet.radius, sheet.offset, strict=True)
+        for grasp, (label, day, radius, offset) in enumerate(columns):
+            rows.writerow([grasp, label, f"session_{day}", round(float(radius), 6), float(offset)])
     with (folder / "samples.csv").open("w", newline="") as file:
         rows = csv.writer(file)
         rows.writerow(_COLUMNS)
-        values = np.concatenate([setup.commands, recording.q, recording.f], axis=2)
+        values = np.concatenate([sheet.commands, sheet.q, sheet.f], axis=2)
         for grasp, series in enumerate(values):
             for k, row in enumerate(series):
-                rows.writerow([grasp, f"{k * SAMPLE_S:.2f}", *(f"{x:.9g}" for x in row)])
+                rows.writerow([grasp, f"{k * sheet.period_s:.2f}", *(f"{x:.9g}" for x in row)])
 
 
 def main() -> None:
@@ -224,7 +245,8 @@ def main() -> None:
     parser.add_argument("--samples", type=int, default=150)
     parser.add_argument("--plan", default="rich", choices=["rich", "close_and_hold"])
     parser.add_argument("--contact", default="mujoco", choices=sorted(PLANTS))
-    parser.add_argument("--no-noise", action="store_true")
+    parser.add_argument("--noise", default="white", choices=sorted(NOISES))
+    parser.add_argument("--spoiled", default="", choices=sorted(SPOILED))
     args = parser.parse_args()
     chosen: dict[str, str | dict] = {}
     for item in args.effects:
@@ -232,8 +254,9 @@ def main() -> None:
         pairs = [pair.split(":") for pair in value.split(",")]
         chosen[name] = {key: float(x) for key, x in pairs} if ":" in value else value
     truth = record(
-        args.folder, chosen, args.seed, args.grasps, args.plan, args.contact, not args.no_noise, args.samples
-    )
+        args.folder, chosen, args.seed, args.grasps, args.plan, args.contact, args.noise, args.samples,
+        spoiled=args.spoiled,
+    )  # fmt: skip
     print(json.dumps(asdict(truth), indent=1))
 
 

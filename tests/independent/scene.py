@@ -27,7 +27,7 @@ _SCENE = """
     <geom name="table" type="plane" size="1 1 0.1"/>
     <body name="object" pos="0 {offset} 0.05">
       <freejoint/>
-      <geom type="cylinder" size="{radius} 0.05" mass="0.4" condim="3" friction="1 0.005 0.0001" priority="1"
+      <geom type="cylinder" size="{radius} 0.05" mass="0.4" condim="3" friction="{friction} 0.005 0.0001" priority="1"
             solref="0.02 1" solimp="0 0.99 {rho} 0.5 2"/>
     </body>
     {left}
@@ -77,7 +77,12 @@ class Servo:
 
 
 def compile_model(
-    rho: float, radius: float, offset: float, servo: Servo | None = None, multiccd: bool = False
+    rho: float,
+    radius: float,
+    offset: float,
+    servo: Servo | None = None,
+    multiccd: bool = False,
+    friction: float = 1.0,
 ) -> mujoco.MjModel:
     """One grasp's model. Without a servo, the motor (and its rotor's inertia) is simulated outside MuJoCo.
 
@@ -100,13 +105,13 @@ def compile_model(
         )
     xml = _SCENE.format(
         step=STEP_S, offset=offset, radius=radius, rho=rho, contacts=_MAX_CONTACTS, motors=motors,
-        multiccd="enable" if multiccd else "disable",
+        multiccd="enable" if multiccd else "disable", friction=friction,
         left=finger("left", -1), right=finger("right", 1),
     )  # fmt: skip
     model = mujoco.MjModel.from_xml_string(xml)
     if servo is None:
         # A contact's softness is scaled by these: the object stays the same whatever hangs behind the pad.
-        whole = compile_model(rho, radius, offset, Servo())
+        whole = compile_model(rho, radius, offset, Servo(), friction=friction)
         model.body_invweight0[:], model.dof_invweight0[:] = whole.body_invweight0, whole.dof_invweight0
     return model
 
@@ -118,13 +123,20 @@ class MujocoPlant:
       rho, radius, offset: of each grasp's object, ``(n,)``.
       servo: the fingers' servo, or None when the caller simulates the motors.
       multiccd: see :func:`compile_model`.
+      friction: of the object, on the table and on the pads.
     """
 
     def __init__(
-        self, rho: np.ndarray, radius: np.ndarray, offset: np.ndarray, servo: Servo | None, multiccd: bool = False
+        self,
+        rho: np.ndarray,
+        radius: np.ndarray,
+        offset: np.ndarray,
+        servo: Servo | None,
+        multiccd: bool = False,
+        friction: float = 1.0,
     ) -> None:
         _silence_log()
-        models = [compile_model(*values, servo, multiccd) for values in zip(rho, radius, offset, strict=True)]
+        models = [compile_model(*values, servo, multiccd, friction) for values in zip(rho, radius, offset, strict=True)]
         self._batch = batch = Batch(models[0], len(models), 1)
         batch.set_models(models)
         batch.reset()

@@ -12,10 +12,12 @@ import numpy as np
 import pytest
 import yaml
 
-from .catalogue import CATALOGUE, CLASSES, OUTSIDE, VARIANT_OF, VARIANTS, build_effects
+from .catalogue import CATALOGUE, CLASSES, OTHERWISE, OUTSIDE, VARIANT_OF, VARIANTS, build_effects
+from .noises import NOISES
 from .plan import Setup, Thing, draw_setup
 from .rig import FORCE_STD_N, PLANTS, POSITION_STD_M, record, simulate
 from .scene import Servo, compile_model
+from .spoiled import SPOILED
 
 GAIN, F_ALPHA, OFFSET = 100.0, 2.0, 0.003
 # When the commands of the little grasp below are sent, and where they have settled.
@@ -38,7 +40,7 @@ def little_setup() -> Setup:
 def rig(name: str = "", size: str = "medium", **parameters: float):
     """The little grasp, without noise, with one effect."""
     chosen = {name: parameters or size} if name else {}
-    return simulate(little_setup(), build_effects(chosen), contact="penalty", noise=False)
+    return simulate(little_setup(), build_effects(chosen), contact="penalty", noise="none")
 
 
 def test_null_effects_change_no_bit() -> None:
@@ -50,7 +52,7 @@ def test_null_effects_change_no_bit() -> None:
         np.testing.assert_array_equal(plain.f, null.f)
 
 
-@pytest.mark.parametrize("name", sorted(CATALOGUE | VARIANTS | OUTSIDE))
+@pytest.mark.parametrize("name", sorted(CATALOGUE | VARIANTS | OTHERWISE | OUTSIDE))
 def test_every_effect_shows(name: str) -> None:
     plain, hidden = rig(), rig(name, "large")
     assert np.isfinite([hidden.q, hidden.f]).all()
@@ -59,9 +61,9 @@ def test_every_effect_shows(name: str) -> None:
 
 
 def test_names() -> None:
-    assert set(CATALOGUE) | set(VARIANTS) | set(OUTSIDE) == set(CLASSES)
+    assert set(CATALOGUE) | set(VARIANTS) | set(OTHERWISE) | set(OUTSIDE) == set(CLASSES)
     assert set(VARIANT_OF) == set(VARIANTS)
-    assert set(VARIANT_OF.values()) <= set(CATALOGUE)
+    assert set(VARIANT_OF.values()) | {name for name, _ in OTHERWISE.values()} <= set(CATALOGUE)
 
 
 def test_symptoms_of_the_command() -> None:
@@ -165,6 +167,45 @@ def test_symptoms_of_the_sensors() -> None:
     assert len(np.unique(few.f.round(9))) < 6
 
 
+@pytest.mark.parametrize("name", sorted(NOISES))
+def test_noises(name: str) -> None:
+    drawn = NOISES[name](np.random.default_rng(0), (2, 100, 50, 2))
+    sizes = {"none": 0.0, "louder": 1.5, "quieter": 0.7, "outliers": np.sqrt(1 + 63 / 300)}
+    assert np.std(drawn) == pytest.approx(sizes.get(name, 1.0), rel=0.15)
+    after = np.corrcoef(drawn[..., 1:, :].ravel(), drawn[..., :-1, :].ravel())[0, 1] if name != "none" else 0.0
+    assert after == pytest.approx(0.7 if name == "slow" else 0.0, abs=0.03)
+    assert (np.abs(drawn).max() > 7) == (name in ("heavy", "outliers"))
+
+
+@pytest.mark.parametrize("name", sorted(SPOILED))
+def test_a_spoiled_set_differs_in_what_is_written_alone(name: str, tmp_path: Path) -> None:
+    read = {}
+    for spoiled in ("", name):
+        folder = tmp_path / (spoiled or "whole")
+        record(folder, {}, 3, grasps=6, contact="penalty", samples=40, spoiled=spoiled)
+        read[spoiled] = {
+            file: list(csv.DictReader((folder / file).read_text().splitlines()))
+            for file in ("grasps.csv", "samples.csv")
+        }
+
+    def columns_that_differ(file: str) -> set[str]:
+        pairs = zip(read[""][file], read[name][file], strict=True)
+        return {column for whole, other in pairs for column in whole if whole[column] != other[column]}
+
+    expected = {
+        "": set(), "clock_doubled": {"t_s"}, "forces_swapped": {"f_l_n", "f_r_n"}, "forces_late": {"f_l_n", "f_r_n"},
+        "commands_late": {"qdes_l_m", "qdes_r_m"}, "tare": {"f_l_n"}, "calliper": {"object_radius_m"},
+        "radius_0.3mm": {"object_radius_m"}, "radius_2mm": {"object_radius_m"},
+        "labels_swapped": {"object", "object_radius_m"},
+    }  # fmt: skip
+    assert columns_that_differ("grasps.csv") | columns_that_differ("samples.csv") == expected[name]
+
+
+def test_jitter_moves_readings_a_little() -> None:
+    plain, late = (simulate(little_setup(), {}, contact="penalty", noise="none", jitter_s=j) for j in (0.0, 0.0015))
+    assert 1e-6 < np.max(abs(plain.q - late.q)) < 1e-3
+
+
 def test_scene_constants() -> None:
     for servo in (Servo(), None):
         model = compile_model(0.005, 0.025, 0.0, servo)
@@ -178,7 +219,7 @@ def test_motor_outside_mujoco_is_the_same_motor() -> None:
     """Where something gives way, the motor is integrated here: with next to no play it must move the same."""
     setup = draw_setup(5, 2, "rich", 40)
     plain, stiff = (
-        simulate(setup, build_effects(chosen), contact="mujoco", noise=False)
+        simulate(setup, build_effects(chosen), contact="mujoco", noise="none")
         for chosen in ({}, {"backlash": {"gap": 1e-9}})
     )
     assert np.max(abs(stiff.q - plain.q)) < 3e-5
@@ -201,7 +242,7 @@ def test_record(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("contact", "plan"), [*((name, "rich") for name in PLANTS), ("penalty", "close_and_hold")])
 def test_tiers_and_plans(contact: str, plan: str) -> None:
-    recording = simulate(draw_setup(2, 2, plan, 60), {}, contact=contact, noise=False)
+    recording = simulate(draw_setup(2, 2, plan, 60), {}, contact=contact, noise="none")
     assert recording.f.max() > 0.01
     assert -1e-3 < recording.q.min() < recording.q.max() < 0.046
 
@@ -217,6 +258,6 @@ def test_authors_trajectory() -> None:
     commands = np.concatenate([commands, commands[-1:]])[None]  # their rows are what follows a command
     things = [Thing("kappa_0.50", 0.035, 0.0065, 2.75)]
     setup = Setup(Servo(100.0, -9.0), things, np.array([0]), np.array([0.0]), np.array([1]), commands)
-    ours = simulate(setup, {}, noise=False)
+    ours = simulate(setup, {}, noise="none")
     assert np.mean(abs(ours.q[0, 1:] - q)) < 2e-5
     assert np.mean(abs(ours.f[0, 1:] - f)) < 5e-3
