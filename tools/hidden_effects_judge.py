@@ -1,0 +1,78 @@
+"""Whether a diagnosis of the campaign was right, by what was hidden in the set."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+from forcegrasp.effects import catalogue
+
+#: What the messy rig has in every set, beside what is hidden: to name it, or a form of it, is right.
+OF_THE_MESS = ("encoder_bias", "force_gain_asymmetry", "coulomb_friction", "object_size", "force_bias")
+#: Groups where whoever names the kind of effect is right.
+BY_FAMILY = ("law", "contact")
+
+
+def families(names: Collection[str]) -> set[str]:
+    """The kinds of these effects; names that are no effects are left out."""
+    known = catalogue()
+    return {known[name].family for name in names if name in known}
+
+
+def is_of_set(name: str) -> bool:
+    """Whether a name stands for a mistake of the set and not for an effect."""
+    return name not in catalogue() or catalogue()[name].of_set
+
+
+def steps_of(row: dict) -> list[list[str]]:
+    """What was found one after the other, each with what it can't be told from; nothing where nothing is named."""
+    named = row.get("effects", [])
+    return [effects for _, effects in row.get("steps", []) if effects and effects[0] in named]
+
+
+def judge(row: dict, right: set[str]) -> str:
+    """One of "first", "in set", "wrong", "missed", "error"; "in set" is right, but not it alone.
+
+    Args:
+      row: a result of the campaign.
+      right: names of the effects that were hidden, as the catalogue has them.
+    """
+    verdict, named, group = row["verdict"], row.get("effects", []), row["group"].removeprefix("servo ")
+    if verdict in ("error", "not_fitted"):
+        return "error" if verdict == "error" else "missed"
+    if group == "spoiled":
+        if verdict in ("data", "refused"):
+            return "first"
+        return "in set" if any(is_of_set(name) for name in named) else "wrong" if named else "missed"
+    if group == "outside":
+        return "first" if verdict == "unknown" else "wrong" if named else "missed"
+    if group == "contact" and not right:
+        return "first" if families(named) <= {"contact"} else "wrong"
+    if not right and group != "messy":
+        return "first" if verdict == "explained" else "missed" if verdict == "unknown" else "wrong"
+    if group in ("two", "several", "messy"):
+        return _judge_several(row, right)
+    matches = families(right) if group in BY_FAMILY else right
+    said = [families([name]) if group in BY_FAMILY else {name} for name in named]
+    if verdict != "one_of":
+        said = said[:1]
+    elif any(one & matches for one in said[1:]) and not said[0] & matches:
+        return "in set"
+    return "first" if said and said[0] & matches else "wrong" if named else "missed"
+
+
+def _judge_several(row: dict, right: set[str]) -> str:
+    hits, wrong = named_of(row, right), false_names(row, right)
+    if hits == right:
+        return "in set" if wrong else "first"
+    return "in set" if hits else "wrong" if wrong else "missed"
+
+
+def named_of(row: dict, right: set[str]) -> set[str]:
+    """Those of the hidden effects that are named, alone or in a tie."""
+    return right & {name for step in steps_of(row) for name in step}
+
+
+def false_names(row: dict, right: set[str]) -> list[str]:
+    """What was named first in a step of which nothing is right."""
+    allowed = right | set(OF_THE_MESS if row["group"] == "messy" else ())
+    return [step[0] for step in steps_of(row) if not allowed & set(step)]
