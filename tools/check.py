@@ -26,6 +26,7 @@ PARTS = {
     "docs": [["sphinx-build", "--quiet", "--fail-on-warning", "--keep-going", "--fresh-env", "docs", "build/docs"]],
     "hidden-effects": [["python", "tools/hidden_effects.py", "check"]],
     "results": [["python", "-m", "tools.results", "check"]],
+    "speed": [["python", "-m", "tools.bench", "--check"]],
     "tests": [["python", "-m", "pytest", "-q", "-n", "auto", "--dist", "loadfile", "--no-loadscope-reorder"]],
 }
 

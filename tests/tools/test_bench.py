@@ -9,7 +9,7 @@ import pytest
 
 from forcegrasp.config import PhysicsConfig, SensorConfig, TrainConfig
 from forcegrasp.env.gymnasium_view import GraspGymnasiumEnv
-from tools.bench import learning
+from tools.bench import history, learning
 from tools.bench.__main__ import main
 from tools.bench.case import STEPS, Case, Learning, Measured
 from tools.bench.levels import BATCHES, LEVELS
@@ -83,6 +83,40 @@ def test_what_was_learned_is_told_and_drawn(tmp_path, capsys):
     assert "more than 30.0 times as long" in said
     assert {"30.0", "10.0", "3.0"} <= set(said.replace("│", " ").split())  # of it stack, of it tier
     assert (tmp_path / "all_learning.png").exists()
+
+
+def measured(collection: float, grasps: int = 256) -> Results:
+    rates = {"raw engine": 1000.0, "collection": 1000.0 * collection}
+    levels = [Measured(Case(name, "fast", grasps), rate, 9.0) for name, rate in rates.items()]
+    return Results(10, levels, machine={"cores": 2})
+
+
+def test_a_history_of_ratios_tells_what_became_slower(tmp_path, monkeypatch, capsys):
+    kept, source = tmp_path / "history.jsonl", tmp_path / "one.json"
+    assert main(["--check", str(kept)]) == 0  # nothing was measured yet
+    for commit, ratio, machine in (("a" * 40, 0.8, 2), ("b" * 40, 0.5, 64), ("c" * 40, 0.73, 2), ("d" * 40, 0.65, 2)):
+        monkeypatch.setattr(history, "git_hash", lambda commit=commit: commit)
+        results = measured(ratio)
+        results.machine["cores"] = machine
+        results.write(source)
+        assert main(["--from", str(source), "--history", str(kept)]) == 0
+        slower = main(["--check", str(kept)])
+        assert slower == (commit[0] == "d"), commit  # by 11 %, on one machine; on another it says nothing
+    said = " ".join(capsys.readouterr().out.split())
+    assert "collection, fast: 0.65 of the raw engine, 0.73 at cccccccccccc" in said
+    assert (tmp_path / "history.png").exists()
+    assert history.read(kept)[0]["ratios"] == {"collection, fast": 0.8}
+
+
+def test_another_size_and_the_same_commit_are_not_held_against_a_run(tmp_path, monkeypatch):
+    monkeypatch.setattr(history, "git_hash", lambda: "a" * 40)
+    entries = [history.entry(measured(ratio)) for ratio in (0.9, 0.5)]
+    assert history.lost(entries) == []
+    monkeypatch.setattr(history, "git_hash", lambda: "b" * 40)
+    assert history.lost([*entries, history.entry(measured(0.3, 16))]) == []
+    assert history.lost([*entries, history.entry(measured(0.3))]) != []
+    without_engine = Results(10, measured(0.5).levels[1:])
+    assert history.entry(without_engine) is None
 
 
 def test_our_training_tells_of_each_batch(monkeypatch):

@@ -5,6 +5,8 @@
     python -m tools.bench --time-to-reward 3600              also how long training takes until a force reward of 100
     python -m tools.bench --only simulator training          some layers, peers or trainings alone
     python -m tools.bench --from speed.json --figure         tables and pictures of what was measured before
+    python -m tools.bench --history                          also adds the ratios to a file in docs, and draws it
+    python -m tools.bench --check                            fails where the last ratios there fell by more than 10 %
 
 Each layer and peer runs in a process of its own. They take turns, and the best of their repeats counts, so that
 whatever else the machine does hits all alike. Peers need `pip install '.[bench]'`; what is not installed is left out.
@@ -23,6 +25,7 @@ from rich.console import Console
 
 from tools.bench.case import Case, Measured
 from tools.bench.figures import draw
+from tools.bench.history import append, draw_history, entry, lost, read
 from tools.bench.learning import LEARNED, TRAININGS
 from tools.bench.levels import LEVELS
 from tools.bench.peers import PEERS, missing
@@ -35,6 +38,7 @@ TIERS = ("fast", "reference")
 #: What the authors simulate.
 PEER_TIER = "reference"
 FIGURE = ROOT / "docs" / "figures" / "speed.png"
+HISTORY = ROOT / "docs" / "speed-history.jsonl"
 
 
 def parse(arguments: list[str] | None = None) -> argparse.Namespace:
@@ -56,6 +60,8 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--json", type=Path, help="file to write, as soon as a part is measured")
     parser.add_argument("--figure", nargs="?", type=Path, const=FIGURE, help=f"to draw ({FIGURE.relative_to(ROOT)})")
     parser.add_argument("--from", type=Path, dest="source", help="JSON of an earlier run: measure nothing")
+    parser.add_argument("--history", nargs="?", type=Path, const=HISTORY, help=f"({HISTORY.relative_to(ROOT)})")
+    parser.add_argument("--check", nargs="?", type=Path, const=HISTORY, help="a history, and measure nothing")
     options = parser.parse_args(arguments)
     if options.source and not options.source.is_file():
         parser.error(f"--from {options.source}: no such file")
@@ -126,6 +132,8 @@ class Benchmark:
 
 def main(arguments: list[str] | None = None) -> int:
     options, console = parse(arguments), Console()
+    if options.check:
+        return _check(options.check, console)
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # so that it ends its processes
     if options.source:
         results = Results.read(options.source)
@@ -145,7 +153,19 @@ def main(arguments: list[str] | None = None) -> int:
     if options.figure:
         for path in draw(results, options.figure):
             console.print(f"drew {path}")
+    if options.history and (one := entry(results)) is not None:
+        append(options.history, one)
+        draw_history(read(options.history), options.history.with_suffix(".png"))
+        console.print(f"wrote {options.history} and {options.history.with_suffix('.png').name}")
     return 0
+
+
+def _check(path: Path, console: Console) -> int:
+    """Exit status: 1 if a ratio fell since the last commit that was measured on the same machine."""
+    fell = lost(read(path))
+    for line in fell:
+        console.print(f"{path.name}: {line}", markup=False)
+    return int(bool(fell))
 
 
 if __name__ == "__main__":
