@@ -53,7 +53,7 @@ PAIRS_OF_SERVOS = (
 )
 
 
-#: What every real rig has: objects measured to 0.3 mm, encoders, gains, a little friction, a clock, heavy-tailed noise.
+#: What every real rig has: objects 0.3 mm off, encoders, gains, a little friction, a clock, heavy-tailed noise.
 MESS: dict[str, dict[str, float]] = {
     "encoder_bias": {"left": 1e-4, "right": -6e-5},
     "force_gain_asymmetry": {"right_excess": 0.03},
@@ -119,12 +119,15 @@ def jobs() -> list[Job]:
         found += [Job("contact", (name,), "medium", 7, contact) for name in rng.sample(sorted(CATALOGUE), 6)]
     found += [Job("several", pair, "medium", seed) for seed, pair in enumerate(PAIRS, 1)]
     found += [Job("several", several(count), "medium", 10 * count + k) for count in (2, 3, 4, 5) for k in range(15)]
-    for spoiled in sorted(set(SPOILED) - {"", "calliper"}):
-        found += [Job("spoiled", (), "", seed, spoiled=spoiled) for seed in range(30, 38)]
-    mess = {"noise": "heavy", "spoiled": "calliper"}
-    found += [Job("messy", (), "", seed, **mess) for seed in range(40, 55)]
-    found += [Job("messy", (name,), "medium", 60 + k, **mess) for k, name in enumerate(sorted(CATALOGUE))]
-    found += [Job("messy", several(count), "medium", 100 * count + k, **mess) for count in (2, 3) for k in range(15)]
+    for spoiled in sorted(set(SPOILED) - {""}):
+        found += [Job("spoiled", (), "", seed, spoiled=spoiled) for seed in range(30, 37)]
+
+    def messy(hidden: tuple[str, ...], size: str, seed: int) -> Job:
+        return Job("messy", hidden, size, seed, noise="heavy", spoiled="radius_0.3mm")
+
+    found += [messy((), "", seed) for seed in range(40, 55)]
+    found += [messy((name,), "medium", 60 + k) for k, name in enumerate(sorted(CATALOGUE))]
+    found += [messy(several(count), "medium", 100 * count + k) for count in (2, 3) for k in range(15)]
     found += _servo_jobs()
     rng.shuffle(found)
     return found

@@ -10,17 +10,19 @@ import numpy as np
 from forcegrasp.diagnosis.doubt import leaves_less, more_likely, with_fault
 from forcegrasp.diagnosis.faults import suspects
 from forcegrasp.diagnosis.law import find_law
-from forcegrasp.diagnosis.result import Diagnosis
+from forcegrasp.diagnosis.moved_set import go_on_with_moved
+from forcegrasp.diagnosis.result import Diagnosis, Step
 from forcegrasp.diagnosis.search import diagnose
 from forcegrasp.effects import Effect
 from forcegrasp.effects.for_gripper import effect_of, effects_of
 from forcegrasp.errors import MeasurementError
 from forcegrasp.identify import fit_set
 from forcegrasp.identify.base_fit import BaseFit
-from forcegrasp.identify.fit import Simulators
+from forcegrasp.identify.fit import Fit, Simulators
 from forcegrasp.identify.loading import Loaded
 from forcegrasp.identify.progress import Progress
 from forcegrasp.identify.target import Target
+from forcegrasp.identify.verdict import Verdict
 from forcegrasp.measure import MeasurementSet
 from forcegrasp.models.model_file import Model
 from forcegrasp.physics.gripper import Gripper
@@ -55,8 +57,20 @@ def diagnose_set(
             return fit_set.fit_model(one, seed, progress)
         return fit_set.apply_model(one, model, progress, refit=True)
 
-    def search(target: Target, simulators: Simulators, base: BaseFit) -> Diagnosis:
-        return diagnose(target, base, simulators, chosen, np.random.default_rng(seed + 1), progress)
+    def search(
+        target: Target, simulators: Simulators, base: BaseFit, start: tuple[Fit, Sequence[Step]] | None = None
+    ) -> Diagnosis:
+        return diagnose(target, base, simulators, chosen, np.random.default_rng(seed + 1), progress, start)
+
+    def as_said() -> tuple[Diagnosis, Simulators]:
+        target, simulators, base = said
+        found = search(target, simulators, base)
+        if not found.left or found.verdict is Verdict.NOT_FITTED or found.verdict is Verdict.DATA:
+            return found, simulators
+        return go_on_with_moved(found, loaded, lambda t, s, fit, steps: search(t, s, base, (fit, steps)), progress) or (
+            found,
+            simulators,
+        )
 
     said = fitted(loaded)
 
@@ -73,7 +87,7 @@ def diagnose_set(
             certain = not found.left and not fault.expected  # else an effect may do as well
             likely = found if certain else more_likely(found, search(*said))
             return with_law(likely, right[1] if likely.target.grasps is right[0].grasps else said[1])
-    return with_law(search(*said), said[1])
+    return with_law(*as_said())
 
 
 def chosen_effects(gripper: Gripper, names: Sequence[str]) -> list[type[Effect]]:

@@ -67,10 +67,25 @@ def suspects(loaded: Loaded[MeasurementSet], target: Target, fit: Fit) -> list[F
         words = f"{listed(early)} are what was read one row later{late}"
         check = "which row each column was written to, and its clock"
         found.append(Fault("early_row", words, check, _changed(loaded, lambda _, g: _one_row_later(g, early))))
-    if not found and (moved := move_given(measured, target, fit)) is not None:
-        words, right = moved.words(measured), _changed(loaded, lambda _, g: moved.put(g))
-        found.append(Fault("object_tolerance", words, "the objects, with a calliper", right, moved.price, True))
+    if not found and (moved := within_tolerance(loaded, target, fit)) is not None:
+        found.append(moved)
     return found
+
+
+def within_tolerance(loaded: Loaded[MeasurementSet], target: Target, fit: Fit, worth: float = _WORTH) -> Fault | None:
+    """What was moved within the tolerance of what is given, if that explains this share of what a fit leaves.
+
+    Args:
+      loaded: grasps of a gripper, as the set has them.
+      target: the same, lined up.
+      fit: of the model.
+      worth: least share of the squares beyond the noise.
+    """
+    moved = move_given(loaded.measured, target, fit, worth)
+    if moved is None:
+        return None
+    words, right = moved.words(loaded.measured), _changed(loaded, lambda _, g: moved.put(g))
+    return Fault("object_tolerance", words, "the objects, with a calliper", right, moved.price, True)
 
 
 def _changed(

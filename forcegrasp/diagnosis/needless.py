@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 
 from forcegrasp.diagnosis.evidence import LEAST_RISE, is_beyond_chance
 from forcegrasp.diagnosis.families import refit_without
@@ -21,18 +22,12 @@ def drop_needless(study: Study, step: Step, fit: Fit, given: int) -> tuple[Step,
       fit: with all effects.
       given: number of effects that were in the model before the search; they stay.
     """
-    held = study.heldout(fit)
-    without: dict[str, tuple[Fit, float]] = {}
-    for one in fit.problem.effects[given:-1]:
-        study.progress(f"fitting without {one.effect.name}")
-        less = refit_without(one.effect.name, fit, study)
-        left = study.heldout(less)
-        if not is_beyond_chance(study.gains(left, held), LEAST_RISE):
-            without[one.effect.name] = less, rms(left, study.target)
-    if not without:
+    found = _without_needless(study, fit, [one.effect.name for one in fit.problem.effects[given:-1]])
+    if found is None:
         return step, fit
-    name, (less, error) = min(without.items(), key=lambda item: item[1][0].cost)
+    name, less = found
     study.progress(f"{name} is needless with {step.effects[0]}")
+    error = rms(study.heldout(less), study.target)
     last = dataclasses.replace(
         step.candidates[0],
         setting=less.problem.case(less.vector).effects[-1],
@@ -41,3 +36,31 @@ def drop_needless(study: Study, step: Step, fit: Fit, given: int) -> tuple[Step,
         replaces=name,
     )
     return dataclasses.replace(step, candidates=(last, *step.candidates[1:]), error_after=error), less
+
+
+def drop_all_needless(study: Study, steps: Sequence[Step], fit: Fit, given: int) -> tuple[list[Step], Fit]:
+    """The steps whose effects held-out grasps still ask for, and the fit without the others.
+
+    Args:
+      study: the measurements.
+      steps: that found the effects.
+      fit: with all effects.
+      given: as for :func:`drop_needless`.
+    """
+    left = list(steps)
+    while found := _without_needless(study, fit, [one.effect.name for one in fit.problem.effects[given:]]):
+        name, fit = found
+        study.progress(f"{name} is needless now")
+        left = [step for step in left if name not in step.effects[:1]]
+    return left, fit
+
+
+def _without_needless(study: Study, fit: Fit, names: Sequence[str]) -> tuple[str, Fit] | None:
+    """That one of these effects which held-out grasps ask for least, if they don't, and the fit without it."""
+    held, without = study.heldout(fit), {}
+    for name in names:
+        study.progress(f"fitting without {name}")
+        less = refit_without(name, fit, study)
+        if not is_beyond_chance(study.gains(study.heldout(less), held), LEAST_RISE):
+            without[name] = less
+    return min(without.items(), key=lambda item: item[1].cost) if without else None

@@ -26,7 +26,7 @@ def other_starts(fit: Fit, study: Study) -> list[np.ndarray]:
 
     What rings at 6 Hz has a valley there and others at higher frequencies. Base parameters that made up for the effect
     while it was missing may be stuck where they are. The first parameter of the last effect is set to sizes all over
-    its range, each of them simulated by the model itself. What the other parameters would make up for, as far as their
+    its range, each of them simulated by the cheap model. What the other parameters would make up for, as far as their
     slopes tell, is taken out of the residuals.
 
     Args:
@@ -44,7 +44,7 @@ def other_starts(fit: Fit, study: Study) -> list[np.ndarray]:
         starts.append(start)
     if not starts:
         return []
-    signals = predict(study.simulators.exact, [problem.case(start) for start in starts])
+    signals = predict(study.simulators.cheap, [problem.case(start) for start in starts]) + fit.correction
     others = Background(fit, (), without=index)
     left = np.stack([(fit.weight * study.target.residual(one)).ravel() for one in signals], axis=1)
     costs = np.sum(others.remove(left) ** 2, axis=0)

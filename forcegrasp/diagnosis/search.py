@@ -37,6 +37,7 @@ def diagnose(
     effects: Sequence[type[Effect]],
     rng: np.random.Generator,
     progress: Progress = silent,
+    start: tuple[Fit, Sequence[Step]] | None = None,
 ) -> Diagnosis:
     """Adds effects to a fitted base model for as long as the evidence holds.
 
@@ -47,11 +48,14 @@ def diagnose(
       effects: the catalogue.
       rng: for the null distribution.
       progress: told what is going on.
+      start: a fit with the effects that steps have found before, to go on from; the base model by default.
     """
-    fit, folds = base.fit, tuple(make_folds(target.grasps))
+    first, before = (base.fit, ()) if start is None else start
+    fit = first
+    folds = tuple(make_folds(target.grasps))
     of_base = numerical_error(fit, target)
     study = Study(target, simulators, folds, beyond_fit(fit, of_base), progress)
-    error_before = rms(target.before_rounding(study.heldout(fit)), target)
+    error_before = rms(target.before_rounding(study.heldout(base.fit)), target)
     odd = odd_grasps(target, fit)
     if any(grasp.like for grasp in odd):  # nothing can be learnt of the gripper until labels are right
         labels = ("object_labels",)
@@ -59,8 +63,8 @@ def diagnose(
             Verdict.DATA, labels, (), base, fit, target, folds, error_before, error_before, left="labels", odd=odd
         )
     floor = numerical_floor(study.numerical, target)
-    steps: list[Step] = []
-    if (rounding := target.rounding) is not None:
+    steps: list[Step] = list(before)
+    if (rounding := target.rounding) is not None and start is None:
         progress(f"found {rounding.effect.name}: readings are multiples of one step")
         steps.append(Step((rounding.effect.name,), (), (), error_before, rms(study.heldout(fit), target)))
     signatures = Signatures(effects, study)
@@ -103,7 +107,7 @@ def diagnose(
     names = [s.effects[0] for s in found] if verdict.names_effects else []
     if verdict is Verdict.ONE_OF:
         names += [name for s in found for name in s.effects[1:]]
-    of_final = of_base if fit is base.fit else numerical_error(fit, target)
+    of_final = of_base if fit is first else numerical_error(fit, target)
     return Diagnosis(
         verdict, tuple(dict.fromkeys(names)), tuple(steps), base, fit, target, folds, error_before, error_after,
         of_final, floor, left, odd, noise,

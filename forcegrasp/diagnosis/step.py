@@ -26,7 +26,7 @@ from forcegrasp.diagnosis.verdict import explained_share
 from forcegrasp.effects import Effect
 from forcegrasp.identify.base_fit import rms_error
 from forcegrasp.identify.cross_validation import rms
-from forcegrasp.identify.fit import Fit, fit_exactly
+from forcegrasp.identify.fit import Fit, descend_roughly, fit_exactly
 from forcegrasp.identify.noise_floor import cells, excess
 
 #: An effect must lower the error of some signal in some phase by this share; by more where all is at the floor already.
@@ -206,9 +206,15 @@ class _Start:
         if not _ALL_FITTED < rms_error(exact, target) < _FAR:
             return exact
         # it may have ended where an effect's size meets a step of the simulation, or in another valley
-        starts = other_starts(exact, self._study)
-        ends = [fit_exactly(target, exact.problem, simulators, start) for start in starts]
-        return min([exact, *ends], key=lambda fit: fit.cost)
+        ends = [
+            descend_roughly(target, exact.problem, simulators, start, exact.correction)
+            for start in other_starts(exact, self._study)
+        ]
+        costs = [float(np.sum((exact.weight * residual) ** 2)) for _, residual in ends]
+        if not ends or min(costs) > _NO_BETTER * exact.cost:
+            return exact
+        again = fit_exactly(target, exact.problem, simulators, ends[int(np.argmin(costs))][0])
+        return min([exact, again], key=lambda fit: fit.cost)
 
     def _judge(self, refit: Fit, p_family: float, signature: np.ndarray, replaces: str = "") -> Candidate:
         """What held-out grasps say of a fit with one more effect, its last one."""

@@ -17,8 +17,6 @@ from forcegrasp.replay.replay import Replay
 
 # What is further off than so many standard deviations is no tolerance; what is nearer than this is not told.
 _MOST, _TOLD = 3.0, 1.0
-# It is worth a fit if it takes this share off the squares that a fit leaves beyond the noise.
-_WORTH = 0.5
 # Readings bend with the objects' sizes: so many linear steps.
 _STEPS = 3
 
@@ -56,7 +54,7 @@ class Moved:
         return listed(told or ["nothing by more than its standard deviation"])
 
 
-def move_given(measured: MeasurementSet, target: Target, fit: Fit) -> Moved | None:
+def move_given(measured: MeasurementSet, target: Target, fit: Fit, worth: float) -> Moved | None:
     """Radii and places as the readings have them; None if that explains little, or takes more than the tolerance.
 
     Linear steps from a fit, whose parameters follow, with a Gaussian prior of the set's standard deviations on what is
@@ -65,7 +63,8 @@ def move_given(measured: MeasurementSet, target: Target, fit: Fit) -> Moved | No
     Args:
       measured: the set.
       target: its grasps, lined up.
-      fit: of the base model, with radii and places as given.
+      fit: with radii and places as given.
+      worth: least share of the squares beyond the noise that is to be explained.
     """
     objects = list(dict.fromkeys(g.object for g in target.grasps if g.radius_m is not None))
     placed = [g.name for g in target.grasps if g.offset_m is not None]
@@ -78,7 +77,7 @@ def move_given(measured: MeasurementSet, target: Target, fit: Fit) -> Moved | No
             moved_target = dataclasses.replace(target, grasps=grasps)
             fit = fit_once(moved_target, problem, Simulators(problem), fit.vector, rounds=1)
         step, left = _step(measured, target, fit, (objects, placed), moves)
-        if left > (1 - _WORTH) * (fit.cost - target.readings) and not number:
+        if left > (1 - worth) * (fit.cost - target.readings) and not number:
             return None
         moves = np.clip(moves + step, -_MOST, _MOST)  # the first step may lead too far
         sizes = (moves * deviations).tolist()

@@ -1,0 +1,56 @@
+"""Goes on where effects leave something that the tolerance of what a set gives would explain."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Sequence
+
+from forcegrasp.diagnosis.evidence import LEAST_LEAD, LEAST_SHARE, is_beyond_chance
+from forcegrasp.diagnosis.faults import within_tolerance
+from forcegrasp.diagnosis.needless import drop_all_needless
+from forcegrasp.diagnosis.result import Diagnosis, Step, kept_steps
+from forcegrasp.diagnosis.study import Study
+from forcegrasp.identify.fit import Fit, Simulators, fit_exactly
+from forcegrasp.identify.loading import Loaded
+from forcegrasp.identify.noise_floor import beyond_fit
+from forcegrasp.identify.problem import Problem
+from forcegrasp.identify.progress import Progress
+from forcegrasp.identify.target import Target
+from forcegrasp.measure import MeasurementSet
+
+#: Searches on from a fit and the steps that found its effects.
+SearchOn = Callable[[Target, Simulators, Fit, Sequence[Step]], Diagnosis]
+
+
+def go_on_with_moved(
+    found: Diagnosis, loaded: Loaded[MeasurementSet], search_on: SearchOn, progress: Progress
+) -> tuple[Diagnosis, Simulators] | None:
+    """The diagnosis of a set whose givens were moved within their tolerance; None if held-out grasps ask for no move.
+
+    A hidden effect hides what is a little off besides, until it is in the model. What was taken for an effect may then
+    have been the objects' sizes: effects that are no longer needed are left out.
+
+    Args:
+      found: that left more than noise.
+      loaded: the set.
+      search_on: looks for further effects.
+      progress: told what is going on.
+    """
+    fault = None if loaded.gripper.is_servo else within_tolerance(loaded, found.target, found.fit, LEAST_SHARE)
+    if fault is None:
+        return None
+    progress(f"fitting with {fault.words}")
+    grasps = fault.put_right.measured.grasps
+    target = dataclasses.replace(found.target, grasps=grasps)
+    case = found.fit.problem.case(found.fit.vector)
+    problem = Problem(loaded.gripper, grasps, case.effects)
+    simulators = Simulators(problem)
+    fit = fit_exactly(target, problem, simulators, found.fit.vector)
+    study = Study(target, simulators, found.folds, beyond_fit(fit, found.numerical), progress)
+    gains = study.gains(found.heldout(), study.heldout(fit))
+    if not is_beyond_chance(gains - fault.price / len(gains), LEAST_LEAD):
+        return None
+    given = len(found.base.fit.problem.effects)
+    steps, fit = drop_all_needless(study, kept_steps(found.steps), fit, given)
+    again = search_on(target, simulators, fit, steps)
+    return dataclasses.replace(again, fault=fault, error_before=found.error_before), simulators
