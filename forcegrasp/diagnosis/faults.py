@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from forcegrasp.diagnosis.signatures import Background
-from forcegrasp.diagnosis.tolerance import move_given
+from forcegrasp.diagnosis.tolerance import WORTH, move_given
 from forcegrasp.identify.base_fit import rms_error
 from forcegrasp.identify.fit import Fit
 from forcegrasp.identify.intervals import listed
@@ -72,7 +72,7 @@ def suspects(loaded: Loaded[MeasurementSet], target: Target, fit: Fit) -> list[F
     return found
 
 
-def within_tolerance(loaded: Loaded[MeasurementSet], target: Target, fit: Fit, worth: float = _WORTH) -> Fault | None:
+def within_tolerance(loaded: Loaded[MeasurementSet], target: Target, fit: Fit, worth: float = WORTH) -> Fault | None:
     """What was moved within the tolerance of what is given, if that explains this share of what a fit leaves.
 
     Args:

@@ -17,6 +17,8 @@ from forcegrasp.replay.replay import Replay
 
 # What is further off than so many standard deviations is no tolerance; what is nearer than this is not told.
 _MOST, _TOLD = 3.0, 1.0
+#: It is worth a fit if it takes this share off the squares that a fit leaves beyond the noise.
+WORTH = 0.5
 # Readings bend with the objects' sizes: so many linear steps.
 _STEPS = 3
 
@@ -54,7 +56,7 @@ class Moved:
         return listed(told or ["nothing by more than its standard deviation"])
 
 
-def move_given(measured: MeasurementSet, target: Target, fit: Fit, worth: float) -> Moved | None:
+def move_given(measured: MeasurementSet, target: Target, fit: Fit, worth: float = WORTH) -> Moved | None:
     """Radii and places as the readings have them; None if that explains little, or takes more than the tolerance.
 
     Linear steps from a fit, whose parameters follow, with a Gaussian prior of the set's standard deviations on what is

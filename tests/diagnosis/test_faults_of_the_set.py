@@ -9,7 +9,9 @@ import pytest
 
 from forcegrasp.diagnosis.diagnose_set import diagnose_set
 from forcegrasp.diagnosis.faults import suspects
+from forcegrasp.diagnosis.moved_set import go_on_with_moved
 from forcegrasp.diagnosis.odd_grasps import odd_grasps
+from forcegrasp.diagnosis.search import diagnose
 from forcegrasp.diagnosis.tolerance import move_given
 from forcegrasp.identify.fit_set import apply_model, fit_model
 from forcegrasp.identify.fitted_model import model_of
@@ -127,6 +129,28 @@ def test_given_more_exactly_it_does_not_move(sound):
     assert moved.radius_m[name] == pytest.approx(-1e-4, abs=3e-5)
     assert max(map(abs, moved.offset_m.values())) < 2e-4
     assert moved.price > len(moved.radius_m) + len(moved.offset_m)
+
+
+@pytest.mark.parametrize(("radius_std_m", "moves"), [(5e-5, True), (1e-6, False)])
+def test_a_search_goes_on_with_what_is_given_moved(sound, radius_std_m, moves):
+    loaded, model = sound
+    name = loaded.measured.grasps[0].object
+    measured = inexact(name, 1e-4, 0.0, radius_std_m)(loaded.measured)
+    inexactly = dataclasses.replace(loaded, measured=measured)
+    target, simulators, base = apply_model(inexactly, model, silent, refit=True)
+
+    def search(target, simulators, base, start=None):
+        return diagnose(target, base, simulators, [], np.random.default_rng(0), start=start)
+
+    found = search(target, simulators, base)
+    assert found.left
+    again = go_on_with_moved(found, inexactly, lambda t, s, fit, steps: search(t, s, base, start=(fit, steps)), silent)
+    assert (again is not None) == moves
+    if again is not None:
+        diagnosis, _ = again
+        assert (diagnosis.left, diagnosis.verdict) == ("", "explained")
+        assert diagnosis.error_before == found.error_before > 1.1 * diagnosis.error_after
+        assert f"radius of {name} by -0." in answer(diagnosis)
 
 
 def test_a_sound_set_has_no_suspects(sound):

@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from forcegrasp.diagnosis.needless import drop_needless
+from forcegrasp.diagnosis.needless import drop_all_needless, drop_needless
 from forcegrasp.diagnosis.result import Candidate, Step, kept_steps
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.effects.for_gripper import effect_of
@@ -55,3 +55,12 @@ def test_what_is_needed_or_was_given_stays(rubbing):
     assert drop_needless(study, step, fit, 0) == (step, fit)
     study, step, fit = step_with(rubbing, "motor_offset", "coulomb_friction")
     assert drop_needless(study, step, fit, 1) == (step, fit)
+
+
+def test_all_that_is_no_longer_needed_goes_and_its_step_with_it(rubbing):
+    study, step, fit = step_with(rubbing, "motor_offset", "coulomb_friction")
+    first = dataclasses.replace(step, effects=("motor_offset",))
+    steps, less = drop_all_needless(study, [first, step], fit, 0)
+    assert steps == [step]
+    assert [one.effect.name for one in less.problem.effects] == ["coulomb_friction"]
+    assert drop_all_needless(study, [first, step], fit, 2) == ([first, step], fit)  # they were given
