@@ -19,6 +19,8 @@ LEAST_RISE = 5.0
 _PARALLEL, _ALIKE = 0.995, 0.9
 # An effect with fewer parameters that gains this share of what the best one gains can't be ruled out.
 _NEARLY = 0.95
+# One that explains less than this share of what the best one explains is no rival of it.
+_HALF = 0.5
 #: Between an effect and a fault of the set a lead below this decides nothing: to take one for the other costs most.
 LEAST_LEAD = 10.0
 
@@ -33,6 +35,11 @@ def is_significant(candidate: Candidate, least_gain: float) -> bool:
     )
 
 
+def place(candidate: Candidate, least_gain: float) -> tuple[bool, float]:
+    """What candidates are ordered by: a true effect that explains too little yet must not hide one that does."""
+    return not is_significant(candidate, least_gain), -candidate.heldout_gain
+
+
 def _shows_in_some(candidate: Candidate) -> bool:
     """Whether the windows of some recordings are surely better with an effect, and no recording surely worse."""
     return is_beyond_chance(candidate.gains, LEAST_RISE) and not candidate.harms
@@ -44,6 +51,8 @@ def indistinguishable(winner: Candidate, other: Candidate) -> bool:
     alike = parallel and other.heldout_gain > _ALIKE * winner.heldout_gain
     simpler = len(other.effect.parameters) < len(winner.effect.parameters)
     nearly = simpler and other.heldout_gain > _NEARLY * winner.heldout_gain
+    if other.share < min(LEAST_SHARE, _HALF * winner.share):  # it may be there besides, and not instead
+        return False
     least = LEAST_LEAD if winner.effect.of_set != other.effect.of_set else 0.0
     return other.heldout_gain > 0 and (not _leads(winner, other, least) or alike or nearly)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -105,6 +106,15 @@ def kept_steps(steps: Sequence[Step]) -> list[Step]:
     """The steps that found something that no later step put something richer in place of."""
     replaced = {step.replaces for step in steps}
     return [step for step in steps if step.effects and step.effects[0] not in replaced]
+
+
+def settle_ties(steps: Sequence[Step]) -> list[Step]:
+    """The steps less rivals that a later step has found besides: what is there as well is not there instead."""
+    found = {step.effects[0] for step in kept_steps(steps)}
+    return [
+        dataclasses.replace(step, effects=(*step.effects[:1], *(n for n in step.effects[1:] if n not in found)))
+        for step in steps
+    ]
 
 
 @dataclass(frozen=True, repr=False)

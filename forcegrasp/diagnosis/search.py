@@ -11,7 +11,7 @@ from forcegrasp.diagnosis import families
 from forcegrasp.diagnosis.needless import drop_needless
 from forcegrasp.diagnosis.noise_check import Noise, unexpected_noise
 from forcegrasp.diagnosis.odd_grasps import odd_grasps
-from forcegrasp.diagnosis.result import Diagnosis, Step, kept_steps
+from forcegrasp.diagnosis.result import Diagnosis, Step, kept_steps, settle_ties
 from forcegrasp.diagnosis.signatures import Signatures
 from forcegrasp.diagnosis.step import look_further
 from forcegrasp.diagnosis.study import Study
@@ -90,6 +90,7 @@ def diagnose(
         if not _left(study, fit)[0]:
             break
     error_after, (left, noise) = rms(study.heldout(fit), target), _left(study, fit)
+    steps = settle_ties(steps)
     found = kept_steps(steps)
     # a missing effect makes the error rough, and the base fit stop short: then only what leaves nothing is an answer
     if not base.converged and (left or not found):

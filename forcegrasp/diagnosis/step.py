@@ -15,6 +15,7 @@ from forcegrasp.diagnosis.evidence import (
     indistinguishable,
     is_beyond_chance,
     is_significant,
+    place,
 )
 from forcegrasp.diagnosis.noise_check import unexpected_noise
 from forcegrasp.diagnosis.other_starts import other_starts
@@ -81,11 +82,10 @@ def look_further(
     candidates = start.refit([s for s in ranked if s.gain > threshold][:_REFITTED], null)
     candidates += start.refit_richer(richer, null)
     best: dict[str, Candidate] = {}
-    for candidate in sorted(candidates, key=lambda c: -c.heldout_gain):
+    for candidate in sorted(candidates, key=start.place):
         best.setdefault(candidate.effect.name, candidate)  # of several variants the best one
     ordered, redundant = start.refine_on_reference_tier(tuple(best.values()))
-    least_gain = LEAST_GAIN if excess(start.held, study.numerical, study.target) else LEAST_GAIN_AT_FLOOR
-    if not ordered or not is_significant(ordered[0], least_gain):
+    if not ordered or not is_significant(ordered[0], start.least_gain):
         return Step((), ordered, tuple(ranked), start.error, start.error)
     winner = ordered[0]
     # of those that can't be told apart the simplest comes first
@@ -115,6 +115,12 @@ class _Start:
         #: of noise that is not as was assumed: its size ÷ that, ``(C,)``, and its memory, for :func:`null_gains`
         self.noise = None if noise is None else np.maximum(noise.ratio, 1.0)
         self.memory = None if noise is None else (noise.memory, self.held.shape[1])
+        beyond = excess(self.held, study.numerical, study.target)
+        self.least_gain = LEAST_GAIN if beyond else LEAST_GAIN_AT_FLOOR
+
+    def place(self, candidate: Candidate) -> tuple[bool, float]:
+        """See :func:`.evidence.place`."""
+        return place(candidate, self.least_gain)
 
     def refit_threshold(self, groups: Sequence[Sequence[Score]], null: np.ndarray) -> float:
         """What a signature must gain for its effect to be worth a fit."""
@@ -165,7 +171,7 @@ class _Start:
         every = [*refined, *(c for c in ordered if c.effect.name not in names)]
         while True:
             redundant = add_nothing(every)
-            every.sort(key=lambda c: (c.effect.name in redundant, -c.heldout_gain))
+            every.sort(key=lambda c: (c.effect.name in redundant, *self.place(c)))
             first = every[0] if every else None
             if first is None or first.effect.name in names:
                 return tuple(every), redundant

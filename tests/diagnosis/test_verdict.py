@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from forcegrasp.diagnosis import search
-from forcegrasp.diagnosis.evidence import indistinguishable, is_significant
-from forcegrasp.diagnosis.result import Diagnosis, Step
+from forcegrasp.diagnosis.evidence import indistinguishable, is_significant, place
+from forcegrasp.diagnosis.result import Diagnosis, Step, settle_ties
 from forcegrasp.diagnosis.verdict import conclude, explained_share
 from forcegrasp.effects import get_effect
 from forcegrasp.effects.setting import EffectSetting
@@ -80,6 +80,26 @@ def test_between_a_fault_of_the_set_and_an_effect_a_small_lead_decides_nothing(m
     winner, other = one("backlash", 100 + lead / 4, [1.0, 0.0]), one("object_size", 100.0, [0.0, 1.0])
     assert indistinguishable(winner, other) == equal
     assert not indistinguishable(winner, one("encoder_bias", 100.0, [0.0, 1.0]))
+
+
+def test_what_explains_too_little_yet_hides_nothing_that_explains_enough(made_up):
+    """Of several hidden effects the one that gains most may explain less than a quarter of all."""
+    ahead = candidate(made_up, gains=np.full(4, 110.0), share=0.2)
+    enough = candidate(made_up, gains=np.full(4, 100.0), share=0.6)
+    less = candidate(made_up, gains=np.full(4, 50.0), share=0.6)
+    assert sorted([ahead, less, enough], key=lambda c: place(c, 0.02)) == [enough, less, ahead]
+
+
+@pytest.mark.parametrize(("share", "winners", "equal"), [(0.2, 0.6, False), (0.26, 0.6, True), (0.2, 0.3, True)])
+def test_what_explains_far_less_is_no_rival(made_up, share, winners, equal):
+    winner = candidate(made_up, gains=np.full(4, 100.0), share=winners, signature=np.array([1.0, 0.0]))
+    other = candidate(made_up, gains=np.full(4, 101.0), share=share, signature=np.array([0.0, 1.0]))
+    assert indistinguishable(winner, other) == equal
+
+
+def test_a_rival_that_is_found_besides_is_none():
+    steps = [Step(names, (), (), 3.0, 2.0) for names in (("a", "b", "c"), ("b",), ())]
+    assert [step.effects for step in settle_ties(steps)] == [("a", "c"), ("b",), ()]
 
 
 # --- all steps -----------------------------------------------------------------------------------------------------
