@@ -12,6 +12,8 @@ from forcegrasp.diagnosis.result import Candidate
 ALARM = 0.01
 #: An effect must explain this share of the mean square beyond the noise.
 LEAST_SHARE = 0.25
+#: One of many may explain less; it is believed if all of them together leave nothing, or explain this share.
+LEAST_SHARE_OF_MANY, LEAST_SHARE_TOGETHER = 0.1, 0.75
 #: A change of the held-out log-likelihood below this is no evidence, however even it is.
 LEAST_RISE = 5.0
 # Effects whose signatures are that parallel, and that gain this share of each other, can't be told apart, whatever the
@@ -25,13 +27,19 @@ _HALF = 0.5
 LEAST_LEAD = 10.0
 
 
-def is_significant(candidate: Candidate, least_gain: float) -> bool:
-    """Whether noise would hardly do as well: ``least_gain`` is the share by which some signal's error must fall."""
+def is_significant(candidate: Candidate, least_gain: float, least_share: float = LEAST_SHARE) -> bool:
+    """Whether noise would hardly do as well.
+
+    Args:
+      candidate: an effect.
+      least_gain: the share by which some signal's error must fall.
+      least_share: the share of the mean square beyond the noise that it must explain.
+    """
     return (
         candidate.p_family <= ALARM
         and (is_beyond_chance(candidate.evidence, LEAST_RISE) or _shows_in_some(candidate))
         and candidate.largest_fall >= least_gain
-        and candidate.share >= LEAST_SHARE
+        and candidate.share >= least_share
     )
 
 

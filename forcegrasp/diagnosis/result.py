@@ -77,6 +77,7 @@ class Step(ShortRepr):
     scores: tuple[Score, ...]  #: best signature of each effect, best first
     error_before: float
     error_after: float
+    of_many: bool = False  #: it explains little: one of several, or a look-alike of what is not known
 
     @property
     def replaces(self) -> str:

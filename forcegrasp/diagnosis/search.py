@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from forcegrasp.diagnosis import families
+from forcegrasp.diagnosis.evidence import LEAST_SHARE_TOGETHER
 from forcegrasp.diagnosis.needless import drop_needless
 from forcegrasp.diagnosis.noise_check import Noise, unexpected_noise
 from forcegrasp.diagnosis.odd_grasps import odd_grasps
@@ -15,7 +16,7 @@ from forcegrasp.diagnosis.result import Diagnosis, Step, kept_steps, settle_ties
 from forcegrasp.diagnosis.signatures import Signatures
 from forcegrasp.diagnosis.step import look_further
 from forcegrasp.diagnosis.study import Study
-from forcegrasp.diagnosis.verdict import conclude
+from forcegrasp.diagnosis.verdict import conclude, explained_share
 from forcegrasp.effects import Effect
 from forcegrasp.identify.base_fit import BaseFit
 from forcegrasp.identify.cross_validation import make_folds, rms
@@ -27,7 +28,7 @@ from forcegrasp.identify.verdict import Verdict
 from forcegrasp.identify.weights import reweigh
 
 #: Largest number of effects that are looked for.
-MOST_EFFECTS = 6
+MOST_EFFECTS = 8
 
 
 def diagnose(
@@ -68,6 +69,7 @@ def diagnose(
         progress(f"found {rounding.effect.name}: readings are multiples of one step")
         steps.append(Step((rounding.effect.name,), (), (), error_before, rms(study.heldout(fit), target)))
     signatures = Signatures(effects, study)
+    believed: tuple[list[Step], Fit, Target, Study] | None = None  # what is, if the rest explains too little in the end
     for _ in range(MOST_EFFECTS):
         known, dropped = {setting.effect for setting in fit.problem.effects}, {step.replaces for step in steps}
         untried = [
@@ -81,6 +83,13 @@ def diagnose(
         if not step.effects:
             steps.append(step)
             break
+        if step.of_many and believed is None:
+            believed = (
+                [*steps, dataclasses.replace(step, effects=(), error_after=step.error_before)],
+                fit,
+                target,
+                study,
+            )
         progress(f"found {step.effects[0]}: held-out error {step.error_before:.2f} → {step.error_after:.2f} × noise")
         weighed, fit = reweigh(target, step.candidates[0].fit, simulators)
         if weighed is not target:
@@ -89,6 +98,8 @@ def diagnose(
         steps.append(step)
         if not _left(study, fit)[0]:
             break
+    if believed is not None and not _convincing(believed[-1], believed[1], study, fit):
+        steps, fit, target, study = believed
     error_after, (left, noise) = rms(study.heldout(fit), target), _left(study, fit)
     steps = settle_ties(steps)
     found = kept_steps(steps)
@@ -113,6 +124,12 @@ def diagnose(
         verdict, tuple(dict.fromkeys(names)), tuple(steps), base, fit, target, folds, error_before, error_after,
         of_final, floor, left, odd, noise,
     )  # fmt: skip
+
+
+def _convincing(before: Study, fewer: Fit, study: Study, fit: Fit) -> bool:
+    """Whether effects that explain little each leave nothing together, or little of what was left before them."""
+    error, left = rms(before.heldout(fewer), before.target), rms(study.heldout(fit), study.target)
+    return not _left(study, fit)[0] or explained_share(error, left) >= LEAST_SHARE_TOGETHER
 
 
 def _left(study: Study, fit: Fit) -> tuple[str, Noise | None]:

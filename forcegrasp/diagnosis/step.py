@@ -11,6 +11,7 @@ from forcegrasp.diagnosis.evidence import (
     ALARM,
     LEAST_RISE,
     LEAST_SHARE,
+    LEAST_SHARE_OF_MANY,
     add_nothing,
     indistinguishable,
     is_beyond_chance,
@@ -85,7 +86,7 @@ def look_further(
     for candidate in sorted(candidates, key=start.place):
         best.setdefault(candidate.effect.name, candidate)  # of several variants the best one
     ordered, redundant = start.refine_on_reference_tier(tuple(best.values()))
-    if not ordered or not is_significant(ordered[0], start.least_gain):
+    if not ordered or not is_significant(ordered[0], start.least_gain, LEAST_SHARE_OF_MANY):
         return Step((), ordered, tuple(ranked), start.error, start.error)
     winner = ordered[0]
     # of those that can't be told apart the simplest comes first
@@ -95,7 +96,8 @@ def look_further(
     )
     ordered = (*equal, *(c for c in ordered if c not in equal))
     names = tuple(c.effect.name for c in equal)
-    return Step(names, ordered, tuple(ranked), start.error, equal[0].error_after)
+    of_many = not is_significant(winner, start.least_gain)
+    return Step(names, ordered, tuple(ranked), start.error, equal[0].error_after, of_many)
 
 
 class _Start:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from forcegrasp.diagnosis import search
-from forcegrasp.diagnosis.evidence import indistinguishable, is_significant, place
+from forcegrasp.diagnosis.evidence import LEAST_SHARE_OF_MANY, indistinguishable, is_significant, place
 from forcegrasp.diagnosis.result import Diagnosis, Step, settle_ties
 from forcegrasp.diagnosis.verdict import conclude, explained_share
 from forcegrasp.effects import get_effect
@@ -33,7 +33,7 @@ def candidate(made_up, **changed: Any):
     [
         ({}, True),
         ({"share": 0.26}, True),
-        ({"share": 0.24}, False),  # a quarter of the mean square beyond the noise is asked for
+        ({"share": 0.24}, False),  # alone; a quarter of the mean square beyond the noise is asked for
         ({"p_family": 0.009}, True),
         ({"p_family": 0.011}, False),
         ({"largest_fall": 0.021}, True),
@@ -88,6 +88,29 @@ def test_what_explains_too_little_yet_hides_nothing_that_explains_enough(made_up
     enough = candidate(made_up, gains=np.full(4, 100.0), share=0.6)
     less = candidate(made_up, gains=np.full(4, 50.0), share=0.6)
     assert sorted([ahead, less, enough], key=lambda c: place(c, 0.02)) == [enough, less, ahead]
+
+
+def test_one_of_many_may_explain_less(made_up):
+    little = candidate(made_up, share=0.12)
+    assert not is_significant(little, 0.02)
+    assert is_significant(little, 0.02, LEAST_SHARE_OF_MANY)
+    assert not is_significant(candidate(made_up, share=0.09), 0.02, LEAST_SHARE_OF_MANY)
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "left", "believed"),
+    [(3.0, 1.0, "", True), (3.0, 1.2, "much", True), (3.0, 2.0, "much", False), (3.0, 2.9, "", True)],
+)
+def test_what_explains_little_is_believed_together(monkeypatch, before, after, left, believed):
+    """Three quarters of the mean square beyond the noise, or all that is no noise."""
+
+    def study(error: float):
+        return SimpleNamespace(heldout=lambda fit: np.array([error]), target=None)
+
+    monkeypatch.setattr(search, "rms", lambda held, target: float(held[0]))
+    monkeypatch.setattr(search, "_left", lambda study, fit: (left, None))
+    one, other = cast(Any, study(before)), cast(Any, study(after))
+    assert search._convincing(one, cast(Any, None), other, cast(Any, None)) == believed
 
 
 @pytest.mark.parametrize(("share", "winners", "equal"), [(0.2, 0.6, False), (0.26, 0.6, True), (0.2, 0.3, True)])
