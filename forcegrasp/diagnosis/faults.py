@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from forcegrasp.diagnosis.signatures import Background
-from forcegrasp.diagnosis.tolerance import move_given
+from forcegrasp.diagnosis.tolerance import Moved, move_given
 from forcegrasp.identify.base_fit import rms_error
 from forcegrasp.identify.fit import Fit
 from forcegrasp.identify.intervals import listed
@@ -33,8 +33,7 @@ class Fault(ShortRepr):
     words: str  #: what seems to be wrong
     check: str  #: what to look at
     put_right: Loaded[MeasurementSet]
-    price: float = 0.0  #: log-likelihood that its numbers cost which were fitted
-    expected: bool = False  #: within the tolerance of what is given, so that it is no fault
+    moved: Moved | None = None  #: what was moved within the tolerance of what is given, so that it is no fault
 
     def summary(self) -> str:
         return cut(f"{self.name}: {self.words}", 100)
@@ -68,8 +67,8 @@ def suspects(loaded: Loaded[MeasurementSet], target: Target, fit: Fit) -> list[F
         check = "which row each column was written to, and its clock"
         found.append(Fault("early_row", words, check, _changed(loaded, lambda _, g: _one_row_later(g, early))))
     if not found and (moved := move_given(measured, target, fit)) is not None:
-        words, right = moved.words(measured), _changed(loaded, lambda _, g: moved.put(g))
-        found.append(Fault("object_tolerance", words, "the objects, with a calliper", right, moved.price, True))
+        name, right = f"{'_and_'.join(moved.groups)}_tolerance", _changed(loaded, lambda _, g: moved.put(g))
+        found.append(Fault(name, moved.words(), moved.check, right, moved))
     return found
 
 
