@@ -84,7 +84,7 @@ def diagnose_set(
         right = fitted(fault.put_right)
         if leaves_less(fault, (right[0], right[2].fit), (said[0], said[2].fit)):
             found = with_fault(search(*right), fault, (said[0], said[2].fit))
-            certain = not found.left and not fault.expected  # else an effect may do as well
+            certain = not found.left and fault.moved is None  # else an effect may do as well
             likely = found if certain else more_likely(found, search(*said))
             return with_law(likely, right[1] if likely.target.grasps is right[0].grasps else said[1])
     return with_law(*as_said())

@@ -27,7 +27,7 @@ def leaves_less(fault: Fault, right: _Fitted, said: _Fitted) -> bool:
 def with_fault(found: Diagnosis, fault: Fault, said: _Fitted) -> Diagnosis:
     """The diagnosis of a set put right: its fault comes first among what was found, the error before is the set's."""
     before = rms(_held(*said), said[0])
-    if fault.expected:
+    if fault.moved is not None:
         return dataclasses.replace(found, fault=fault, error_before=before)
     if found.verdict is Verdict.EXPLAINED:
         return dataclasses.replace(found, verdict=Verdict.DATA, effects=(fault.name,), fault=fault, error_before=before)
@@ -44,6 +44,9 @@ def more_likely(right: Diagnosis, said: Diagnosis) -> Diagnosis:
         return right
     if is_beyond_chance(-gains, LEAST_LEAD):
         return said
+    moved = right.fault.moved
+    if moved is not None and moved.is_no_surprise and right.verdict is Verdict.EXPLAINED:
+        return right  # what is as exact as was said leaves nothing for an effect to explain
     return dataclasses.replace(
         said, verdict=Verdict.ONE_OF, effects=(*said.effects, right.fault.name), fault=right.fault
     )
@@ -58,4 +61,4 @@ def _gains(fault: Fault, right: _Fitted, said: _Fitted) -> np.ndarray:
     better, worse = _held(*right), _held(*said)
     scale = right[0].sigma / said[0].sigma
     gains = log_likelihood(better * scale) - log_likelihood(worse[:, -better.shape[1] :])
-    return gains - fault.price / len(gains)
+    return gains - (fault.moved.price / len(gains) if fault.moved else 0.0)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from forcegrasp.diagnosis.signatures import Background
-from forcegrasp.diagnosis.tolerance import WORTH, move_given
+from forcegrasp.diagnosis.tolerance import WORTH, Moved, move_given
 from forcegrasp.identify.base_fit import rms_error
 from forcegrasp.identify.fit import Fit
 from forcegrasp.identify.intervals import listed
@@ -33,8 +33,7 @@ class Fault(ShortRepr):
     words: str  #: what seems to be wrong
     check: str  #: what to look at
     put_right: Loaded[MeasurementSet]
-    price: float = 0.0  #: log-likelihood that its numbers cost which were fitted
-    expected: bool = False  #: within the tolerance of what is given, so that it is no fault
+    moved: Moved | None = None  #: what was moved within the tolerance of what is given, so that it is no fault
 
     def summary(self) -> str:
         return cut(f"{self.name}: {self.words}", 100)
@@ -84,8 +83,8 @@ def within_tolerance(loaded: Loaded[MeasurementSet], target: Target, fit: Fit, w
     moved = move_given(loaded.measured, target, fit, worth)
     if moved is None:
         return None
-    words, right = moved.words(loaded.measured), _changed(loaded, lambda _, g: moved.put(g))
-    return Fault("object_tolerance", words, "the objects, with a calliper", right, moved.price, True)
+    name, right = f"{'_and_'.join(moved.groups)}_tolerance", _changed(loaded, lambda _, g: moved.put(g))
+    return Fault(name, moved.words(), moved.check, right, moved)
 
 
 def _changed(

@@ -37,7 +37,7 @@ def go_on_with_moved(
       progress: told what is going on.
     """
     fault = None if loaded.gripper.is_servo else within_tolerance(loaded, found.target, found.fit, LEAST_SHARE)
-    if fault is None:
+    if fault is None or fault.moved is None:
         return None
     progress(f"fitting with {fault.words}")
     grasps = fault.put_right.measured.grasps
@@ -48,7 +48,7 @@ def go_on_with_moved(
     fit = fit_exactly(target, problem, simulators, found.fit.vector)
     study = Study(target, simulators, found.folds, beyond_fit(fit, found.numerical), progress)
     gains = study.gains(found.heldout(), study.heldout(fit))
-    if not is_beyond_chance(gains - fault.price / len(gains), LEAST_LEAD):
+    if not is_beyond_chance(gains - fault.moved.price / len(gains), LEAST_LEAD):
         return None
     given = len(found.base.fit.problem.effects)
     steps, fit = drop_all_needless(study, kept_steps(found.steps), fit, given)

@@ -1,9 +1,10 @@
-"""What a set gives has a tolerance: radii and places of objects are moved within it, as far as the readings ask."""
+"""What a set gives has a tolerance: objects, clock and times of reading are moved within it, as the readings ask."""
 
 from __future__ import annotations
 
 import dataclasses
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -13,106 +14,204 @@ from forcegrasp.identify.predict import Case, predict
 from forcegrasp.identify.problem import Problem
 from forcegrasp.identify.target import Target
 from forcegrasp.measure.schema import MeasuredGrasp, MeasurementSet
+from forcegrasp.physics.gripper import FORCE_SKEW, SKEW
 from forcegrasp.replay.replay import Replay
 
 # What is further off than so many standard deviations is no tolerance; what is nearer than this is not told.
 _MOST, _TOLD = 3.0, 1.0
+# All moves together are no surprise if one of so many standard deviations would be as likely.
+_NO_SURPRISE = 2.0
 #: It is worth a fit if it takes this share off the squares that a fit leaves beyond the noise.
 WORTH = 0.5
-# Readings bend with the objects' sizes: so many linear steps.
-_STEPS = 3
+# Fewer numbers do that take this share of what all would.
+_NEARLY = 0.95
+# Readings bend with what is given: so many linear steps, or until they are this small.
+_STEPS, _SETTLED = 3, 0.1
+# What is moved together, the fewest numbers first.
+_PERIOD, _OBJECT = "period_share", ("radius_m", "offset_m")
+_READING = (SKEW, FORCE_SKEW)
+_TIMING = (*_READING, _PERIOD)
+_GROUPS = (*((kind,) for kind in _TIMING), _TIMING, _OBJECT, (*_OBJECT, *_TIMING))
+_CHECKS = {"object": "the objects, with a calliper", "timing": "the clock, and when readings are taken"}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
+class _Number:
+    """One number that a set gives."""
+
+    kind: str  #: base parameter that it is, or :data:`_PERIOD`
+    owner: str  #: object or grasp that it is of; "" of the set
+    std: float
+    members: np.ndarray  #: which grasps it concerns, ``(G,)``
+
+    @property
+    def group(self) -> str:
+        """What it is of: "object" or "timing"."""
+        return "object" if self.kind in _OBJECT else "timing"
+
+    def words(self, move: float) -> str:
+        """How it moved."""
+        if self.kind == _PERIOD:
+            return f"the clock's period by {100 * move:+.2g} %"
+        names = {SKEW: "time of reading", FORCE_SKEW: "time of reading forces"}
+        unit = "ms" if self.kind in names else "mm"
+        return f"{names.get(self.kind, f'radius of {self.owner}')} by {1e3 * move:+.2g} {unit}"
+
+
+@dataclass(frozen=True, eq=False)
 class Moved:
-    """By how much what is given was moved, in metres."""
+    """By how much what is given was moved."""
 
-    radius_m: dict[str, float]  #: by object
-    offset_m: dict[str, float]  #: by grasp
-    price: float = (
-        0.0  #: log-likelihood that it costs: the prior's, and 1 for each number that was fitted (Akaike 1974)
-    )
+    numbers: tuple[_Number, ...] = ()
+    deviations: np.ndarray = field(default_factory=lambda: np.zeros(0))  #: moves ÷ standard deviation, ``(numbers,)``
+
+    @property
+    def moves(self) -> dict[str, float]:
+        """By name, such as ``radius_m of sponge``, in metres and seconds; of the period a share."""
+        named = zip(self.numbers, self.deviations.tolist(), strict=True)
+        return {f"{n.kind} of {n.owner}" if n.owner else n.kind: n.std * move for n, move in named}
+
+    @property
+    def groups(self) -> tuple[str, ...]:
+        """What was moved: "object", "timing" or both."""
+        return tuple(dict.fromkeys(n.group for n in self.numbers))
+
+    @property
+    def check(self) -> str:
+        """What to look at."""
+        return listed([_CHECKS[group] for group in self.groups])
+
+    @property
+    def price(self) -> float:
+        """Log-likelihood that it costs: the prior's, and 1 for each number that was fitted (Akaike 1974)."""
+        return float(len(self.numbers) + np.sum(self.deviations**2) / 2)
+
+    @property
+    def is_no_surprise(self) -> bool:
+        """Whether what is given need be no less exact than was said."""
+        return bool(np.sum(self.deviations**2) <= _NO_SURPRISE**2)
 
     def put(self, grasp: MeasuredGrasp) -> MeasuredGrasp:
-        """A grasp with radius and place moved."""
-        radius, offset = grasp.radius_m, grasp.offset_m
+        """A grasp with what is given moved."""
+        moves = self.moves
+        radius, offset, start = grasp.radius_m, grasp.offset_m, grasp.time_s[0]
+        slower, late = 1 + moves.get(_PERIOD, 0.0), moves.get(SKEW, 0.0)
         return dataclasses.replace(
             grasp,
-            radius_m=None if radius is None else radius + self.radius_m[grasp.object],
-            offset_m=None if offset is None else offset + self.offset_m[grasp.name],
+            radius_m=None if radius is None else radius + moves.get(f"radius_m of {grasp.object}", 0.0),
+            offset_m=None if offset is None else offset + moves.get(f"offset_m of {grasp.name}", 0.0),
+            time_s=start + slower * (grasp.time_s - start),
+            late_s=(late, late + moves.get(FORCE_SKEW, 0.0)),
         )
 
-    def words(self, measured: MeasurementSet) -> str:
-        """What moved by more than its standard deviation."""
-        told = [
-            f"radius of {name} by {1e3 * move:+.2g} mm"
-            for name, move in self.radius_m.items()
-            if abs(move) > _TOLD * measured.radius_std_m
-        ]
-        far = {name: move for name, move in self.offset_m.items() if abs(move) > _TOLD * measured.offset_std_m}
-        if far:
-            grasps = "grasp" if len(far) == 1 else "grasps"
-            told.append(f"place in {grasps} {listed(list(far))} by up to {1e3 * max(map(abs, far.values())):.2g} mm")
-        return listed(told or ["nothing by more than its standard deviation"])
+    def words(self) -> str:
+        """What moved by more than its standard deviation, or else by most of it."""
+        sizes = np.abs(self.deviations)
+        far = [(self.numbers[i], self.numbers[i].std * float(self.deviations[i]))
+               for i in np.flatnonzero(sizes >= min(_TOLD, sizes.max()))]  # fmt: skip
+        told = [number.words(move) for number, move in far if number.kind != "offset_m"]
+        places = {number.owner: abs(move) for number, move in far if number.kind == "offset_m"}
+        if places:
+            grasps = "grasp" if len(places) == 1 else "grasps"
+            told.append(f"place in {grasps} {listed(list(places))} by up to {1e3 * max(places.values()):.2g} mm")
+        return listed(told)
 
 
 def move_given(measured: MeasurementSet, target: Target, fit: Fit, worth: float = WORTH) -> Moved | None:
-    """Radii and places as the readings have them; None if that explains little, or takes more than the tolerance.
+    """What is given as the readings have it; None if that explains little, or takes more than the tolerance.
 
     Linear steps from a fit, whose parameters follow, with a Gaussian prior of the set's standard deviations on what is
-    given.
+    given: on the time of reading or the clock's period alone, on both, on radii and places, or on all.
 
     Args:
       measured: the set.
       target: its grasps, lined up.
-      fit: with radii and places as given.
-      worth: least share of the squares beyond the noise that is to be explained.
+      fit: of the base model, with all as given.
     """
-    objects = list(dict.fromkeys(g.object for g in target.grasps if g.radius_m is not None))
-    placed = [g.name for g in target.grasps if g.offset_m is not None]
-    deviations = np.r_[np.full(len(objects), measured.radius_std_m), np.full(len(placed), measured.offset_std_m)]
-    moves, moved = np.zeros(len(deviations)), Moved({}, {})
-    for number in range(_STEPS if len(moves) else 0):
-        if number:
-            grasps = tuple(moved.put(g) for g in measured.grasps)
-            problem = Problem(fit.problem.gripper, grasps, fit.problem.effects)
-            moved_target = dataclasses.replace(target, grasps=grasps)
-            fit = fit_once(moved_target, problem, Simulators(problem), fit.vector, rounds=1)
-        step, left = _step(measured, target, fit, (objects, placed), moves)
-        if left > (1 - worth) * (fit.cost - target.readings) and not number:
-            return None
-        moves = np.clip(moves + step, -_MOST, _MOST)  # the first step may lead too far
-        sizes = (moves * deviations).tolist()
-        price = float(len(moves) + np.sum(moves**2) / 2)
-        moved = Moved(
-            dict(zip(objects, sizes[: len(objects)], strict=True)),
-            dict(zip(placed, sizes[len(objects) :], strict=True)),
-            price,
-        )
-    return moved if 0 < np.abs(moves).max(initial=0.0) < _MOST else None
+    numbers = _numbers(measured, target)
+    columns = _columns(target, fit, numbers)
+    groups = [kinds for kinds in _GROUPS if any(number.kind in kinds for number in numbers)]
+    steps = [_step(fit, columns, numbers, kinds) for kinds in groups]
+    explained = [fit.cost - left for _, left in steps]
+    if max(explained) < worth * (fit.cost - target.readings):
+        return None
+    moved, _ = next(one for one, share in zip(steps, explained, strict=True) if share > _NEARLY * max(explained))
+    if moved.groups == ("timing",) and np.abs(moved.deviations).max() >= _MOST:
+        return None  # readings hardly bend with times
+    for _ in range(_STEPS - 1):
+        grasps = tuple(moved.put(g) for g in measured.grasps)
+        problem = Problem(fit.problem.gripper, grasps, fit.problem.effects)
+        fit = fit_once(dataclasses.replace(target, grasps=grasps), problem, Simulators(problem), fit.vector, rounds=1)
+        before = moved.deviations
+        moved, _ = _step(fit, _columns(target, fit, moved.numbers), moved.numbers, None, before)
+        if np.abs(moved.deviations - before).max() < _SETTLED:
+            break
+    return moved if 0 < np.abs(moved.deviations).max() < _MOST else None
+
+
+def _numbers(measured: MeasurementSet, target: Target) -> tuple[_Number, ...]:
+    """All that a set gives and has a tolerance."""
+    grasps = target.grasps
+    objects = dict.fromkeys(g.object for g in grasps if g.radius_m is not None)
+    placed = [g.name for g in grasps if g.offset_m is not None]
+    timing = {_PERIOD: measured.period_std_share, SKEW: measured.delay_std_s}
+    timing |= {FORCE_SKEW: measured.delay_std_s} if "force" in target.axis.kinds else {}
+
+    def numbers(kind: str, std: float, owners: Sequence[str], of: Sequence[str]) -> list[_Number]:
+        return [_Number(kind, owner, std, np.array([name == owner for name in of])) for owner in owners]
+
+    return (
+        *numbers("radius_m", measured.radius_std_m, list(objects), [g.object for g in grasps]),
+        *numbers("offset_m", measured.offset_std_m, placed, [g.name for g in grasps]),
+        *(_Number(kind, "", std, np.ones(len(grasps), bool)) for kind, std in timing.items()),
+    )
+
+
+def _columns(target: Target, fit: Fit, numbers: Sequence[_Number]) -> np.ndarray:
+    """What a standard deviation of each number changes of the signals ÷ noise, ``(N, numbers)``."""
+    gripper, grasps, case = fit.problem.gripper, fit.problem.grasps, fit.problem.case(fit.vector)
+    stds = {number.kind: number.std for number in numbers}
+    together = {SKEW: (SKEW, FORCE_SKEW)}  # forces are read with the positions, or by so much later
+    # what is read after a command shows what it does at once, what is read before does not: slopes either way
+    trials = [(kind, way) for kind in stds if kind != _PERIOD for way in ((1, -1) if kind in _READING else (1,))]
+    moved = (
+        Case(case.base | {n: case.base[n] + way * stds[kind] for n in together.get(kind, (kind,))}, case.effects)
+        for kind, way in trials
+    )
+    as_said, *signals = predict(Replay(gripper, grasps), [case, *moved])
+    if _PERIOD in stds:
+        slower = [dataclasses.replace(g, time_s=g.time_s * (1 + stds[_PERIOD])) for g in grasps]
+        signals.append(predict(Replay(gripper, slower), [case])[0])
+        trials.append((_PERIOD, 1))
+    columns: dict[str, tuple[float, np.ndarray]] = {}
+    for (kind, way), one in zip(trials, signals, strict=True):
+        change = np.where(target.mask[..., None], (one - as_said) / target.sigma, 0.0)
+        asked = float(np.sum(change * fit.residual)) / max(float(np.linalg.norm(change)), 1e-9)
+        if kind not in columns or asked > columns[kind][0]:
+            columns[kind] = asked, way * change
+    return np.column_stack([(columns[n.kind][1] * n.members[:, None, None]).ravel() for n in numbers])
 
 
 def _step(
-    measured: MeasurementSet, target: Target, fit: Fit, given: tuple[list[str], list[str]], before: np.ndarray
-) -> tuple[np.ndarray, float]:
-    """One linear step of what is given, in its standard deviations, and the squares beyond the noise that it leaves.
+    fit: Fit,
+    columns: np.ndarray,
+    numbers: Sequence[_Number],
+    kinds: Sequence[str] | None = None,
+    before: np.ndarray | None = None,
+) -> tuple[Moved, float]:
+    """One linear step of what is given, and the sum of squares that it leaves.
 
     Args:
-      measured: the set.
-      target: its grasps, lined up.
       fit: of the base model.
-      given: the objects whose radius is given, and the grasps whose place is.
-      before: steps until now, ``(given,)``.
+      columns: from :func:`_columns`.
+      numbers: whose they are.
+      kinds: those of the numbers that move; all by default.
+      before: moves until now, in standard deviations, ``(numbers,)``.
     """
-    case, grasps = fit.problem.case(fit.vector), fit.problem.grasps
-    deviations = {"radius_m": measured.radius_std_m, "offset_m": measured.offset_std_m}
-    cases = [case, *(Case(case.base | {n: case.base[n] + std}, case.effects) for n, std in deviations.items())]
-    signals = predict(Replay(fit.problem.gripper, grasps), cases)
-    radius, offset = (np.where(target.mask[..., None], (one - signals[0]) / target.sigma, 0.0) for one in signals[1:])
-    columns = [radius * np.array([g.object == name for g in grasps])[:, None, None] for name in given[0]]
-    columns += [offset * np.array([g.name == name for g in grasps])[:, None, None] for name in given[1]]
-    slopes = np.column_stack([fit.jacobian.reshape(-1, len(fit.problem)), *(c.ravel() for c in columns)])
+    chosen = [index for index, number in enumerate(numbers) if kinds is None or number.kind in kinds]
+    start = np.zeros(len(chosen)) if before is None else before[chosen]
+    slopes = np.column_stack([fit.jacobian.reshape(-1, len(fit.problem)), columns[:, chosen]])
     prior, residual = np.eye(slopes.shape[1])[len(fit.problem) :], fit.residual.ravel()
-    step = np.linalg.lstsq(np.vstack([slopes, prior]), np.r_[residual, -before], rcond=None)[0]
-    left = float(np.sum((residual - slopes @ step) ** 2)) - target.readings
-    return step[len(fit.problem) :], left
+    step = np.linalg.lstsq(np.vstack([slopes, prior]), np.r_[residual, -start], rcond=None)[0]
+    moves = np.clip(start + step[len(fit.problem) :], -_MOST, _MOST)  # the first step may lead too far
+    return Moved(tuple(numbers[index] for index in chosen), moves), float(np.sum((residual - slopes @ step) ** 2))

@@ -9,7 +9,7 @@ import numpy as np
 
 from forcegrasp.effects import Effect
 from forcegrasp.effects.setting import EffectSetting
-from forcegrasp.physics.gripper import EFFORT_SCALE, OF_READINGS, SKEW
+from forcegrasp.physics.gripper import EFFORT_SCALE, FORCE_SKEW, OF_READINGS, SKEW
 from forcegrasp.replay.replay import EffectOn, Motion, Replay, join
 from forcegrasp.short_repr import ShortRepr
 
@@ -48,8 +48,11 @@ def predict(replay: Replay, cases: Sequence[Case]) -> np.ndarray:
     rows = np.concatenate([place[key] for key in keys])
     of_force = EFFORT_SCALE if EFFORT_SCALE in cases[0].base else "force_scale"
     scale = np.concatenate([case.base[of_force] for case in cases])
-    skew = np.concatenate([case.base[SKEW] for case in cases]) if SKEW in cases[0].base else None
-    readings = replay.read(motion, rows, scale, _spread(cases, count, lambda e: e.effect.reads()), skew)
+    skew, force_skew = (
+        np.concatenate([case.base[name] for case in cases]) if name in cases[0].base else None
+        for name in (SKEW, FORCE_SKEW)
+    )
+    readings = replay.read(motion, rows, scale, _spread(cases, count, lambda e: e.effect.reads()), skew, force_skew)
     signals = np.concatenate([readings.position, readings.force], axis=-1)
     return signals.reshape(len(cases), count, *signals.shape[1:])
 

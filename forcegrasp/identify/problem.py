@@ -11,7 +11,7 @@ import numpy as np
 from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.identify.predict import Case
 from forcegrasp.measure.schema import MeasuredGrasp
-from forcegrasp.physics.gripper import Gripper
+from forcegrasp.physics.gripper import FORCE_SKEW, SKEW, Gripper
 from forcegrasp.short_repr import ShortRepr
 
 
@@ -66,6 +66,8 @@ class Problem:
             else {
                 "radius_m": np.array([np.nan if g.radius_m is None else g.radius_m for g in grasps]),
                 "offset_m": np.array([np.nan if g.offset_m is None else g.offset_m for g in grasps]),
+                SKEW: np.array([g.late_s[0] for g in grasps]),
+                FORCE_SKEW: np.array([g.late_s[1] for g in grasps]),
             }
         )
         #: what a recording's settings multiply a base parameter with, each ``(G,)``

@@ -13,12 +13,12 @@ import numpy as np
 from forcegrasp.errors import MeasurementError
 from forcegrasp.measure.check_givens import command_period_s, same_clock
 from forcegrasp.measure.folder import show
-from forcegrasp.measure.schema import FinalForceTable, MeasurementSet, fingerprint_of_parts
+from forcegrasp.measure.schema import TOLERANCES, FinalForceTable, MeasurementSet, fingerprint_of_parts
 
 Measured = TypeVar("Measured", bound=MeasurementSet | FinalForceTable)
 
 # What must be said alike of all sets, besides the gripper.
-_SAME = ("position_std_m", "force_std_n", "radius_std_m", "offset_std_m")
+_SAME = ("position_std_m", "force_std_n", *(name for name, _ in TOLERANCES.values()))
 # An object's radius may differ between sets by so many standard deviations of its difference.
 _TOLERANCE = 3 * 2**0.5
 

@@ -3,23 +3,26 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import polars as pl
 from pydantic import Field
 
 from forcegrasp.errors import ConfigError, MeasurementError, closest
-from forcegrasp.files.validate import refusal, validate
+from forcegrasp.files.validate import must, refusal, validate
 from forcegrasp.measure.csv_file import read_csv
 from forcegrasp.measure.folder import find_file, open_folder, show
 from forcegrasp.measure.joined import check_names, check_splits, read_samples, samples_of_each, side_by_side
 from forcegrasp.measure.samples import check_samples
 from forcegrasp.measure.schema import (
+    DELAY_STD_S,
     FORMAT,
     OBJECT,
     OFFSET_STD_M,
+    PERIOD_STD_SHARE,
     RADIUS_STD_M,
+    TOLERANCES,
     Columns,
     FinalForceTable,
     MeasuredGrasp,
@@ -31,6 +34,13 @@ from forcegrasp.measure.schema import (
 from forcegrasp.measure.servo_set import read_servo_set
 from forcegrasp.measure.table import FileColumns, Table
 from forcegrasp.measure.yaml_file import Name, Positive, Text, TextRecord, load_yaml
+
+_Share = Annotated[
+    Positive, must(lambda value: value < 0.1, "{:g} is no share that a clock is off by; 0.01 is one percent")
+]
+_Short = Annotated[
+    Positive, must(lambda value: value < 0.5, "{:g} s is too long; looks like milliseconds, divide by 1000")
+]
 
 
 class Meta(TextRecord):
@@ -45,6 +55,8 @@ class Meta(TextRecord):
     force_std_n: Positive | None = Field(default=None, description="noise of the forces, N")
     object_radius_std_m: Positive = Field(default=RADIUS_STD_M, description="standard deviation of the radii, m")
     object_offset_std_m: Positive = Field(default=OFFSET_STD_M, description="that of the objects' places, m")
+    period_std_share: _Share = Field(default=PERIOD_STD_SHARE, description="that of the clock's rate, a share of it")
+    delay_std_s: _Short = Field(default=DELAY_STD_S, description="that of the time from a command to its readings, s")
 
 
 _GRASPS = FileColumns(
@@ -85,8 +97,8 @@ def _read_table(folder: Path, meta: Meta, facts: dict[str, Any]) -> FinalForceTa
     if meta.position_std_m is not None:
         problem = "a table of final forces has no positions; remove it"
         raise refusal(show(folder / "meta.yaml"), "position_std_m", problem, MeasurementError)
-    for key in sorted(meta.model_fields_set & {"object_radius_std_m", "object_offset_std_m"}):
-        problem = "a table of final forces has no radii or places; remove it"
+    for key in sorted(meta.model_fields_set & set(TOLERANCES)):
+        problem = "a table of final forces has no radii, places or times; remove it"
         raise refusal(show(folder / "meta.yaml"), key, problem, MeasurementError)
     _refuse_files(folder, "final_force", ("grasps.csv", "samples.csv", "samples.parquet"))
     rows = read_csv(find_file(folder, "table.csv"), _FINAL)
@@ -106,12 +118,11 @@ def _read_grasps(folder: Path, meta: Meta, facts: dict[str, Any]) -> Measurement
     _check_grasps(table)
     samples = read_samples(folder, in_samples)
     grasps = _grasps(folder, table, samples, columns)
-    tolerances = (meta.object_radius_std_m, meta.object_offset_std_m)
+    tolerances: dict[str, float] = meta.model_dump(include=set(TOLERANCES))
     return MeasurementSet(
         **facts,
         position_std_m=meta.position_std_m,
-        radius_std_m=tolerances[0],
-        offset_std_m=tolerances[1],
+        **{name: tolerances[key] for key, (name, _) in TOLERANCES.items()},
         grasps=grasps,
         fingerprint=fingerprint_of_set(meta.gripper, meta.position_std_m, meta.force_std_n, grasps, tolerances),
         notes=table.notes() + samples.notes(),

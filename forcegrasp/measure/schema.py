@@ -22,6 +22,16 @@ OBJECT = "o_y_m"
 #: Standard deviations of radii and places of objects where a set gives none: a calliper's on something not quite round,
 #: and a mark's on the table.
 RADIUS_STD_M, OFFSET_STD_M = 5e-5, 5e-4
+#: Those of the clock, as a share, and of the time between a row's command and its readings: a microcontroller's own
+#: oscillator, trimmed, and one exchange on a serial bus.
+PERIOD_STD_SHARE, DELAY_STD_S = 2e-3, 2e-3
+#: What meta.yaml calls these, and what a set does.
+TOLERANCES = {
+    "object_radius_std_m": ("radius_std_m", RADIUS_STD_M),
+    "object_offset_std_m": ("offset_std_m", OFFSET_STD_M),
+    "period_std_share": ("period_std_share", PERIOD_STD_SHARE),
+    "delay_std_s": ("delay_std_s", DELAY_STD_S),
+}
 #: Of servos: whether the motor is switched on (1 or 0), and a force or torque from outside, N or N·m.
 ENABLED, LOAD = "enabled", "load"
 _SIDES = {"l": "left", "r": "right"}
@@ -94,6 +104,8 @@ class MeasuredGrasp(ShortRepr):
     #: Of a part of a recording: where the motors stood and how fast they moved at its start, and what of it counts.
     start: tuple[np.ndarray, np.ndarray] | None = field(default=None, compare=False)
     counts: np.ndarray | None = field(default=None, compare=False)  #: ``(T,)``
+    #: How much later than ``time_s`` positions and forces were read; not in any file, but found within a tolerance.
+    late_s: tuple[float, float] = field(default=(0.0, 0.0), compare=False)
 
     def summary(self) -> str:
         return f"{cut(self.name)} on {cut(self.object)}, {counted(len(self.time_s), 'sample')}"
@@ -127,6 +139,8 @@ class MeasurementSet(ShortRepr):
     notes: tuple[str, ...] = field(default=(), compare=False)  #: what was odd when it was read, one line each
     radius_std_m: float = RADIUS_STD_M  #: standard deviation of the radii that are given
     offset_std_m: float = OFFSET_STD_M  #: that of the objects' places
+    period_std_share: float = PERIOD_STD_SHARE  #: that of the clock's rate
+    delay_std_s: float = DELAY_STD_S  #: that of the time from a row's command to its readings
     kind: str = "grasps"  #: or "servo": recordings of a mechanism that grasps nothing
 
     @property
@@ -168,15 +182,20 @@ def fingerprint_of_set(
     position_std_m: float | None,
     force_std_n: float | None,
     grasps: Iterable[MeasuredGrasp],
-    tolerances: tuple[float, float] = (RADIUS_STD_M, OFFSET_STD_M),
+    tolerances: Mapping[str, float] | None = None,
 ) -> str:
     """Returns a sha256 in hex of the content: the same for CSV and Parquet, and whatever the order of the grasps.
 
-    The folder's name, the source and the licence don't count: no result depends on them.
+    The folder's name, the source and the licence don't count: no result depends on them. ``tolerances`` are those by
+    the keys of :data:`TOLERANCES`.
     """
     digest = _Digest("grasps", gripper, position_std_m, force_std_n)
-    if tolerances != (RADIUS_STD_M, OFFSET_STD_M):  # sets from before they could be given keep theirs
-        digest.facts(*tolerances)
+    stds = {key: usual for key, (_, usual) in TOLERANCES.items()} | dict(tolerances or {})
+    of_objects, of_time = tuple(stds.values())[:2], tuple(stds.values())[2:]
+    if of_objects != (RADIUS_STD_M, OFFSET_STD_M):  # sets from before they could be given keep theirs
+        digest.facts(*of_objects)
+    if of_time != (PERIOD_STD_SHARE, DELAY_STD_S):
+        digest.facts("time", *of_time)
     for grasp in sorted(grasps, key=lambda grasp: grasp.name):
         digest.facts(grasp.name, grasp.object, grasp.session, grasp.radius_m, grasp.offset_m, grasp.split)
         for name in sorted(grasp.settings):

@@ -17,8 +17,7 @@ from forcegrasp.measure.schema import (
     ENABLED,
     FORMAT,
     LOAD,
-    OFFSET_STD_M,
-    RADIUS_STD_M,
+    TOLERANCES,
     FinalForceTable,
     MeasurementSet,
 )
@@ -54,11 +53,7 @@ def write_set(measured: MeasurementSet, folder: str | Path, samples: str = "csv"
     index = index.drop([name for name in ("object_offset_m", "split") if index[name].null_count() == index.height])
     frame = pl.concat([_frame(grasp.name, grasp.signals()) for grasp in measured.grasps], how="diagonal")
     meta = _meta(measured, "grasps") | {"position_std_m": measured.position_std_m}
-    tolerances = {
-        "object_radius_std_m": (measured.radius_std_m, RADIUS_STD_M),
-        "object_offset_std_m": (measured.offset_std_m, OFFSET_STD_M),
-    }
-    meta |= {key: std for key, (std, usual) in tolerances.items() if std != usual}
+    meta |= {key: std for key, (name, usual) in TOLERANCES.items() if (std := float(getattr(measured, name))) != usual}
     write = {"csv": frame.write_csv, "parquet": frame.write_parquet}[samples]
     return _write(folder, meta, {"grasps.csv": index.write_csv, f"samples.{samples}": write})
 

@@ -25,12 +25,14 @@ TIERS = {"reference": 1, "fitting": 2, "fast": 4}
 SPECIAL = ("force_scale", "radius_m", "offset_m")
 #: Parameter of a mechanism: how much later than a row's command its readings were taken, s. It needs no `writes`.
 SKEW = "readout_skew_s"
+#: The same of the forces, where they may be read at another time than the positions.
+FORCE_SKEW = "force_skew_s"
 #: Parameter of a mechanism: what an effort reads for one N or N·m of the motor, such as a current. Nor does it.
 EFFORT_SCALE = "effort_scale"
 #: Parameter of a mechanism with one motor: how much faster it moves at a window's start than it was read, unit per s.
 START_VELOCITY = "start_velocity"
 #: Parameters that change what is read, and nothing that happens.
-OF_READINGS = ("force_scale", EFFORT_SCALE, SKEW)
+OF_READINGS = ("force_scale", EFFORT_SCALE, SKEW, FORCE_SKEW)
 #: Parameters of a mechanism that need no `writes`.
 KNOWN_TO_REPLAY = (SKEW, EFFORT_SCALE, START_VELOCITY)
 SIDES = ("left", "right")

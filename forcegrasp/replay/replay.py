@@ -23,6 +23,9 @@ THREADS = 0
 _AT_REST = 1 / 45
 #: Rows × physics steps that are kept in memory at once.
 _CHUNK = 8_000_000
+# A physics step that is off by less than this share is what it should be; by more than the other, it is no longer that
+# of the gripper. Samples that scatter by this share of it have no period.
+_SAME_STEP, _OTHER_STEP, _JITTER = 1e-5, 0.1, 0.25
 # Motions that are kept; those of 24 grasps of 6 s take 3 MB.
 _REMEMBERED = 6
 
@@ -57,8 +60,9 @@ class Replay:
     """Replays grasps of one gripper.
 
     A command acts from the physics step at its time stamp until the next command's; a reading is the state at its time
-    stamp, before that command acts. Of grasps it is that of the nearest physics step; of a servo, which may be sampled
-    faster than that and read later than commanded, it lies between two.
+    stamp, before that command acts. Of grasps it is that of the nearest physics step, and the step is made to divide
+    the time between two samples; of a servo, which may be sampled faster than that, it lies between two. So do readings
+    that are taken later than their time stamps, or earlier.
 
     Args:
       gripper: what is simulated.
@@ -79,16 +83,19 @@ class Replay:
         encoders_known: bool = True,
     ) -> None:
         self.gripper, self.grasps, self.tier = gripper, tuple(grasps), tier
-        self._step_factor, self._other_collisions = step_factor, other_collisions
-        self.dt = float(gripper.compile(tier).opt.timestep) * step_factor
+        timestep = float(gripper.compile(tier).opt.timestep)
+        self._step_factor = step_factor * (1.0 if gripper.is_servo else _fitting_factor(self.grasps, timestep))
+        self.dt, self._other_collisions = timestep * self._step_factor, other_collisions
         starts = [np.rint((g.time_s - g.time_s[0]) / self.dt).astype(int) for g in self.grasps]
         self._steps = 1 + max(start[-1] for start in starts)
         samples = max(len(start) for start in starts)
         #: physics step at which each sample is taken, ``(grasps, samples)``
         self.sample_steps = np.stack([np.pad(start, (0, samples - len(start)), "edge") for start in starts])
-        self._instants = None  # when each sample is taken, in steps, if that is no whole number
+        self._instants = self.sample_steps  # when each sample is taken, in steps
+        latest_s = max(gripper.latest_reading_s, *(max(g.late_s) for g in self.grasps))
+        self._steps += math.ceil(latest_s / self.dt)
         if gripper.is_servo:
-            self._steps += 1 + math.ceil(gripper.latest_reading_s / self.dt)
+            self._steps += 1
             real = [(g.time_s - g.time_s[0]) / self.dt for g in self.grasps]
             self._instants = np.stack([np.pad(r, (0, samples - len(r)), "edge") for r in real])
         #: which samples there are, ``(grasps, samples)``
@@ -188,6 +195,7 @@ class Replay:
         force_scale: np.ndarray,
         effects: Sequence[EffectOn] = (),
         skew_s: np.ndarray | None = None,
+        force_skew_s: np.ndarray | None = None,
     ) -> Readings:
         """Reads rows of a motion through sensors.
 
@@ -197,12 +205,14 @@ class Replay:
           force_scale: f_α, ``(n,)``.
           effects: those that change what is read; their rows count readings.
           skew_s: how much later than its command each row's samples were read, ``(n,)``; at its time stamp by default.
+          force_skew_s: the same of the forces, if they were not read with the positions.
         """
         at = self._when(motion.grasp[rows], skew_s)
+        of_force = at if force_skew_s is None else self._when(motion.grasp[rows], force_skew_s)
         position, objects = at.of(motion.position, rows), at.of(motion.object_position, rows)
         scale = force_scale[:, None, None]
         if not effects:
-            return Readings(position, self._transduced(at.of(motion.force, rows) * scale), objects)
+            return Readings(position, self._transduced(of_force.of(motion.force, rows) * scale), objects)
         force = self._transduced(motion.force[rows] * scale)
         live = ReadingEffects([self._on_readings(effect) for effect in effects])
         true_position = motion.position[rows] if live.change_position else motion.position[:0]
@@ -211,13 +221,13 @@ class Replay:
         count = np.arange(len(rows))
         if live.change_position:
             position = at.of(true_position, count)
-        return Readings(position, at.of(force, count), objects)
+        return Readings(position, of_force.of(force, count), objects)
 
     def _when(self, grasp: np.ndarray, skew_s: np.ndarray | None) -> _Instants:
         """When the samples of these grasps are read."""
-        if self._instants is None:
-            return _Instants(self.sample_steps[grasp])
         later = np.zeros(len(grasp)) if skew_s is None else skew_s / self.dt
+        if self._instants is self.sample_steps and not later.any():
+            return _Instants(self.sample_steps[grasp])
         instants = np.clip(self._instants[grasp] + later[:, None], 0, self._steps - 1)
         before = np.minimum(instants.astype(int), self._steps - 2)
         return _Instants(before, instants - before)
@@ -248,6 +258,15 @@ class _Instants:
             return before
         share = self.share.reshape(*self.share.shape, *(1,) * (before.ndim - 2))
         return before + share * (values[each, self.before + 1] - before)
+
+
+def _fitting_factor(grasps: Sequence[MeasuredGrasp], timestep: float) -> float:
+    """What a physics step is multiplied with for samples to be whole steps apart; 1 if they are, or never will be."""
+    apart = np.concatenate([np.diff(g.time_s) for g in grasps])
+    period = float(np.median(apart))
+    factor = period / (timestep * max(1.0, np.rint(period / timestep)))
+    regular = np.median(np.abs(apart - period)) < _JITTER * timestep
+    return factor if regular and _SAME_STEP < abs(factor - 1) < _OTHER_STEP else 1.0
 
 
 def join(motions: Sequence[Motion]) -> Motion:

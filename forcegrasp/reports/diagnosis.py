@@ -74,7 +74,8 @@ def diagnosis_json(diagnosis: Diagnosis, advice: Advice | None, tried: Sequence[
         "shares": diagnosis.shares(),
         "left_share": left_share(diagnosis) if diagnosis.shares() else None,
         "fault": None if diagnosis.fault is None else {
-            "name": diagnosis.fault.name, "words": diagnosis.fault.words, "check": diagnosis.fault.check
+            "name": diagnosis.fault.name, "words": diagnosis.fault.words, "check": diagnosis.fault.check,
+            "moved": None if diagnosis.fault.moved is None else diagnosis.fault.moved.moves,
         },
         "law": law_json(diagnosis.law),
         "odd_grasps": [dataclasses.asdict(grasp) for grasp in diagnosis.odd],

@@ -10,6 +10,7 @@ from forcegrasp.identify.intervals import listed
 from forcegrasp.identify.verdict import Verdict
 from forcegrasp.reports.diagnosis import answer
 from forcegrasp.reports.diagnosis_words import (
+    fault_words,
     is_not_all,
     lacks,
     left_sentence,
@@ -40,6 +41,7 @@ def answer_box(diagnosis: Diagnosis, advice: Advice | None, commands: Sequence[C
     # of rivals the next command tells which grasp to record
     record = advice.sentence().removeprefix("record next: ") if advice and d.verdict is not Verdict.ONE_OF else ""
     rows = [
+        ("The set", fault_words(d) if found else ""),
         ("Explains", shares_sentence(d) if found else ""),
         ("Error", f"{fall}; up to {d.floor:.2f} is noise." if found and d.steps else ""),
         ("How sure", certainty(d)),

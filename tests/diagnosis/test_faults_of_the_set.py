@@ -18,6 +18,7 @@ from forcegrasp.identify.fitted_model import model_of
 from forcegrasp.identify.loading import Loaded, load
 from forcegrasp.models.model_file import Model
 from forcegrasp.reports.diagnosis import answer, diagnosis_json
+from forcegrasp.reports.diagnosis_box import answer_box
 from tests.independent.rig import record
 
 
@@ -114,7 +115,7 @@ def test_what_is_given_moves_within_its_tolerance_and_is_told(sound):
     diagnosis, _ = diagnose_set(dataclasses.replace(loaded, measured=measured), model, ["force_bias"], 0, silent)
     assert (diagnosis.verdict, diagnosis.effects) == ("explained", ())
     assert diagnosis.error_before > 1.3 > diagnosis.error_after
-    assert "moved within the tolerance of what the set gives: radius of thing_0 by -0." in answer(diagnosis)
+    assert "What the set gives was moved within its tolerance: radius of thing_0 by -0." in answer(diagnosis)
 
 
 def test_given_more_exactly_it_does_not_move(sound):
@@ -126,9 +127,81 @@ def test_given_more_exactly_it_does_not_move(sound):
     easy = dataclasses.replace(measured, radius_std_m=5e-5)
     moved = move_given(easy, target, base.fit)
     assert moved is not None
-    assert moved.radius_m[name] == pytest.approx(-1e-4, abs=3e-5)
-    assert max(map(abs, moved.offset_m.values())) < 2e-4
-    assert moved.price > len(moved.radius_m) + len(moved.offset_m)
+    assert moved.moves[f"radius_m of {name}"] == pytest.approx(-1e-4, abs=3e-5)
+    assert max(abs(moved.moves[f"offset_m of {g.name}"]) for g in measured.grasps) < 2e-4
+    assert moved.price > len(moved.moves) == len({g.object for g in measured.grasps}) + len(measured.grasps)
+
+
+@pytest.fixture(scope="module")
+def late(sound, tmp_path_factory):
+    """A function that gives the same grasps with commands that act late, by seconds."""
+    folder = tmp_path_factory.mktemp("late")
+
+    def recorded(delay_s: float) -> Loaded:
+        record(folder / str(delay_s), {"command_delay": {"latency": delay_s}}, 2, 9, samples=80)
+        return load(folder / str(delay_s))
+
+    return recorded
+
+
+def test_a_small_lag_is_taken_by_the_tolerance_and_told(sound, late):
+    diagnosis, _ = diagnose_set(late(0.003), sound[1], ["command_delay", "actuator_lag"], 0, silent)
+    assert (diagnosis.verdict, diagnosis.effects) == ("explained", ())
+    assert diagnosis.error_before > 1.2 > 1.04 > diagnosis.error_after
+    assert "What the set gives was moved within its tolerance: time of reading by -3." in answer(diagnosis)
+    fault = diagnosis_json(diagnosis, None, [], "s")["fault"]
+    assert fault["name"] == "timing_tolerance"
+    assert fault["moved"] == {"readout_skew_s": pytest.approx(-0.003, abs=0.001)}
+    assert "time of reading by -3." in str(answer_box(diagnosis, None, []))
+
+
+def test_a_delay_beyond_the_tolerance_is_an_effect(sound, late):
+    loaded = late(0.02)
+    target, _, base = apply_model(loaded, sound[1], silent, refit=True)
+    assert suspects(loaded, target, base.fit) == []
+    diagnosis, _ = diagnose_set(loaded, sound[1], ["command_delay", "actuator_lag"], 0, silent)
+    assert (diagnosis.verdict, diagnosis.effects, diagnosis.fault) == ("effect", ("command_delay",), None)
+
+
+def test_a_delay_at_the_end_of_its_tolerance_may_be_either(sound, late):
+    diagnosis, _ = diagnose_set(late(0.0045), sound[1], ["command_delay"], 0, silent)
+    assert (diagnosis.verdict, diagnosis.effects) == ("one_of", ("command_delay", "timing_tolerance"))
+    assert "Or the set is wrong, and nothing is missing: timing_tolerance (time of reading by -" in answer(diagnosis)
+
+
+def test_said_to_be_exact_a_small_lag_is_an_effect(sound, late):
+    """And with a wide tolerance a larger one is none."""
+    loaded = late(0.003)
+    target, _, base = apply_model(loaded, sound[1], silent, refit=True)
+    assert move_given(loaded.measured, target, base.fit) is not None
+    assert move_given(dataclasses.replace(loaded.measured, delay_std_s=1e-4), target, base.fit) is None
+    wide = dataclasses.replace(late(0.02), measured=dataclasses.replace(late(0.02).measured, delay_std_s=0.01))
+    target, _, base = apply_model(wide, sound[1], silent, refit=True)
+    moved = move_given(wide.measured, target, base.fit)
+    assert moved is not None
+    assert moved.is_no_surprise
+    assert moved.moves["readout_skew_s"] == pytest.approx(-0.02, abs=0.002)
+
+
+def test_a_clock_that_is_a_little_off_is_no_effect(sound):
+    loaded, model = sound
+    stretched = changed(loaded, lambda g: dataclasses.replace(g, time_s=1.003 * g.time_s))
+    diagnosis, _ = diagnose_set(stretched, model, ["command_delay", "actuator_lag", "force_lag"], 0, silent)
+    assert (diagnosis.verdict, diagnosis.effects) == ("explained", ())
+
+
+def test_a_clock_that_is_further_off_moves_within_a_wider_tolerance(sound):
+    loaded, model = sound
+    stretched = changed(loaded, lambda g: dataclasses.replace(g, time_s=1.06 * g.time_s))
+    target, _, base = apply_model(stretched, model, silent, refit=True)
+    exact = dataclasses.replace(stretched.measured, delay_std_s=1e-4)
+    assert move_given(exact, target, base.fit) is None
+    moved = move_given(dataclasses.replace(exact, period_std_share=0.03), target, base.fit)
+    assert moved is not None
+    assert moved.moves["period_share"] == pytest.approx(1 / 1.06 - 1, abs=0.01)
+    assert "the clock's period by -" in moved.words()
+    put = moved.put(stretched.measured.grasps[0]).time_s
+    assert put[-1] == pytest.approx(loaded.measured.grasps[0].time_s[-1], rel=0.01)
 
 
 @pytest.mark.parametrize(("radius_std_m", "moves"), [(5e-5, True), (1e-6, False)])

@@ -36,7 +36,7 @@ def test_a_fault_besides_an_effect_is_told_first(made_up, fault):
     assert answer(both).startswith("The set seems to be wrong: time_scale (stamps are too long; to check: the clock).")
     assert "The model lacks force_bias" in answer(both)
     assert diagnosis_json(both, None, made_up.tried, "s")["fault"] == {
-        "name": "time_scale", "words": "stamps are too long", "check": "the clock"
+        "name": "time_scale", "words": "stamps are too long", "check": "the clock", "moved": None
     }  # fmt: skip
 
 

@@ -87,6 +87,7 @@ def test_folders_of_one_name_are_told_apart_by_their_paths(sets, tmp_path):
         ({"position_std_m": 1e-4}, "position_std_m is 0.0001, in"),
         ({"force_std_n": None}, "force_std_n is not given, in"),
         ({"offset_std_m": 1e-3}, "offset_std_m is 0.001, in"),
+        ({"delay_std_s": 1e-3}, "delay_std_s is 0.001, in"),
         ({"kind": "servo"}, "is of kind servo, first of kind grasps; only sets of one kind can be joined"),
     ],
 )

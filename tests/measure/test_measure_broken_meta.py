@@ -35,7 +35,7 @@ TEXTS = {
     **{f"control character in {key}": (_text(**{key: '"a\\x01b"'}), [key]) for key in VALID},
     **{
         f"{key} is {value}": (_text(**{key: value}), [key])
-        for key in ("position_std_m", "force_std_n")
+        for key in ("position_std_m", "force_std_n", "period_std_share", "delay_std_s")
         for value in (
             "-1",
             "0",
@@ -53,6 +53,11 @@ TEXTS = {
             "yes",
         )
     },
+    "percent for a share": (
+        _text(period_std_share="0.3"),
+        ["period_std_share: 0.3 is no share"],
+    ),
+    "milliseconds": (_text(delay_std_s="2"), ["delay_std_s: 2 s is too long; looks like milliseconds"]),
     "format of the future": (_text(format="forcegrasp-measurements/2"), ["forcegrasp-measurements/1"]),
     "format in capitals": (_text(format="Forcegrasp-Measurements/1"), ["format"]),
     "kind misspelt": (_text(kind="grasp"), ["did you mean grasps"]),

@@ -15,11 +15,13 @@ from measured_rig import change, edit, make_set
 
 from forcegrasp.errors import ForcegraspError, MeasurementError
 from forcegrasp.measure import FinalForceTable, MeasurementSet, read_set, write_set, write_table
-from forcegrasp.measure.schema import OBJECT, TWO_FINGERS, fingerprint_of_table
+from forcegrasp.measure.schema import OBJECT, TOLERANCES, TWO_FINGERS, fingerprint_of_set, fingerprint_of_table
 
 
 def _same(a: MeasurementSet, b: MeasurementSet) -> None:
     for name in ("gripper", "source", "license", "position_std_m", "force_std_n", "fingerprint"):
+        assert getattr(a, name) == getattr(b, name)
+    for name, _ in TOLERANCES.values():
         assert getattr(a, name) == getattr(b, name)
     for one, two in zip(a.grasps, b.grasps, strict=True):
         for name in ("name", "object", "session", "radius_m", "offset_m", "split"):
@@ -86,6 +88,18 @@ def test_what_is_not_given(grasps, tmp_path, samples, changes):
 )
 def test_meta(grasps, tmp_path, changes, any_gripper):
     _same(make_set(grasps, **changes), read_set(write_set(make_set(grasps, **changes), tmp_path / "set")))
+
+
+@pytest.mark.parametrize("key", TOLERANCES)
+def test_tolerances(measured, tmp_path, key):
+    """What is usual is not written; what is not is kept, and another set by its fingerprint."""
+    name, usual = TOLERANCES[key]
+    assert getattr(read_set(write_set(measured, tmp_path / "usual")), name) == usual
+    assert key not in (tmp_path / "usual" / "meta.yaml").read_text()
+    facts = (measured.gripper, measured.position_std_m, measured.force_std_n, measured.grasps)
+    other = replace(measured, **{name: 3 * usual}, fingerprint=fingerprint_of_set(*facts, {key: 3 * usual}))
+    _same(other, read_set(write_set(other, tmp_path / "other")))
+    assert other.fingerprint != measured.fingerprint
 
 
 def test_fingerprint_of_every_format(folder, measured, valid_files):

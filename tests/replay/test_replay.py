@@ -42,11 +42,15 @@ TIMES = {
     "gap": REGULAR[[0, 1, 2, 3, 4, 5, 12, 13, 14, 19]],
     "late clock": 1.7e9 + REGULAR,
 }
+# What physics steps must be of to divide 1/30 s: 17 of 2 ms, 4 of 8 ms.
+DIVIDED = {"reference": 0.034, "fast": 0.032}
 
 
-def by_hand(one: MeasuredGrasp, *effects: tuple[type[Effect], str, np.ndarray], tier: str = "fast") -> np.ndarray:
+def by_hand(
+    one: MeasuredGrasp, *effects: tuple[type[Effect], str, np.ndarray], tier: str = "fast", factor: float = 1.0
+) -> np.ndarray:
     """Position, force and object at each sample, read before that sample's command acts; ``(samples, 5)``."""
-    plant, row = Plant(TIAGO, 1, tier, threads=1), np.array([0])
+    plant, row = Plant(TIAGO, 1, tier, threads=1, step_factor=factor), np.array([0])
     plant.attach([(kind(values[None], plant.dt, variant), row) for kind, variant, values in effects])
     base = {name: np.array([value]) for name, value in (BASE | {"force_scale": SCALE}).items()}
     plant.reset(row, write_base(plant, row, base), one.command_m[:1])
@@ -73,9 +77,42 @@ def replayed(simulator: Replay, rows: np.ndarray, *effects: EffectOn, base: dict
 @pytest.mark.parametrize("tier", ["fast", "reference"])
 def test_commands_are_held_from_their_time_stamp(name, tier):
     one = grasp(TIMES[name])
-    seen = replayed(Replay(TIAGO, [one], tier), np.array([0]))[0]
-    assert seen.tobytes() == by_hand(one, tier=tier).tobytes()
+    simulator = Replay(TIAGO, [one], tier)
+    factor = simulator.dt / float(TIAGO.compile(tier).opt.timestep)
+    assert factor == pytest.approx(1 / 30 / DIVIDED[tier] if name.startswith("30 Hz") else 1.0, rel=1e-12)
+    seen = by_hand(one, tier=tier, factor=simulator._step_factor)
+    assert replayed(simulator, np.array([0]))[0].tobytes() == seen.tobytes()
     assert seen[:, 2:4].max() > 0.05 or name == "gap"
+
+
+@pytest.mark.parametrize("slower", [0.997, 1.003, 1.02])
+def test_a_clock_that_is_a_little_off_moves_no_sample_between_steps(slower):
+    """Rows a little further apart are as many steps apart, each a little longer, and the motion is nearly the same."""
+    exact, off = (Replay(TIAGO, [grasp(factor * REGULAR)]) for factor in (1.0, slower))
+    assert off.dt == pytest.approx(slower * exact.dt)
+    assert np.array_equal(off.sample_steps, exact.sample_steps)
+    one, other = (replayed(simulator, np.array([0])) for simulator in (exact, off))
+    assert np.abs(one - other)[..., :2].max() < 0.02 * abs(slower - 1)
+
+
+def test_steps_that_divide_no_period_stay_as_they_are():
+    assert Replay(TIAGO, [grasp(np.arange(80) * 0.003)]).dt == Replay(TIAGO, [grasp(REGULAR)]).dt
+
+
+@pytest.mark.parametrize("late_s", [(-0.003, -0.003), (0.0, -0.005), (0.007, 0.002)])
+def test_late_readings_are_those_of_the_motion_at_that_time(late_s):
+    one = dataclasses.replace(grasp(REGULAR), late_s=late_s)
+    simulator = Replay(TIAGO, [one])
+    motion = simulator.simulate(np.array([0]), {name: np.full(1, value) for name, value in BASE.items()})
+    skews = [np.array([late]) for late in late_s]
+    read = simulator.read(motion, np.array([0]), np.array([SCALE]), (), *skews)
+    moments = simulator.dt * np.arange(motion.position.shape[1])
+    for finger in range(2):
+        position = np.interp(REGULAR + late_s[0], moments, motion.position[0, :, finger])
+        force = np.interp(REGULAR + late_s[1], moments, SCALE * motion.force[0, :, finger])
+        np.testing.assert_allclose(read.position[0, :, finger], position, atol=1e-12)
+        np.testing.assert_allclose(read.force[0, :, finger], force, atol=1e-12)
+    assert moments[-1] >= REGULAR[-1] + max(late_s) - 1e-9
 
 
 @pytest.mark.parametrize(("effect", "variant"), CASES)
@@ -112,12 +149,12 @@ def test_grasps_of_different_lengths_and_rates():
     together = replayed(simulator, np.arange(len(grasps)))
     longest = max(len(g.time_s) for g in grasps)
     assert together.shape == (len(grasps), longest, 5)
+    assert simulator.dt == Replay(TIAGO, grasps[:1], "fast").dt
     for index, one in enumerate(grasps):
         count = len(one.time_s)
         assert simulator.mask[index].tolist() == [True] * count + [False] * (longest - count)
-        alone = replayed(Replay(TIAGO, [one], "fast"), np.array([0]))[0]
-        assert together[index, :count].tobytes() == alone.tobytes()
-        assert np.all(together[index, count:] == alone[-1])  # its last reading again
+        assert together[index, :count].tobytes() == by_hand(one).tobytes()
+        assert np.all(together[index, count:] == together[index, count - 1])  # its last reading again
 
 
 @functools.cache
