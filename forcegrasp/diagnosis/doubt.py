@@ -42,10 +42,12 @@ def more_likely(right: Diagnosis, said: Diagnosis) -> Diagnosis:
     gains = _gains(right.fault, (right.target, right.fit), (said.target, said.fit))
     if is_beyond_chance(gains, LEAST_LEAD) or not said.verdict.names_effects:
         return right
-    if is_beyond_chance(-gains, LEAST_LEAD):
+    moved, explained = right.fault.moved, right.verdict is Verdict.EXPLAINED
+    # a time of reading is a delay by another name: below the simulation's own error no lead tells them apart
+    same = moved is not None and explained and moved.groups == ("timing",)
+    if is_beyond_chance(-gains, LEAST_LEAD) and not same:
         return said
-    moved = right.fault.moved
-    if moved is not None and moved.is_no_surprise and right.verdict is Verdict.EXPLAINED:
+    if moved is not None and explained and moved.is_no_surprise:
         return right  # what is as exact as was said leaves nothing for an effect to explain
     return dataclasses.replace(
         said, verdict=Verdict.ONE_OF, effects=(*said.effects, right.fault.name), fault=right.fault

@@ -24,7 +24,7 @@ _NO_SURPRISE = 2.0
 #: It is worth a fit if it takes this share off the squares that a fit leaves beyond the noise.
 WORTH = 0.5
 # Fewer numbers do that take this share of what all would.
-_NEARLY = 0.95
+_NEARLY = 0.9
 # Readings bend with what is given: so many linear steps, or until they are this small.
 _STEPS, _SETTLED = 3, 0.1
 # What is moved together, the fewest numbers first.
@@ -132,12 +132,10 @@ def move_given(measured: MeasurementSet, target: Target, fit: Fit, worth: float 
     columns = _columns(target, fit, numbers)
     groups = [kinds for kinds in _GROUPS if any(number.kind in kinds for number in numbers)]
     steps = [_step(fit, columns, numbers, kinds) for kinds in groups]
-    explained = [fit.cost - left for _, left in steps]
+    explained = [fit.cost - left - 2 * moved.price for moved, left in steps]
     if max(explained) < worth * (fit.cost - target.readings):
         return None
     moved, _ = next(one for one, share in zip(steps, explained, strict=True) if share > _NEARLY * max(explained))
-    if moved.groups == ("timing",) and np.abs(moved.deviations).max() >= _MOST:
-        return None  # readings hardly bend with times
     for _ in range(_STEPS - 1):
         grasps = tuple(moved.put(g) for g in measured.grasps)
         problem = Problem(fit.problem.gripper, grasps, fit.problem.effects)

@@ -119,10 +119,11 @@ def _read_grasps(folder: Path, meta: Meta, facts: dict[str, Any]) -> Measurement
     samples = read_samples(folder, in_samples)
     grasps = _grasps(folder, table, samples, columns)
     tolerances: dict[str, float] = meta.model_dump(include=set(TOLERANCES))
+    stds: dict[str, Any] = {name: tolerances[key] for key, (name, _) in TOLERANCES.items()}
     return MeasurementSet(
         **facts,
         position_std_m=meta.position_std_m,
-        **{name: tolerances[key] for key, (name, _) in TOLERANCES.items()},
+        **stds,
         grasps=grasps,
         fingerprint=fingerprint_of_set(meta.gripper, meta.position_std_m, meta.force_std_n, grasps, tolerances),
         notes=table.notes() + samples.notes(),

@@ -147,7 +147,7 @@ def late(sound, tmp_path_factory):
 def test_a_small_lag_is_taken_by_the_tolerance_and_told(sound, late):
     diagnosis, _ = diagnose_set(late(0.003), sound[1], ["command_delay", "actuator_lag"], 0, silent)
     assert (diagnosis.verdict, diagnosis.effects) == ("explained", ())
-    assert diagnosis.error_before > 1.2 > 1.04 > diagnosis.error_after
+    assert diagnosis.error_before > 1.3 > 1.1 > diagnosis.error_after
     assert "What the set gives was moved within its tolerance: time of reading by -3." in answer(diagnosis)
     fault = diagnosis_json(diagnosis, None, [], "s")["fault"]
     assert fault["name"] == "timing_tolerance"
@@ -175,7 +175,7 @@ def test_said_to_be_exact_a_small_lag_is_an_effect(sound, late):
     target, _, base = apply_model(loaded, sound[1], silent, refit=True)
     assert move_given(loaded.measured, target, base.fit) is not None
     assert move_given(dataclasses.replace(loaded.measured, delay_std_s=1e-4), target, base.fit) is None
-    wide = dataclasses.replace(late(0.02), measured=dataclasses.replace(late(0.02).measured, delay_std_s=0.01))
+    wide = dataclasses.replace(late(0.02), measured=dataclasses.replace(late(0.02).measured, delay_std_s=0.015))
     target, _, base = apply_model(wide, sound[1], silent, refit=True)
     moved = move_given(wide.measured, target, base.fit)
     assert moved is not None
