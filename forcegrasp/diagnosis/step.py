@@ -28,7 +28,7 @@ from forcegrasp.diagnosis.verdict import explained_share
 from forcegrasp.effects import Effect
 from forcegrasp.identify.base_fit import rms_error
 from forcegrasp.identify.cross_validation import rms
-from forcegrasp.identify.fit import Fit, descend_roughly, fit_exactly
+from forcegrasp.identify.fit import Fit, fit_exactly, fit_once
 from forcegrasp.identify.noise_floor import cells, excess
 
 #: An effect must lower the error of some signal in some phase by this share; by more where all is at the floor already.
@@ -214,14 +214,16 @@ class _Start:
         if not _ALL_FITTED < rms_error(exact, target) < _FAR:
             return exact
         # it may have ended where an effect's size meets a step of the simulation, or in another valley
+        # slopes of all but its last effect hardly change
+        known = exact.jacobian[..., : exact.problem.first_entry(len(exact.problem.effects) - 1)]
         ends = [
-            descend_roughly(target, exact.problem, simulators, start, exact.correction)
+            fit_once(target, exact.problem, simulators, start, exact.correction, rounds=0, known_slopes=known)
             for start in other_starts(exact, self._study)
         ]
-        costs = [float(np.sum((exact.weight * residual) ** 2)) for _, residual in ends]
-        if not ends or min(costs) > _NO_BETTER * exact.cost:
+        best = min(ends, key=lambda fit: fit.cost, default=exact)
+        if best.cost > _NO_BETTER * exact.cost:
             return exact
-        again = fit_exactly(target, exact.problem, simulators, ends[int(np.argmin(costs))][0])
+        again = fit_exactly(target, exact.problem, simulators, best.vector)
         return min([exact, again], key=lambda fit: fit.cost)
 
     def _judge(self, refit: Fit, p_family: float, signature: np.ndarray, replaces: str = "") -> Candidate:
