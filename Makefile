@@ -5,6 +5,9 @@ PYTHON ?= python3
 VENV := .venv
 RUN := runs/latest_$(shell date +%Y-%m-%d_%H-%M-%S)
 
+# what Python compiled is kept: the tests start many a process, which would each compile it again
+unexport PYTHONDONTWRITEBYTECODE
+
 .PHONY: train test check docs setup clean
 
 train: setup

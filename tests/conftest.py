@@ -2,33 +2,44 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import signal
 from collections.abc import Callable, Iterator
 from importlib.util import find_spec
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import numpy as np
 import pytest
-import torch
 from not_tested import pytest_terminal_summary  # noqa: F401  (a hook: pytest calls it)
 
-from forcegrasp.config import GraspConfig
-from forcegrasp.physics import GraspParameters, GraspSampler
-from forcegrasp.replay import replay
+if TYPE_CHECKING:
+    from forcegrasp.physics import GraspParameters
 
 # A worker of xdist, and what tests start, has one core: threads that wait for one another would only take it.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
-torch.set_num_threads(1)
-replay.THREADS = 1
 
 #: Folders of the longest files: they come first, lest one worker is still at such a file when the others have ended.
-LONGEST = ("diagnosis", "docs", "cli", "effects", "config", "importers", "reliability", "train")
+LONGEST = (
+    *("diagnosis", "config", "cli", "train", "docs", "reliability", "effects", "importers", "evaluate", "tools"),
+    *("identify", "transforms", "env", "reports", "deploy", "replay", "grippers", "physics", "independent"),
+)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Puts the tests in the order in which xdist hands their files to its workers."""
     items.sort(key=lambda item: next((i for i, name in enumerate(LONGEST) if item.path.parent.name == name), 99))
+
+
+def pytest_collection_finish() -> None:
+    """In who runs tests, not in who hands them out, which need not import for that what they test."""
+    import torch
+
+    from forcegrasp.replay import replay
+
+    torch.set_num_threads(1)
+    replay.THREADS = 1
+    gc.freeze()  # what is imported by now stays: to look for garbage in it took a tenth of the tests' time
 
 
 @pytest.fixture(scope="session")
@@ -40,6 +51,11 @@ def root() -> Path:
 @pytest.fixture(scope="session")
 def draw() -> Callable[..., GraspParameters]:
     """``draw(n, seed=0, **ranges)``: random grasps from the default ranges, or from those given."""
+
+    import numpy as np
+
+    from forcegrasp.config import GraspConfig
+    from forcegrasp.physics import GraspSampler
 
     def grasps(n: int, seed: int = 0, **ranges) -> GraspParameters:
         return GraspSampler(GraspConfig(**ranges))(np.random.default_rng(seed), np.arange(n))

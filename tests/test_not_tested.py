@@ -28,7 +28,7 @@ def test_tested(): ...
 FILE = "import pytest\npytest.importorskip('no_such_module')\ndef test_one(): ...\n"
 
 
-@pytest.mark.parametrize("workers", [[], ["-n", "2"]], ids=["alone", "xdist"])
+@pytest.mark.parametrize("workers", [[], ["-n", "1"]], ids=["alone", "xdist"])
 def test_every_reason_is_told_at_the_end(tmp_path, root, workers):
     (tmp_path / "conftest.py").write_text("from not_tested import pytest_terminal_summary\n")
     (tmp_path / "test_some.py").write_text(TESTS)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import json
 from pathlib import Path
@@ -40,7 +41,7 @@ def read_config(path: Path) -> TrainConfig:
         if not isinstance(loaded, dict):  # text would be taken for more YAML
             raise ConfigError("no options in it")
         _refuse_interpolations(loaded)
-        merged = OmegaConf.merge(OmegaConf.structured(TrainConfig), loaded)
+        merged = OmegaConf.merge(_schema(), loaded)
         config = cast(TrainConfig, OmegaConf.to_object(merged))
         validate(config)
         gripper, model_path = load_gripper(config.gripper), path.parent / MODEL
@@ -49,6 +50,11 @@ def read_config(path: Path) -> TrainConfig:
     except (OSError, OmegaConfBaseException, ConfigError, ValueError) as error:
         first_line = str(error).strip().splitlines()[0]
         raise CheckpointError(f"{path}: not a valid configuration ({first_line})") from error
+
+
+@functools.cache  # to make it takes as long as to merge a file into it
+def _schema() -> Any:
+    return OmegaConf.structured(TrainConfig)
 
 
 def _refuse_interpolations(options: dict[str, Any], path: str = "") -> None:

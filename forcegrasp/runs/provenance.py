@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import json
 import os
 import platform
@@ -38,6 +39,13 @@ def provenance(config: TrainConfig, overrides: list[str]) -> dict[str, Any]:
         "command": ["forcegrasp", "train", *overrides],
         "seed": config.seed,
         "config": fingerprint(dataclasses.asdict(config)),
+        **_code_and_machine(),
+    }
+
+
+@functools.cache  # a process runs the code that it imported, in each run of a sweep
+def _code_and_machine() -> dict[str, Any]:
+    return {
         "git": git_hash(),
         "python": sys.version.split()[0],
         "versions": {name: version(name) for name in _PACKAGES} | {"forcegrasp": version("forcegrasp")},

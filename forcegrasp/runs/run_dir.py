@@ -58,8 +58,9 @@ class RunDir:
                 for folder in (run.checkpoints, run.tensorboard, run.figures):
                     folder.mkdir(parents=True, exist_ok=True)
                 run.model_path.unlink(missing_ok=True)  # of a run that is begun again: its source may have changed
-                facts = json.dumps(provenance(config, overrides), indent=2) + "\n"
-                write_whole(run.path / "run.json", facts.encode())
+                facts = provenance(config, overrides)
+                run.fingerprint = facts["config"]
+                write_whole(run.path / "run.json", (json.dumps(facts, indent=2) + "\n").encode())
                 text = yaml.safe_dump(dataclasses.asdict(config), sort_keys=False)
                 write_whole(run.config_path, text.encode())  # last: a folder without it is no run
         except OSError as error:
@@ -113,7 +114,7 @@ class RunDir:
 
     @functools.cached_property
     def fingerprint(self) -> str:
-        """Of the configuration as it was when first asked for: editing the file must not spoil a run at work."""
+        """Of the configuration as created, or when first asked for: editing the file must not spoil a run at work."""
         self.config()  # says what is wrong with the file, if anything
         return fingerprint(plain_yaml.load(self.config_path))
 

@@ -243,19 +243,20 @@ MISTAKES = [
 ]
 
 
-@pytest.fixture
-def folder(tmp_path, finished, monkeypatch) -> Path:
-    """A working directory with runs that are in order, and some that are not."""
-    (tmp_path / "empty").mkdir()
-    (tmp_path / "file").write_text("text")
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory, finished) -> Path:
+    """A folder with runs that are in order, and some that are not."""
+    folder = tmp_path_factory.mktemp("runs")
+    (folder / "empty").mkdir()
+    (folder / "file").write_text("text")
     for name in ("finished", "other", "broken", "damaged", "started"):
-        shutil.copytree(finished, tmp_path / name)
-    config = (tmp_path / "other" / "config.yaml").read_text()
-    (tmp_path / "other" / "config.yaml").write_text(config.replace("seed: 0", "seed: 1"))
-    (tmp_path / "broken" / "config.yaml").write_text("ppo: [")
-    for path in (tmp_path / "damaged" / "checkpoints").iterdir():
+        shutil.copytree(finished, folder / name)
+    config = (folder / "other" / "config.yaml").read_text()
+    (folder / "other" / "config.yaml").write_text(config.replace("seed: 0", "seed: 1"))
+    (folder / "broken" / "config.yaml").write_text("ppo: [")
+    for path in (folder / "damaged" / "checkpoints").iterdir():
         path.write_bytes(path.read_bytes()[:-1] + b"\x01")
-    for path in (tmp_path / "started" / "checkpoints").iterdir():
+    for path in (folder / "started" / "checkpoints").iterdir():
         path.unlink()
     header, row = (finished / "metrics.csv").read_text().splitlines()
     values = dict(zip(header.split(","), row.split(","), strict=True))
@@ -267,12 +268,25 @@ def folder(tmp_path, finished, monkeypatch) -> Path:
         "short": f"{header}\n8,1,2,3,4\n",
         "repeated": f"{header}\n{row}\n{row}\n",
     }.items():
-        shutil.copytree(finished, tmp_path / name)
-        (tmp_path / name / "metrics.csv").write_bytes(text if isinstance(text, bytes) else text.encode())
-    shutil.copytree(finished, tmp_path / "silent")
-    (tmp_path / "silent" / "metrics.csv").unlink()
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
+        shutil.copytree(finished, folder / name)
+        (folder / name / "metrics.csv").write_bytes(text if isinstance(text, bytes) else text.encode())
+    shutil.copytree(finished, folder / "silent")
+    (folder / "silent" / "metrics.csv").unlink()
+    return folder
+
+
+@pytest.fixture
+def folder(runs, monkeypatch) -> Path:
+    """The working directory of those who write nothing, as these tests find."""
+    monkeypatch.chdir(runs)
+    return runs
+
+
+@pytest.fixture
+def copied(runs, tmp_path, monkeypatch) -> Path:
+    """The working directory of those who do."""
+    monkeypatch.chdir(shutil.copytree(runs, tmp_path / "runs"))
+    return tmp_path / "runs"
 
 
 def contents(folder: Path) -> dict[Path, bytes | None]:
@@ -314,7 +328,8 @@ def test_mistake_in_a_process_of_its_own(arguments, told, tmp_path):
 
 
 @pytest.mark.parametrize("again", [["resume=started"], ["hydra.run.dir=started"]])
-def test_a_run_without_a_checkpoint_can_be_begun_again_either_way(again, folder, tiny):
+@pytest.mark.usefixtures("copied")
+def test_a_run_without_a_checkpoint_can_be_begun_again_either_way(again, tiny):
     finished = Path("finished/checkpoints")
     assert main(["train", *again, *([] if "resume" in again[0] else tiny["train"])]) == 0
     for path in finished.iterdir():
@@ -329,13 +344,13 @@ def test_a_run_without_a_checkpoint_can_be_begun_again_either_way(again, folder,
         (["-m", "seed=0,1", "hydra.sweep.dir=sweep"], "sweep/sweep.lock"),
     ],
 )
-def test_what_another_training_is_writing(arguments, lock, folder, tiny, capsys, monkeypatch):
+def test_what_another_training_is_writing(arguments, lock, copied, tiny, capsys, monkeypatch):
     monkeypatch.setattr(sys, "argv", sys.argv)
     monkeypatch.setenv("HYDRA_FULL_ERROR", "0")
     with only_writer(Path(lock)):
-        before = contents(folder)
+        before = contents(copied)
         assert main(["train", *arguments, *([] if "resume" in arguments[0] else tiny["train"])]) == 2
-        assert contents(folder) == before
+        assert contents(copied) == before
     out, err = capsys.readouterr()
     assert not out
     told = f"process {os.getpid()} on {platform.node()} is training here; wait until it has ended, or end it"
@@ -361,7 +376,9 @@ def test_launcher_is_not_installed(folder, capsys, monkeypatch):
     assert contents(folder) == before
 
 
-def test_full_disk_while_training(folder, tiny, capsys, monkeypatch):
+def test_full_disk_while_training(tiny, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
     def no_space(*args):
         raise OSError(28, os.strerror(28))
 
@@ -371,12 +388,10 @@ def test_full_disk_while_training(folder, tiny, capsys, monkeypatch):
     assert re.fullmatch(r"forcegrasp: .*full.*No space left on device.*\n", err)
 
 
-@pytest.mark.parametrize(("backend", "verb"), [("nonsense", "train"), ("osmesa", "record")])
-def test_setting_of_mujocos_renderer_does_not_matter(backend, verb, tiny, tmp_path):
-    """Training renders in a process of its own, if at all. A recording starts sooner and imports MuJoCo alike."""
-    options = {"train": [*tiny["train"], "hydra.run.dir=run"], "record": ["grasps=1", "objects=1", "out=run"]}
-    command = [sys.executable, "-m", "forcegrasp.cli.main", verb, *options[verb]]
-    environment = {**os.environ, "MUJOCO_GL": backend}
+def test_setting_of_mujocos_renderer_does_not_matter(tmp_path):
+    """A recording starts sooner than a training, of which test_terminal.py says so, and imports MuJoCo alike."""
+    command = [sys.executable, "-m", "forcegrasp.cli.main", "record", "grasps=1", "objects=1", "out=run"]
+    environment = {**os.environ, "MUJOCO_GL": "osmesa"}
     done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert not done.stderr

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import shlex
-import shutil
 import sys
 from pathlib import Path
 
@@ -38,20 +37,15 @@ def test_name_of_a_run(given, name):
     assert re.fullmatch(rf"runs/\d{{4}}-\d\d-\d\d_\d\d-\d\d-\d\d_{name}", folder)
 
 
-@pytest.mark.parametrize("launcher", ["basic", "joblib"])
-def test_names_of_a_sweeps_runs(launcher, tiny, tmp_path, monkeypatch):
+def test_names_of_a_sweeps_runs(tiny, tmp_path, monkeypatch):
+    """One after another; those of joblib's processes are in test_sweep.py."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "argv", sys.argv)
     monkeypatch.setenv("HYDRA_FULL_ERROR", "0")
     monkeypatch.setattr("forcegrasp.cli.sweep._draw_curves", lambda folder: None)
-    Path("far").mkdir()
-    shutil.copy(MODEL, "far/lag.yaml")
-    if launcher == "joblib":  # each run is named by a process of the launcher's
-        swept, names = [f"model={MODEL},far/lag.yaml"], ["ib_config_s0_0", "ib_lag_s0_1"]
-    else:
-        swept, names = [f"gripper={DEFAULT_GRIPPER},franka_hand"], ["ib_franka_hand_s0_1", "ib_s0_0"]
-    options = [*tiny["train"], f"hydra/launcher={launcher}", "hydra.sweep.dir=sweep"]
-    assert main(["train", "-m", *swept, *options]) == 0
+    swept = [f"gripper={DEFAULT_GRIPPER},franka_hand", "hydra.sweep.dir=sweep"]
+    assert main(["train", "-m", *swept, *tiny["train"]]) == 0
+    names = ["ib_franka_hand_s0_1", "ib_s0_0"]
     assert sorted(path.parent.name for path in Path("sweep").glob("*/config.yaml")) == names
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -12,6 +13,7 @@ from pathlib import Path
 
 import pytest
 import yaml
+from joblib.externals.loky import get_reusable_executor
 
 from forcegrasp.cli.main import main
 from forcegrasp.cli.one_training import begin_or_resume
@@ -20,6 +22,8 @@ from forcegrasp.errors import CheckpointError
 from forcegrasp.runs.lock import only_writer
 from forcegrasp.runs.run_dir import RunDir
 from forcegrasp.train.logging import TrainingLog
+
+MODEL = Path(__file__).parents[1] / "config" / "model.yaml"
 
 
 @pytest.fixture(autouse=True)
@@ -43,27 +47,29 @@ def final(run: RunDir) -> bytes:
     return max(run.checkpoints.iterdir()).read_bytes()
 
 
-def test_two_experiments_and_two_seeds_side_by_side(tiny, tmp_path):
-    swept = ["sweep=ablation", "experiment=ib,no_ib", "seed=0,1"]
-    command = ["train", "-m", *swept, *tiny["train"], "hydra/launcher=joblib"]
-    done = subprocess.run(
-        [sys.executable, "-m", "forcegrasp.cli.main", *command, "hydra.launcher.n_jobs=2", "hydra.sweep.dir=sweep"],
-        env={**os.environ, "OMP_NUM_THREADS": "1"},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    assert "Traceback" not in done.stderr
-    assert "learning curves are in sweep/curves.png" in done.stdout
+def test_two_experiments_and_two_seeds_side_by_side(tiny, tmp_path, capfd):
+    """In two processes of joblib's, which know from here what names a run: experiment, model and seed."""
+    Path("far").mkdir()
+    shutil.copy(MODEL, "far/lag.yaml")
+    options = [*tiny["train"], "model=far/lag.yaml"]
+    swept = ["sweep=ablation", "experiment=ib,no_ib", "seed=0,1", "hydra.sweep.dir=sweep"]
+    side_by_side = ["hydra/launcher=joblib", "hydra.launcher.n_jobs=2"]
+    try:
+        assert main(["train", "-m", *swept, *options, *side_by_side]) == 0
+    finally:
+        get_reusable_executor().shutdown()
+    out, err = capfd.readouterr()
+    assert "Traceback" not in err
+    assert "learning curves are in sweep/curves.png" in out
     runs = runs_in(tmp_path / "sweep")
     assert set(runs) == {(True, 0), (True, 1), (False, 0), (False, 1)}
-    assert sorted(run.path.name for run in runs.values()) == ["ib_s0_0", "ib_s1_2", "no_ib_s0_1", "no_ib_s1_3"]
+    names = ["ib_lag_s0_0", "ib_lag_s1_2", "no_ib_lag_s0_1", "no_ib_lag_s1_3"]
+    assert sorted(run.path.name for run in runs.values()) == names
     assert len({final(run) for run in runs.values()}) == 4
     # a process of the sweep trains several runs: the last one is as good as the first
-    assert main(["train", "experiment=no_ib", "seed=1", *tiny["train"], "hydra.run.dir=alone"]) == 0
+    assert main(["train", "experiment=no_ib", "seed=1", *options, "hydra.run.dir=alone"]) == 0
     assert final(runs[False, 1]) == final(RunDir("alone"))
-    assert {path.name for path in tmp_path.iterdir()} == {"sweep", "alone"}
+    assert {path.name for path in tmp_path.iterdir()} == {"far", "sweep", "alone"}
 
 
 def test_one_after_the_other(tiny, tmp_path):

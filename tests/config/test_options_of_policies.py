@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from matplotlib.figure import Figure
 from mujoco.batch import Batch
 from PIL import Image
 from rich.console import Console
@@ -277,14 +278,20 @@ def evaluated(folder: Path, **values: Any) -> dict[str, Any]:
     return {"policies": report["policies"], "trials": (folder / "trials.csv").read_text()}
 
 
-@pytest.fixture(autouse=True)
-def no_pictures(monkeypatch):
+def draw_nothing(patch: pytest.MonkeyPatch) -> None:
     """Drawing takes most of the time, and rendering needs OpenGL."""
     gif = io.BytesIO()
     Image.new("P", (2, 2)).save(gif, "GIF")
-    monkeypatch.setattr("forcegrasp.train.logging.grasp_video", lambda *args, **kwargs: gif.getvalue())
-    monkeypatch.setattr("matplotlib.figure.Figure.savefig", lambda self, path, **kwargs: Path(path).touch())
-    monkeypatch.setattr("forcegrasp.reports.html._svg", lambda figure: "")
+    patch.setattr("forcegrasp.train.logging.grasp_video", lambda *args, **kwargs: gif.getvalue())
+    patch.setattr("forcegrasp.evaluate.compare_policies.force_traces", lambda *args, **kwargs: Figure())
+    patch.setattr("forcegrasp.evaluate.compare_policies.cell_boxes", lambda *args, **kwargs: Figure())
+    patch.setattr("matplotlib.figure.Figure.savefig", lambda self, path, **kwargs: Path(path).touch())
+    patch.setattr("forcegrasp.reports.html._svg", lambda figure: "")
+
+
+@pytest.fixture(autouse=True)
+def no_pictures(monkeypatch):
+    draw_nothing(monkeypatch)
 
 
 @pytest.fixture(scope="module")
@@ -306,8 +313,7 @@ def learned(plain_training, run_path) -> dict[str, list[str]]:
 @pytest.fixture(scope="module")
 def plain_evaluation(tmp_path_factory, learned):
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("matplotlib.figure.Figure.savefig", lambda *args, **kwargs: None)
-        patch.setattr("forcegrasp.reports.html._svg", lambda figure: "")
+        draw_nothing(patch)
         return evaluated(tmp_path_factory.mktemp("evaluate"), **learned)
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 from pathlib import Path
+from typing import Any
 
 import pytest
 import yaml
@@ -44,8 +46,13 @@ def changed(before, after) -> dict:
     return {name: value for name, value in options(after).items() if value != old[name]}
 
 
+@functools.cache  # several tests look at one
+def composed(verb: str, *overrides: str) -> Any:
+    return compose(verb, list(overrides))
+
+
 def train(*overrides: str) -> TrainConfig:
-    return compose("train", list(overrides))
+    return composed("train", *overrides)
 
 
 def default_choices(verb: str) -> dict[str, str]:
@@ -75,7 +82,7 @@ def named_options(path: Path) -> dict:
 
 @pytest.mark.parametrize(("verb", "schema"), SCHEMAS.items())
 def test_without_presets_the_dataclasses_speak(verb, schema):
-    assert compose(verb, []) == schema()
+    assert composed(verb) == schema()
 
 
 def test_every_group_is_offered():
@@ -85,14 +92,14 @@ def test_every_group_is_offered():
 
 @pytest.mark.parametrize(("verb", "group", "choice"), CHOICES)
 def test_preset_sets_what_its_file_says(verb, group, choice):
-    composed = options(compose(verb, [f"{group}={choice}"]))
+    found = options(composed(verb, f"{group}={choice}"))
     named = named_options(preset(verb, group, choice))
-    assert {name: composed[name] for name in named} == named
+    assert {name: found[name] for name in named} == named
 
 
 @pytest.mark.parametrize(("verb", "group", "choice"), CHOICES)
 def test_preset_changes_something_unless_it_is_the_default(verb, group, choice):
-    config = compose(verb, [f"{group}={choice}"])
+    config = composed(verb, f"{group}={choice}")
     assert bool(changed(SCHEMAS[verb](), config)) == (choice != default_choices(verb)[group])
 
 

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import dataclasses
 
+import numpy as np
 import pytest
 
 from forcegrasp.diagnosis.add_effect import add_effect
 from forcegrasp.diagnosis.diagnose_set import diagnose_set
+from forcegrasp.diagnosis.law import find_law
 from forcegrasp.effects import get_effect
 from forcegrasp.errors import ConfigError, MeasurementError
 from forcegrasp.identify.fit_set import fit_model
 from forcegrasp.identify.fitted_model import model_of
 from forcegrasp.identify.loading import Loaded, load
+from forcegrasp.identify.verdict import Verdict
 from forcegrasp.measure import check_set
 from tests.independent.rig import record
 
@@ -48,9 +51,12 @@ def test_finds_what_was_hidden(tmp_path):
 
 
 def test_finds_nothing_where_nothing_is_hidden(tmp_path):
-    diagnosis = diagnosed(recorded(tmp_path, {}))
-    assert (diagnosis.verdict, diagnosis.effects) == ("explained", ())
+    diagnosis, simulators = diagnose_set(recorded(tmp_path, {}), None, [], 0, silent, law=True)
+    assert (diagnosis.verdict, diagnosis.effects, diagnosis.law) == ("explained", (), None)
     assert diagnosis.error_after < 1.1
+    # nor a law if one is looked for
+    doubted = dataclasses.replace(diagnosis, verdict=Verdict.UNKNOWN)
+    assert find_law(doubted, simulators, np.random.default_rng(1), silent) is None
 
 
 def test_does_not_name_an_effect_for_one_that_it_does_not_know(tmp_path):

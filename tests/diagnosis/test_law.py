@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from forcegrasp.diagnosis.diagnose_set import diagnose_set
-from forcegrasp.diagnosis.law import find_law
 from forcegrasp.diagnosis.law_terms import LIBRARY, along, terms
 from forcegrasp.effects.law import make_law
 from forcegrasp.errors import ConfigError
@@ -55,16 +54,6 @@ def test_it_is_told_in_words_and_as_data(bent):
     inside = bent.target.mask
     size = bent.law.law.formula_of.parameters["c1"].value
     np.testing.assert_allclose(added[inside], (size * force * abs(force))[inside], rtol=1e-9)
-
-
-def test_none_is_proposed_on_noise(tmp_path):
-    record(tmp_path / "set", {}, 2, 6, samples=100)
-    loaded = load(tmp_path / "set")
-    diagnosis, simulators = diagnose_set(loaded, None, ["force_bias"], 0, silent, law=True)
-    assert (diagnosis.verdict, diagnosis.law) == (Verdict.EXPLAINED, None)
-    # nor if it is looked for
-    doubted = dataclasses.replace(diagnosis, verdict=Verdict.UNKNOWN)
-    assert find_law(doubted, simulators, np.random.default_rng(1), silent) is None
 
 
 def test_every_term_does_something_and_is_small(made_up):

@@ -31,7 +31,7 @@ SMALLER = {
 }
 MORE = {
     "diagnose": ["effects=[backlash,force_deadzone]"],
-    "train": ["ppo.total_frames=2400", "ppo.grasps=8", "grasp.steps=30", "log.video_every=0", "log.figures_every=0"],
+    "train": ["ppo.total_frames=240", "ppo.grasps=8", "grasp.steps=30", "log.video_every=0", "log.figures_every=0"],
     "evaluate": ["trials=2", "kappas=1", "physics=fast", "grasp.steps=30"],
 }
 SECONDS = 3.0

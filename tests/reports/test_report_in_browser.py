@@ -126,14 +126,14 @@ def write(verb: str, made_up: Any, folder: Path) -> Path:
     return folder / "report.html"
 
 
-@pytest.fixture(params=["compare", "one_of", "unknown"])
-def report(request, made_up, tmp_path) -> Path:
-    return write(request.param, made_up, tmp_path)
-
-
 @pytest.fixture(scope="module")
 def diagnosed(made_up, tmp_path_factory) -> Path:
     return write("one_of", made_up, tmp_path_factory.mktemp("diagnosed"))
+
+
+@pytest.fixture(params=["compare", "one_of", "unknown"])
+def report(request, made_up, diagnosed, tmp_path) -> Path:
+    return diagnosed if request.param == "one_of" else write(request.param, made_up, tmp_path)
 
 
 def test_report(browser, report, made_up):

@@ -202,11 +202,9 @@ def evaluation(**means: float) -> dict:
 @pytest.fixture
 def results(tmp_path):
     """A folder of results: every stage ended, each policy with the rewards 100, 101 … of its seeds."""
-    out, asked = tmp_path / "results", stages(Settings(out=tmp_path / "results"))
+    out, asked, code = tmp_path / "results", stages(Settings(out=tmp_path / "results")), digests()
     for stage in asked.values():
-        note = Note(
-            [list(c) for c in stage.commands], dict.fromkeys(stage.needs, "now"), "c0ffee", digests()[stage.code]
-        )
+        note = Note([list(c) for c in stage.commands], dict.fromkeys(stage.needs, "now"), "c0ffee", code[stage.code])
         note.done, note.ended = len(note.commands), "now"
         Notes(out)._write(stage.name, note)
 

@@ -107,7 +107,7 @@ def equal(metrics) -> Callable[[RunDir, RunDir], bool]:
 
 @pytest.mark.parametrize(
     ("number", "action"),
-    [(1, ctrl_c), (2, ctrl_c), (4, ctrl_c), (1, terminate), (4, terminate), (1, hang_up), (3, preempt)],
+    [(1, hang_up), (2, ctrl_c), (3, preempt), (4, terminate)],
 )
 @pytest.mark.usefixtures("hang_ups_arrive")
 def test_after_a_signal(whole, run, equal, number, action):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import json
 import os
 import resource
@@ -25,6 +26,7 @@ def fork(work: Callable[[], int | None], said: Path | None = None) -> int:
     """
     sys.stdout.flush()
     sys.stderr.flush()
+    gc.freeze()  # lest the child's garbage collector goes through all that was imported, and copies it
     process = os.fork()
     if process:
         return process
