@@ -24,7 +24,7 @@ _NO_SURPRISE = 2.0
 #: It is worth a fit if it takes this share off the squares that a fit leaves beyond the noise.
 WORTH = 0.5
 # Fewer numbers do that take this share of what all would.
-_NEARLY = 0.9
+_NEARLY = 0.8
 # Readings bend with what is given: so many linear steps, or until they are this small.
 _STEPS, _SETTLED = 3, 0.1
 # What is moved together, the fewest numbers first.

@@ -5,12 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.signal import lfilter
 from scipy.sparse.csgraph import connected_components
 
 from forcegrasp.identify.fit import Fit
 
 #: Half width of a 95 % interval in standard errors.
 Z95 = 1.96
+# Residuals may lean on the reading before by so much; slower, they can't be told from a model's error.
+_SLOWEST = 0.95
 # Share of the range between its bounds up to which a parameter is at one.
 _AT_BOUND = 1e-3
 # Correlation of two parameters above which data don't tell them apart.
@@ -30,15 +33,35 @@ def standard_errors(fit: Fit, numerical: Sequence[np.ndarray] = ()) -> np.ndarra
 def chance_errors(fit: Fit) -> np.ndarray:
     """Standard errors of the fitted coordinates by chance alone, ``(p,)``.
 
-    The larger of two figures: white noise of the known size, and the scatter from grasp to grasp, which also sees
-    residuals that are correlated in time.
+    The largest of three figures: white noise of the known size; the scatter from grasp to grasp, which also sees
+    residuals that are correlated in time, but not of what few grasps tell; and noise as large as the residuals are, and
+    as correlated with the reading before.
     """
     inverse = fit.covariance()
     slopes = np.einsum("gskp,gsk->gp", fit.jacobian, fit.weight**2 * fit.residual, optimize=True)
     count, p = slopes.shape
     freedom = count / max(1, count - min(p, count - 1))
     by_grasp = inverse @ (slopes.T @ slopes * min(freedom, 4.0)) @ inverse
-    return np.sqrt(np.maximum(np.maximum(np.diag(inverse), np.diag(by_grasp)), 0.0))
+    with_memory = inverse @ _covariance_of_slope(fit) @ inverse
+    return np.sqrt(np.maximum.reduce([np.diag(inverse), np.diag(by_grasp), np.diag(with_memory), np.zeros(p)]))
+
+
+def _covariance_of_slope(fit: Fit) -> np.ndarray:
+    """Covariance of the cost's slope, ``(p, p)``, if noise is a first-order autoregression like the residuals.
+
+    The middle of the sandwich of Huber (1967) with that autocovariance in place of the residuals' own, which of a
+    parameter of a single grasp are orthogonal to its slopes.
+    """
+    total = np.zeros((len(fit.vector),) * 2)
+    for channel in range(fit.residual.shape[-1]):
+        slopes = fit.weight * fit.jacobian[:, :, channel]
+        left = fit.weight[..., 0] * fit.residual[..., channel]
+        squares = max(float(np.sum(left**2)), 1e-12)
+        leaning = float(np.clip(np.sum(left[:, 1:] * left[:, :-1]) / squares, 0.0, _SLOWEST))
+        sums = np.asarray(lfilter([1.0], [1.0, -leaning], slopes, axis=1))  # of all before, ever less of it
+        cross, inner = (np.einsum("gsp,gsq->pq", slopes, other, optimize=True) for other in (sums, slopes))
+        total += squares / max(1, np.count_nonzero(left)) * (cross + cross.T - inner)
+    return total
 
 
 def numerical_shifts(fit: Fit, numerical: Sequence[np.ndarray]) -> np.ndarray:

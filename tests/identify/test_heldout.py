@@ -248,6 +248,26 @@ def test_standard_errors_see_what_is_correlated_in_a_grasp():
     assert np.all(correlated > 3 * alone)
 
 
+@pytest.mark.parametrize("memory", [0.0, 0.7, 0.9])
+def test_intervals_hold_the_truth_under_noise_with_a_memory(memory):
+    """Of 95 % intervals about 95 % do: of a slow and a late response, of one in one grasp, of a fast one in two."""
+    rng, grasps, time = np.random.default_rng(1), np.arange(12)[:, None, None], np.arange(100)[None, :, None] / 100
+    slopes = np.zeros((12, 100, 4, 4))
+    slopes[..., 0] = np.sin(3 * time)
+    slopes[..., 1] = (time > 0.4) * (1 - time)
+    slopes[..., 2] = (grasps == 0) * np.exp(-(((time - 0.5) / 0.1) ** 2))
+    slopes[..., 3] = (grasps < 2) * np.gradient(np.exp(-(((time - 0.3) / 0.02) ** 2)), axis=1)
+    inside, draws = np.zeros(4), 300
+    for _ in range(draws):
+        noise = rng.standard_normal(slopes.shape[:3])
+        for sample in range(1, 100):
+            noise[:, sample] = memory * noise[:, sample - 1] + np.sqrt(1 - memory**2) * noise[:, sample]
+        found = np.linalg.lstsq(slopes.reshape(-1, 4), noise.ravel(), rcond=None)[0]
+        errors = standard_errors(fit_at(slopes, noise - slopes @ found))
+        inside += np.abs(found) < 1.96 * errors
+    assert np.all((inside / draws > 0.93) & (inside / draws < 0.99))
+
+
 def test_standard_errors_see_what_numerical_error_shifts():
     slopes, shift = random_slopes(4), np.array([0.01, -0.02, 0.0, 0.03])
     plain = standard_errors(fit_at(slopes, noise()))
