@@ -102,6 +102,20 @@ class Signatures:
         return list(found.values())
 
 
+def share_together(scores: Sequence[Score], fit: Fit, beyond: float) -> float:
+    """Share of the squares beyond the noise that signatures explain all together, of whatever size and sign.
+
+    Args:
+      scores: the best signature of each effect and variant.
+      fit: what they are signatures on.
+      beyond: sum of squares that it leaves beyond the noise.
+    """
+    signatures = np.stack([score.signature for score in scores], axis=1)
+    residual = (fit.weight * fit.residual).ravel()
+    sizes = np.linalg.lstsq(signatures, residual, rcond=1e-6)[0]
+    return float(residual @ signatures @ sizes) / max(beyond, 1e-9)
+
+
 def best_sizes(scores: Sequence[Score], study: Study, fit: Fit, background: Background) -> list[Score]:
     """The same effects with their first parameters at the sizes that minimise the residual, and what these gain.
 

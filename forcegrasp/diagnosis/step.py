@@ -12,6 +12,7 @@ from forcegrasp.diagnosis.evidence import (
     LEAST_RISE,
     LEAST_SHARE,
     LEAST_SHARE_OF_MANY,
+    LEAST_SHARE_TOGETHER,
     add_nothing,
     indistinguishable,
     is_beyond_chance,
@@ -22,7 +23,7 @@ from forcegrasp.diagnosis.noise_check import unexpected_noise
 from forcegrasp.diagnosis.other_starts import other_starts
 from forcegrasp.diagnosis.refine import refine
 from forcegrasp.diagnosis.result import Candidate, Step
-from forcegrasp.diagnosis.signatures import Background, Score, Signatures, null_gains
+from forcegrasp.diagnosis.signatures import Background, Score, Signatures, null_gains, share_together
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.diagnosis.verdict import explained_share
 from forcegrasp.effects import Effect
@@ -89,6 +90,9 @@ def look_further(
     if not ordered or not is_significant(ordered[0], start.least_gain, LEAST_SHARE_OF_MANY):
         return Step((), ordered, tuple(ranked), start.error, start.error)
     winner = ordered[0]
+    of_many = not is_significant(winner, start.least_gain)
+    if of_many and share_together(ranked, fit, start.beyond) < LEAST_SHARE_TOGETHER:
+        return Step((), ordered, tuple(ranked), start.error, start.error)
     # of those that can't be told apart the simplest comes first
     equal = sorted(
         [winner, *(c for c in ordered[1:] if c.effect.name not in redundant and indistinguishable(winner, c))],
@@ -96,7 +100,6 @@ def look_further(
     )
     ordered = (*equal, *(c for c in ordered if c not in equal))
     names = tuple(c.effect.name for c in equal)
-    of_many = not is_significant(winner, start.least_gain)
     return Step(names, ordered, tuple(ranked), start.error, equal[0].error_after, of_many)
 
 
@@ -117,8 +120,9 @@ class _Start:
         #: of noise that is not as was assumed: its size ÷ that, ``(C,)``, and its memory, for :func:`null_gains`
         self.noise = None if noise is None else np.maximum(noise.ratio, 1.0)
         self.memory = None if noise is None else (noise.memory, self.held.shape[1])
-        beyond = excess(self.held, study.numerical, study.target)
-        self.least_gain = LEAST_GAIN if beyond else LEAST_GAIN_AT_FLOOR
+        left = excess(self.held, study.numerical, study.target)
+        self.least_gain = LEAST_GAIN if left else LEAST_GAIN_AT_FLOOR
+        self.beyond = fit.cost - study.target.cost_of_noise  #: sum of squares beyond the noise
 
     def place(self, candidate: Candidate) -> tuple[bool, float]:
         """See :func:`.evidence.place`."""
@@ -128,9 +132,10 @@ class _Start:
         """What a signature must gain for its effect to be worth a fit."""
         if not groups:
             return np.inf
-        beyond = self._fit.cost - self._study.target.cost_of_noise
         best = max(group[0].gain for group in groups)
-        return max(float(np.quantile(null, 1 - ALARM)), _MIN_GAIN_RATIO * best, _MAX_GAIN_FACTOR * LEAST_SHARE * beyond)
+        return max(
+            float(np.quantile(null, 1 - ALARM)), _MIN_GAIN_RATIO * best, _MAX_GAIN_FACTOR * LEAST_SHARE * self.beyond
+        )
 
     def refit(self, scores: Sequence[Score], null: np.ndarray) -> list[Candidate]:
         """Rough fits with one more effect, from where the best signatures put them."""

@@ -12,6 +12,7 @@ import pytest
 from forcegrasp.diagnosis import search
 from forcegrasp.diagnosis.evidence import LEAST_SHARE_OF_MANY, indistinguishable, is_significant, place
 from forcegrasp.diagnosis.result import Diagnosis, Step, settle_ties
+from forcegrasp.diagnosis.signatures import share_together
 from forcegrasp.diagnosis.verdict import conclude, explained_share
 from forcegrasp.effects import get_effect
 from forcegrasp.effects.setting import EffectSetting
@@ -118,6 +119,15 @@ def test_what_explains_far_less_is_no_rival(made_up, share, winners, equal):
     winner = candidate(made_up, gains=np.full(4, 100.0), share=winners, signature=np.array([1.0, 0.0]))
     other = candidate(made_up, gains=np.full(4, 101.0), share=share, signature=np.array([0.0, 1.0]))
     assert indistinguishable(winner, other) == equal
+
+
+def test_signatures_explain_together_what_lies_in_their_span():
+    rng = np.random.default_rng(0)
+    one, other, unknown = np.linalg.qr(rng.normal(size=(200, 3)))[0].T
+    residual = 30 * one - 20 * other + 10 * unknown
+    fit = cast(Any, SimpleNamespace(weight=np.ones(1), residual=residual))
+    scores = [cast(Any, SimpleNamespace(signature=s)) for s in (one, other, one)]  # twice the same adds nothing
+    assert share_together(scores, fit, 1400.0) == pytest.approx(1300 / 1400)
 
 
 def test_a_rival_that_is_found_besides_is_none():
