@@ -61,6 +61,10 @@ def check(config: TrainConfig) -> TrainConfig:
         from forcegrasp.train.cluster import find_ray
 
         find_ray()
+    if config.start:
+        from forcegrasp.train.warm_start import read_start
+
+        read_start(config)
     return config
 
 

@@ -29,7 +29,8 @@ class TrainConfig:
 
     seed: int = option(0, "seed of everything random", low=0, high=2**31 - 1)
     gripper: str = option(DEFAULT_GRIPPER, "gripper by name, or the path of a description")
-    model: str = option("", "model file of forcegrasp fit or add: train with its effects, within fitted intervals")
+    model: str = option("", "file of forcegrasp fit or add: its effects, within fitted intervals")
+    start: str = option("", "run or shipped policy whose networks the training begins with")
     randomise: str = option(
         "auto",
         "robots to train on, see docs/robots.md; auto: model, if there is one",

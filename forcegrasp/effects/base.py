@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -205,6 +206,7 @@ class Effect:
         return STAGES.index(self.stage), self.order
 
     @classmethod
+    @functools.cache
     def index(cls, parameter: str) -> int:
         """Which of the parameters has that name in the class that defines the effect."""
         return [p.name for p in cls.parameters].index(parameter)

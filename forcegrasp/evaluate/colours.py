@@ -14,6 +14,7 @@ KNOWN = {
     "no_ib": "#d55e00",
     "no_rand": "#009e73",
     "force_pi": "#cc79a7",
+    "catalogue": "#117733",
     "ib_virtual_robot": "#e69f00",
     "ib_virtual_robot_measured": "#56b4e9",
     "informed": "#999933",

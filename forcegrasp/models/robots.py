@@ -99,8 +99,7 @@ def population(gripper: Gripper, count: int) -> Robots:
 class DrawnRobots:
     """Another robot from the prior for every grasp.
 
-    Every effect is attached to every row and is null where a robot has it not, which changes no bit: rows keep their
-    effects' memory whichever others are reset.
+    Effects are attached to the rows whose robots have them, anew with each draw; other rows keep their effects' memory.
 
     Args:
       gripper: whose robots they are.
@@ -111,21 +110,35 @@ class DrawnRobots:
 
     def attach(self, plant: Plant) -> None:
         """Prepares a plant, once."""
+        self._plant, self._attached = plant, {}
         self.readings = np.zeros((plant.n, 4))  #: see :attr:`Robots.readings`, ``(rows, 4)``
-        self._effects: list[Effect] = []
-        for effect, prior in _possible(self.gripper):
-            largest = np.array([_range(effect, p, prior)[1] for p in effect.parameters])
-            values = np.repeat(effect.null_values()[None], plant.n, axis=0)
-            self._effects += [effect(values.copy(), plant.dt, variant, largest) for variant in effect.variants]
-        plant.attach([(effect, np.arange(plant.n)) for effect in self._effects])
+        kinds = [(e, variant, prior) for e, prior in _possible(self.gripper) for variant in e.variants]
+        self._settings = [EffectSetting(e, v, np.repeat(e.null_values()[None], plant.n, axis=0)) for e, v, _ in kinds]
+        self._largest = [np.array([_range(e, p, prior)[1] for p in e.parameters]) for e, _, prior in kinds]
 
     def draw(self, rng: np.random.Generator, ids: np.ndarray) -> dict[str, np.ndarray]:
         """Draws robots for these rows, and returns their base parameters, each ``(len(ids),)``."""
         robots = draw_robots(self.gripper, rng, len(ids))
-        for effect, setting in zip(self._effects, robots.effects, strict=True):
-            effect.values[ids] = setting.values
+        for own, drawn in zip(self._settings, robots.effects, strict=True):
+            own.values[ids] = drawn.values
         self.readings[ids] = robots.readings
+        self._attach(ids)
         return robots.base
+
+    def _attach(self, ids: np.ndarray) -> None:
+        """Attaches the effects that there are now; rows other than these keep their memory."""
+        plant, before, self._attached = self._plant, self._attached, {}
+        for number, (setting, largest) in enumerate(zip(self._settings, self._largest, strict=True)):
+            rows = np.flatnonzero(_present(setting))
+            if len(rows):
+                effect = setting.effect(setting.values[rows], plant.dt, setting.variant, largest)
+                self._attached[number] = effect, rows
+        plant.attach(list(self._attached.values()))
+        for number, (effect, rows) in self._attached.items():
+            if (kept := ~np.isin(rows, ids)).any():
+                old, old_rows = before[number]
+                for name, values in old.state.items():
+                    effect.state[name][kept] = values[np.isin(old_rows, rows[kept])]
 
 
 class FixedRobots:

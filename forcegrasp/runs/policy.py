@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from torch import Tensor
 from torchrl.modules import ProbabilisticActor
 
 from forcegrasp.config import TrainConfig
@@ -24,11 +25,7 @@ def load_policy(name: Path | str) -> tuple[ProbabilisticActor, TrainConfig]:
     Raises:
       CheckpointError: if there is no such policy or run, or its checkpoint is of another configuration.
     """
-    path = FOLDER / str(name) if str(name) in shipped_policies() else Path(name)
-    one = path.suffix == ".safetensors"
-    run = RunDir.open(path.parent.parent if one else path)
-    config = run.config()
-    tensors, _ = run.load_file(path) if one else run.load()
+    tensors, config = read_trained(name)
     policy = policy_of(config, load_gripper(config.gripper))
     weights = {key.removeprefix("policy."): t for key, t in tensors.items() if key.startswith("policy.")}
     try:
@@ -36,3 +33,16 @@ def load_policy(name: Path | str) -> tuple[ProbabilisticActor, TrainConfig]:
     except RuntimeError as error:
         raise CheckpointError(f"{name}: the checkpoint's weights do not fit its config.yaml") from error
     return policy.eval(), config
+
+
+def read_trained(name: Path | str) -> tuple[dict[str, Tensor], TrainConfig]:
+    """Returns all that a checkpoint holds, and the configuration it was trained with. The name is as above.
+
+    Raises:
+      CheckpointError: if there is no such policy or run, or its checkpoint is of another configuration.
+    """
+    path = FOLDER / str(name) if str(name) in shipped_policies() else Path(name)
+    one = path.suffix == ".safetensors"
+    run = RunDir.open(path.parent.parent if one else path)
+    config = run.config()
+    return (run.load_file(path) if one else run.load())[0], config

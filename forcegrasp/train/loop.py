@@ -35,6 +35,7 @@ from forcegrasp.train.collector import (
 )
 from forcegrasp.train.logging import TrainingLog
 from forcegrasp.train.stop import stop_signals
+from forcegrasp.train.warm_start import read_start
 
 
 class Trainer:
@@ -131,6 +132,8 @@ def _train(config: TrainConfig, run: RunDir, resume: bool) -> bool:
     total = algorithm.total_frames
     if resume and run.has_checkpoint:
         trainer.restore(*run.load())
+    elif config.start:
+        trainer.algorithm.begin_with(read_start(config))
     batch = None
     with (
         collecting(trainer.next_batch),

@@ -101,6 +101,7 @@ TRAIN_CASES: dict[str, Any] = {
     "seed": 1,
     "gripper": "franka_hand",
     "model": str(MODEL),
+    "start": "ib",
     "randomise": "catalogue",
     "learner": "sac",
     **SHARED_CASES,
@@ -335,7 +336,11 @@ def test_the_same_evaluation_finds_the_same(tmp_path, plain_evaluation, learned)
 
 @pytest.mark.parametrize(
     "name",
-    [n for n in TRAIN_CASES if n not in ("reward.forces", *TEACHING, *ELSEWHERE, *RAY) and not n.startswith(OTHERWISE)],
+    [
+        n
+        for n in TRAIN_CASES
+        if n not in ("start", "reward.forces", *TEACHING, *ELSEWHERE, *RAY) and not n.startswith(OTHERWISE)
+    ],
 )
 def test_option_of_train(name, tmp_path, plain_training):
     different = trained(tmp_path, **{name: TRAIN_CASES[name]})
@@ -350,6 +355,12 @@ def plain_sac(tmp_path_factory):
 @pytest.mark.parametrize("name", [name for name in TRAIN_CASES if name.startswith("sac.")])
 def test_option_of_sac(name, tmp_path, plain_sac):
     assert trained(tmp_path, learner="sac", **{name: TRAIN_CASES[name]}) != plain_sac
+
+
+def test_option_start_of_train(tmp_path):
+    network = {"ppo.hidden": [50, 50]}
+    plain = trained(tmp_path / "plain", **network)
+    assert trained(tmp_path / "other", **network, start=TRAIN_CASES["start"]) != plain
 
 
 class JoinedError(Exception):

@@ -185,8 +185,22 @@ def test_sac_learns_the_task_of_recommended():
     assert task == {"learner", "observation.frames", "curriculum.enabled", "log.checkpoint_every", "collector.ahead"}
 
 
-def test_catalogue_differs_from_recommended_in_the_robots_alone():
-    assert changed(train("experiment=recommended"), train("experiment=catalogue")) == {"randomise": "catalogue"}
+def test_catalogue_differs_from_no_ib_in_what_its_file_says():
+    assert changed(train("experiment=no_ib"), train("experiment=catalogue")) == {
+        "randomise": "catalogue",
+        "observation.frames": 10,
+        "reward.form": "goal_normalised",
+        "reward.overshoot_weight": 0.05,
+        "curriculum.enabled": False,
+        "ppo.total_frames": 3_500_000,
+        "ppo.grasps": 512,
+        "ppo.hidden": [100, 100],
+        "ppo.log_std": -2.0,
+        "ppo.epochs": 3,
+        "ppo.minibatch": 768,
+        "ppo.learning_rate": 4e-4,
+        "collector.ahead": False,
+    }
 
 
 @pytest.mark.parametrize(

@@ -82,6 +82,26 @@ def test_a_robot_drawn_for_a_row_acts_as_the_same_one_given():
     np.testing.assert_array_equal(again, forces(pair, 2, np.arange(2)))
 
 
+def test_robots_drawn_anew_leave_the_others_as_they_were():
+    """Rows that are not reset go on as if nothing had happened, whatever the new ones have."""
+    some, others = np.array([1, 4]), np.array([0, 2, 3, 5])
+
+    def go_on(anew: bool) -> np.ndarray:
+        simulator = GraspSimulator(6, "fast", 1, DrawnRobots(default_gripper()), default_gripper())
+        simulator.reset(simulator.parameters, None, np.random.default_rng(8))
+        found = []
+        for step in range(50):
+            if anew and step in (10, 25):
+                simulator.reset(simulator.parameters[some], some, np.random.default_rng(step))
+            simulator.step(np.full((6, 2), -0.002))
+            found.append(np.concatenate([simulator.measured_force, simulator.measured_position], axis=1))
+        return np.array(found)
+
+    disturbed, plain = go_on(True), go_on(False)
+    np.testing.assert_array_equal(disturbed[:, others], plain[:, others])
+    assert (disturbed[11:, some] != plain[11:, some]).any(axis=(0, 2)).all()
+
+
 @pytest.mark.parametrize("parameter", range(2))
 def test_mass_and_friction_of_the_object_count(parameter):
     robots = plain()

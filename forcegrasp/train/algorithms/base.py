@@ -12,7 +12,11 @@ from torchrl.envs import TransformedEnv
 
 from forcegrasp.config import TrainConfig
 from forcegrasp.controllers.policy import policy_of
+from forcegrasp.errors import CheckpointError
 from forcegrasp.physics.gripper import Gripper
+
+#: How the policy's standard deviation is named.
+DEVIATION = "state_independent_scale"
 
 
 class Algorithm(ABC):
@@ -35,6 +39,8 @@ class Algorithm(ABC):
     ADVICE: ClassVar[str]
     #: Whether updates draw from torch's own generator, as collecting does: then the two take turns.
     DRAWS: ClassVar[bool] = False
+    #: How the names of its networks begin in :meth:`state_dict`.
+    NETWORKS: ClassVar[tuple[str, ...]] = ("policy.",)
     #: Of all that learns; its moments are saved.
     optimizer: torch.optim.Optimizer
 
@@ -71,6 +77,21 @@ class Algorithm(ABC):
             index, moment = key.split(".")
             optimizer["state"].setdefault(int(index), {})[moment] = value
         self.optimizer.load_state_dict(optimizer)
+
+    def begin_with(self, tensors: dict[str, Tensor]) -> None:
+        """Takes over the networks of another training, where it has them and they are of this shape.
+
+        The deviation stays that of the options: a policy that has learned explores too little to learn anew.
+
+        Raises:
+          CheckpointError: if the policy's weights are of another network.
+        """
+        own = self.state_dict()
+        wanted = {k: v for k, v in own.items() if k.startswith(self.NETWORKS) and not k.endswith(DEVIATION)}
+        taken = {k: tensors[k] for k, v in wanted.items() if k in tensors and tensors[k].shape == v.shape}
+        if any(name.startswith("policy.") for name in wanted.keys() - taken.keys()):
+            raise CheckpointError("start: its weights do not fit its config.yaml")
+        self.load_state_dict(own | taken)
 
 
 def part_of(tensors: dict[str, Tensor], prefix: str) -> dict[str, Tensor]:

@@ -84,6 +84,7 @@ class PPO(Algorithm):
             "losses": ("ppo/loss_objective", "ppo/loss_critic"),
         }
     }
+    NETWORKS = ("policy.", "value.")
     ADVICE = """in trainings that went well `kl_approx` stayed below 0.02 and `clip_fraction` below 0.2 (0.06 and
   0.35 with `budget=quick`); `action_std` and `entropy` fall as the policy makes up its mind; `ESS` is the effective
   share of a minibatch"""

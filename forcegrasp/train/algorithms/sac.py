@@ -41,6 +41,7 @@ class SAC(Algorithm):
     ADVICE = """`entropy` should come to the motors' number times `sac.entropy_target`, and `alpha`, its weight, settle;
   `loss_actor` is about minus the value, so it falls as the policy improves; `buffer` counts the transitions kept"""
 
+    NETWORKS = ("policy.", "loss.qvalue", "loss.target_qvalue")
     DRAWS = True
 
     def __init__(self, config: TrainConfig, env: TransformedEnv, gripper: Gripper) -> None:
