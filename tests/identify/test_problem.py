@@ -111,6 +111,8 @@ def test_a_vector_is_a_model(problem):
         "force_scale": [1.5, 3, 1.5, 3],
         "radius_m": [0.02, 0.031, 0.021, 0.03],
         "offset_m": [0.001, -0.003, 0.002, 0.004],
+        "readout_skew_s": [0] * 4,
+        "force_skew_s": [0] * 4,
     }
     assert {*case.base} == {*expected}
     for name, values in expected.items():
