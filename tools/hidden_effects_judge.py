@@ -52,12 +52,10 @@ def judge(row: dict, right: set[str]) -> str:
     if group in ("two", "several", "messy"):
         return _judge_several(row, right)
     matches = families(right) if group in BY_FAMILY else right
-    said = [families([name]) if group in BY_FAMILY else {name} for name in named]
-    if verdict != "one_of":
-        said = said[:1]
-    elif any(one & matches for one in said[1:]) and not said[0] & matches:
-        return "in set"
-    return "first" if said and said[0] & matches else "wrong" if named else "missed"
+    hits = [bool(matches & (families([name]) if group in BY_FAMILY else {name})) for name in named]
+    if any(hits[:1]):
+        return "first"
+    return "in set" if verdict == "one_of" and any(hits) else "wrong" if named else "missed"
 
 
 def _judge_several(row: dict, right: set[str]) -> str:

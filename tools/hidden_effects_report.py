@@ -56,7 +56,7 @@ def _at_floor(rows: list[dict]) -> str:
 def _several_lines(what: str, rows: list[dict]) -> list[str]:
     """How many of the hidden effects are named, and how many of the names are right."""
     hidden = [name in named_of(r, set(r["right"])) for r in rows for name in r["right"]]
-    named = [k >= len(false_names(r, set(r["right"]))) for r in rows for k in range(len(steps_of(r)))]
+    named = [step[0] not in false_names(r, set(r["right"])) for r in rows for step in steps_of(r)]
     return [
         f"| {what}: share of them that is named | {_rate(hidden)} |",
         f"| … share of names that are right | {_rate(named)} |",

@@ -69,7 +69,7 @@ def diagnose(
         progress(f"found {rounding.effect.name}: readings are multiples of one step")
         steps.append(Step((rounding.effect.name,), (), (), error_before, rms(study.heldout(fit), target)))
     signatures = Signatures(effects, study)
-    believed: tuple[list[Step], Fit, Target, Study] | None = None  # what is, if the rest explains too little in the end
+    believed: tuple[list[Step], Fit, Study] | None = None  # what is, if the rest explains too little in the end
     for _ in range(MOST_EFFECTS):
         known, dropped = {setting.effect for setting in fit.problem.effects}, {step.replaces for step in steps}
         untried = [
@@ -84,12 +84,8 @@ def diagnose(
             steps.append(step)
             break
         if step.of_many and believed is None:
-            believed = (
-                [*steps, dataclasses.replace(step, effects=(), error_after=step.error_before)],
-                fit,
-                target,
-                study,
-            )
+            nothing = dataclasses.replace(step, effects=(), error_after=step.error_before)
+            believed = [*steps, nothing], fit, study
         progress(f"found {step.effects[0]}: held-out error {step.error_before:.2f} → {step.error_after:.2f} × noise")
         weighed, fit = reweigh(target, step.candidates[0].fit, simulators)
         if weighed is not target:
@@ -98,8 +94,9 @@ def diagnose(
         steps.append(step)
         if not _left(study, fit)[0]:
             break
-    if believed is not None and not _convincing(believed[-1], believed[1], study, fit):
-        steps, fit, target, study = believed
+    if believed is not None and not _convincing(believed[2], believed[1], study, fit):
+        steps, fit, study = believed
+        target = study.target
     error_after, (left, noise) = rms(study.heldout(fit), target), _left(study, fit)
     steps = settle_ties(steps)
     found = kept_steps(steps)

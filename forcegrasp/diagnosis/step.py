@@ -87,12 +87,10 @@ def look_further(
     for candidate in sorted(candidates, key=start.place):
         best.setdefault(candidate.effect.name, candidate)  # of several variants the best one
     ordered, redundant = start.refine_on_reference_tier(tuple(best.values()))
-    if not ordered or not is_significant(ordered[0], start.least_gain, LEAST_SHARE_OF_MANY):
+    of_many = bool(ordered) and not is_significant(ordered[0], start.least_gain)
+    if not ordered or (of_many and not start.may_be_of_many(ordered[0], ranked)):
         return Step((), ordered, tuple(ranked), start.error, start.error)
     winner = ordered[0]
-    of_many = not is_significant(winner, start.least_gain)
-    if of_many and share_together(ranked, fit, start.beyond) < LEAST_SHARE_TOGETHER:
-        return Step((), ordered, tuple(ranked), start.error, start.error)
     # of those that can't be told apart the simplest comes first
     equal = sorted(
         [winner, *(c for c in ordered[1:] if c.effect.name not in redundant and indistinguishable(winner, c))],
@@ -127,6 +125,13 @@ class _Start:
     def place(self, candidate: Candidate) -> tuple[bool, float]:
         """See :func:`.evidence.place`."""
         return place(candidate, self.least_gain)
+
+    def may_be_of_many(self, candidate: Candidate, ranked: Sequence[Score]) -> bool:
+        """Whether an effect that explains little is worth a trial: all signatures together must promise enough."""
+        return (
+            is_significant(candidate, self.least_gain, LEAST_SHARE_OF_MANY)
+            and share_together(ranked, self._fit, self.beyond) >= LEAST_SHARE_TOGETHER
+        )
 
     def refit_threshold(self, groups: Sequence[Sequence[Score]], null: np.ndarray) -> float:
         """What a signature must gain for its effect to be worth a fit."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -62,8 +62,8 @@ class _Number:
 class Moved:
     """By how much what is given was moved."""
 
-    numbers: tuple[_Number, ...] = ()
-    deviations: np.ndarray = field(default_factory=lambda: np.zeros(0))  #: moves ÷ standard deviation, ``(numbers,)``
+    numbers: tuple[_Number, ...]
+    deviations: np.ndarray  #: moves ÷ standard deviation, ``(numbers,)``
 
     @property
     def moves(self) -> dict[str, float]:
