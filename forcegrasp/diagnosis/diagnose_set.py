@@ -22,7 +22,6 @@ from forcegrasp.identify.fit import Fit, Simulators
 from forcegrasp.identify.loading import Loaded
 from forcegrasp.identify.progress import Progress
 from forcegrasp.identify.target import Target
-from forcegrasp.identify.verdict import Verdict
 from forcegrasp.measure import MeasurementSet
 from forcegrasp.models.model_file import Model
 from forcegrasp.physics.gripper import Gripper
@@ -65,12 +64,8 @@ def diagnose_set(
     def as_said() -> tuple[Diagnosis, Simulators]:
         target, simulators, base = said
         found = search(target, simulators, base)
-        if not found.left or found.verdict is Verdict.NOT_FITTED or found.verdict is Verdict.DATA:
-            return found, simulators
-        return go_on_with_moved(found, loaded, lambda t, s, fit, steps: search(t, s, base, (fit, steps)), progress) or (
-            found,
-            simulators,
-        )
+        further = go_on_with_moved(found, loaded, lambda t, s, fit, steps: search(t, s, base, (fit, steps)), progress)
+        return further or (found, simulators)
 
     said = fitted(loaded)
 

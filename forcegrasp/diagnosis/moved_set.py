@@ -16,6 +16,7 @@ from forcegrasp.identify.noise_floor import beyond_fit
 from forcegrasp.identify.problem import Problem
 from forcegrasp.identify.progress import Progress
 from forcegrasp.identify.target import Target
+from forcegrasp.identify.verdict import Verdict
 from forcegrasp.measure import MeasurementSet
 
 #: Searches on from a fit and the steps that found its effects.
@@ -25,18 +26,20 @@ SearchOn = Callable[[Target, Simulators, Fit, Sequence[Step]], Diagnosis]
 def go_on_with_moved(
     found: Diagnosis, loaded: Loaded[MeasurementSet], search_on: SearchOn, progress: Progress
 ) -> tuple[Diagnosis, Simulators] | None:
-    """The diagnosis of a set whose givens were moved within their tolerance; None if held-out grasps ask for no move.
+    """The diagnosis of a set whose givens were moved within their tolerance; None if nothing asks for a move.
 
     A hidden effect hides what is a little off besides, until it is in the model. What was taken for an effect may then
     have been the objects' sizes: effects that are no longer needed are left out.
 
     Args:
-      found: that left more than noise.
+      found: of the set as it is.
       loaded: the set.
       search_on: looks for further effects.
       progress: told what is going on.
     """
-    fault = None if loaded.gripper.is_servo else within_tolerance(loaded, found.target, found.fit, LEAST_SHARE)
+    if not found.left or loaded.gripper.is_servo or found.verdict in (Verdict.NOT_FITTED, Verdict.DATA):
+        return None
+    fault = within_tolerance(loaded, found.target, found.fit, LEAST_SHARE)
     if fault is None or fault.moved is None:
         return None
     progress(f"fitting with {fault.words}")

@@ -71,17 +71,27 @@ class Suction(Effect):
         return -self.pull * (s.depth > 0)
 
 
+class _TwoPoles:
+    """A filter of two equal poles; it is as late as one of the whole time constant."""
+
+    def __init__(self, time_constant: float) -> None:
+        self._first, self._second = Lag(time_constant / 2), Lag(time_constant / 2)
+
+    def __call__(self, value: np.ndarray) -> np.ndarray:
+        return self._second(self._first(value))
+
+
 @dataclass
 class SecondOrderDrive(Effect):
-    """A set point filter of two poles; it is as late as one of the whole time constant."""
+    """A set point filter of two poles."""
 
     time_constant: float = 0.0  # s
 
     def start(self, n, rng):
-        self._first, self._second = Lag(self.time_constant / 2), Lag(self.time_constant / 2)
+        self._lag = _TwoPoles(self.time_constant)
 
     def setpoint(self, setpoint, s):
-        return self._second(self._first(setpoint))
+        return self._lag(setpoint)
 
 
 @dataclass
@@ -91,10 +101,10 @@ class SecondOrderSensor(Effect):
     time_constant: float = 0.0  # s
 
     def start(self, n, rng):
-        self._first, self._second = Lag(self.time_constant / 2), Lag(self.time_constant / 2)
+        self._lag = _TwoPoles(self.time_constant)
 
     def force(self, f, s):
-        return self._second(self._first(f))
+        return self._lag(f)
 
 
 @dataclass
@@ -195,8 +205,7 @@ class SoftRate(Effect):
     def setpoint(self, setpoint, s):
         if self._at is None or np.isinf(self.speed):
             self._at = setpoint
+            return setpoint
         wanted = (setpoint - self._at) / self.time_constant
-        self._at = (
-            self._at + STEP_S * self.speed * np.tanh(wanted / self.speed) if np.isfinite(self.speed) else setpoint
-        )
+        self._at = self._at + STEP_S * self.speed * np.tanh(wanted / self.speed)
         return self._at

@@ -60,7 +60,13 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--json", type=Path, help="file to write, as soon as a part is measured")
     parser.add_argument("--figure", nargs="?", type=Path, const=FIGURE, help=f"to draw ({FIGURE.relative_to(ROOT)})")
     parser.add_argument("--from", type=Path, dest="source", help="JSON of an earlier run: measure nothing")
-    parser.add_argument("--history", nargs="?", type=Path, const=HISTORY, help=f"({HISTORY.relative_to(ROOT)})")
+    parser.add_argument(
+        "--history",
+        nargs="?",
+        type=Path,
+        const=HISTORY,
+        help=f"file to add the ratios to ({HISTORY.relative_to(ROOT)})",
+    )
     parser.add_argument("--check", nargs="?", type=Path, const=HISTORY, help="a history, and measure nothing")
     options = parser.parse_args(arguments)
     if options.source and not options.source.is_file():
