@@ -13,10 +13,11 @@ from types import FrameType
 from mujoco.batch import Batch
 
 from forcegrasp.cli.measuring import refuse_table
-from forcegrasp.diagnosis import signatures, step
+from forcegrasp.diagnosis import needless, odd_grasps, signatures, step, tolerance
 from forcegrasp.diagnosis.diagnose_set import diagnose_set
 from forcegrasp.diagnosis.refine import refine
 from forcegrasp.identify.base_fit import fit_base
+from forcegrasp.identify.cross_validation import heldout_residual
 from forcegrasp.identify.loading import load
 from forcegrasp.identify.noise_floor import numerical_error
 from forcegrasp.replay import replay
@@ -30,6 +31,11 @@ PARTS = {
     signatures.best_sizes.__code__: "sizes around the best signatures",
     refine.__code__: "rough fits with one more effect",
     step._Start.refine_on_reference_tier.__code__: "fits of the best ones to the end",
+    step._Start.refit_richer.__code__: "fits with richer effects in place of known ones",
+    needless.drop_needless.__code__: "fits without known effects",
+    heldout_residual.__code__: "held-out grasps",
+    odd_grasps.odd_grasps.__code__: "odd grasps",
+    tolerance.move_given.__code__: "tolerances",
 }
 
 
@@ -82,7 +88,7 @@ def main() -> None:
     print(f"{diagnosis.verdict} {', '.join(diagnosis.effects)}: {wall:.0f} s, {processor:.0f} s of processor time")
     for name, seconds in sorted(spent.items(), key=lambda item: -item[1]):
         print(f"  {seconds / processor:4.0%}  {seconds:5.1f} s  {grasps[name]:6,} grasps  {name}")
-    print(f"  {1 - sum(spent.values()) / processor:4.0%}  the rest: sensors, linear algebra, held-out grasps")
+    print(f"  {1 - sum(spent.values()) / processor:4.0%}  the rest: sensors, linear algebra")
     print(f"{engine[0] / processor:.0%} of it in MuJoCo")
 
 

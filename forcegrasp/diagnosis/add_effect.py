@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from forcegrasp.diagnosis.refine import refine
-from forcegrasp.diagnosis.signatures import Background, Signatures
+from forcegrasp.diagnosis.signatures import Background, Signatures, trials
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.effects import Effect
 from forcegrasp.errors import ConfigError
@@ -53,9 +53,9 @@ def add_effect(loaded: Loaded[MeasurementSet], model: Model, effect: type[Effect
     if target.rounding is not None and is_rounding(effect):  # it is in the noise already
         same = model_of(before, target, loaded, numerical_error(before, target))
         return Added(target, before, before, rms(target.before_rounding(held), target), rms(held, target), same)
-    background, signatures = Background(before, []), Signatures([effect], study)
-    signatures.simulate(before, [effect])
-    scores = [group[0] for group in signatures.scores(before, background, [effect])]
+    background, signatures, tried = Background(before, []), Signatures(study), trials([effect])
+    signatures.simulate(before, tried)
+    scores = [group[0] for group in signatures.scores(before, background, tried)]
     if not scores:
         raise ConfigError(
             f"effect={effect.name}: leaves no trace in these data at any size; record grasps that show it"

@@ -16,7 +16,7 @@ from forcegrasp.effects import Effect
 from forcegrasp.effects.base import Nested
 from forcegrasp.effects.for_gripper import effect_of
 from forcegrasp.effects.setting import EffectSetting
-from forcegrasp.identify.fit import Fit, fit_exactly
+from forcegrasp.identify.fit import Fit, fit_exactly, fit_once
 from forcegrasp.identify.predict import predict
 from forcegrasp.identify.problem import Problem
 from forcegrasp.physics.gripper import Gripper
@@ -82,23 +82,47 @@ def refit_as_richer(container: type[Effect], fit: Fit, without: str, study: Stud
     return _refit(richer(known, container), fit, without, study)
 
 
+def roughly_as_richer(container: type[Effect], fit: Fit, without: str, study: Study) -> Fit:
+    """The same by the cheap model."""
+    known = next(one for one in fit.problem.case(fit.vector).effects if one.effect.name == without)
+    problem, start = _best_start(richer(known, container), fit, without, study)
+    return fit_once(study.target, problem, study.simulators, start, fit.correction, rounds=0)
+
+
 def refit_without(name: str, fit: Fit, study: Study) -> Fit:
     """Fits a model that lacks one of the effects, from where the model stands."""
-    kept, start = _without(name, fit)
-    problem = Problem(fit.problem.gripper, fit.problem.grasps, kept)
-    return fit_exactly(study.target, problem, study.simulators, np.array(start))
+    problem, start, slopes = _problem_without(name, fit)
+    return fit_exactly(study.target, problem, study.simulators, start, slopes)
 
 
-def _without(name: str, fit: Fit) -> tuple[list[EffectSetting], list[float]]:
-    """The other effects of a fit, and the coordinates of all but this one."""
+def roughly_without(name: str, fit: Fit, study: Study) -> Fit:
+    """The same by the cheap model."""
+    problem, start, _ = _problem_without(name, fit)
+    return fit_once(study.target, problem, study.simulators, start, fit.correction, rounds=0)
+
+
+def _problem_without(name: str, fit: Fit) -> tuple[Problem, np.ndarray, np.ndarray]:
+    """The problem without one of the effects, where the fit stands in it, and its slopes there."""
+    kept, places = _without(name, fit)
+    return Problem(fit.problem.gripper, fit.problem.grasps, kept), fit.vector[places], fit.jacobian[..., places]
+
+
+def _without(name: str, fit: Fit) -> tuple[list[EffectSetting], list[int]]:
+    """The other effects of a fit, and the indices of all coordinates but those of this one."""
     case = fit.problem.case(fit.vector)
     gone = [i for i, one in enumerate(case.effects) if one.effect.name == name]
-    start = [x for x, entry in zip(fit.vector, fit.problem.entries, strict=True) if entry.effect not in gone]
-    return [one for one in case.effects if one.effect.name != name], start
+    places = [i for i, entry in enumerate(fit.problem.entries) if entry.effect not in gone]
+    return [one for one in case.effects if one.effect.name != name], places
 
 
 def _refit(settings: Sequence[EffectSetting], fit: Fit, without: str, study: Study) -> Fit:
-    kept, base = _without(without, fit)
+    problem, start = _best_start(settings, fit, without, study)
+    return fit_exactly(study.target, problem, study.simulators, start)
+
+
+def _best_start(settings: Sequence[EffectSetting], fit: Fit, without: str, study: Study) -> tuple[Problem, np.ndarray]:
+    kept, places = _without(without, fit)
+    base = fit.vector[places]
     problems = [Problem(fit.problem.gripper, fit.problem.grasps, [*kept, setting]) for setting in settings]
     starts = [np.r_[base, problem.start()[len(base) :]] for problem in problems]
     if len(starts) > 1:
@@ -106,8 +130,8 @@ def _refit(settings: Sequence[EffectSetting], fit: Fit, without: str, study: Stu
         left = map(study.target.residual, predict(study.simulators.cheap, cases))
         errors = [float(np.sum((fit.weight * one) ** 2)) for one in left]
         best = int(np.argmin(errors))
-        problems, starts = problems[best : best + 1], starts[best : best + 1]
-    return fit_exactly(study.target, problems[0], study.simulators, starts[0])
+        return problems[best], starts[best]
+    return problems[0], starts[0]
 
 
 def extensions(fit: Fit, effects: Sequence[type[Effect]]) -> Iterator[tuple[str, type[Effect]]]:

@@ -7,10 +7,11 @@ import re
 
 import numpy as np
 
+from forcegrasp.diagnosis.few import with_few
 from forcegrasp.diagnosis.found_law import FoundLaw
 from forcegrasp.diagnosis.law_terms import terms
 from forcegrasp.diagnosis.result import Diagnosis
-from forcegrasp.diagnosis.signatures import Signatures
+from forcegrasp.diagnosis.screen import Screen
 from forcegrasp.diagnosis.step import look_further
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.diagnosis.verdict import explained_share, explains_enough
@@ -70,9 +71,10 @@ def _search(study: Study, fit: Fit, rng: np.random.Generator) -> tuple[Fit, Targ
     """Adds one term after the other for as long as the evidence holds: the fit, what it was fitted to, and rivals."""
     study.progress("looking for a law of what is left")
     library, rivals = list(terms(fit, study.target)), ()
-    signatures, start = Signatures(library, study), fit
+    screen, start = Screen(library, study), fit
     for number in range(MOST_TERMS):
-        step = look_further(study, fit, signatures, library, rng)
+        study = with_few(study, fit)
+        step = look_further(study, fit, screen, library, rng)
         if not step.effects:
             break
         term = step.candidates[0].effect

@@ -48,7 +48,7 @@ def go_on_with_moved(
     case = found.fit.problem.case(found.fit.vector)
     problem = Problem(loaded.gripper, grasps, case.effects)
     simulators = Simulators(problem)
-    fit = fit_exactly(target, problem, simulators, found.fit.vector)
+    fit = fit_exactly(target, problem, simulators, found.fit.vector, found.fit.jacobian)
     study = Study(target, simulators, found.folds, beyond_fit(fit, found.numerical), progress)
     gains = study.gains(found.heldout(), study.heldout(fit))
     if not is_beyond_chance(gains - fault.moved.price / len(gains), LEAST_LEAD):

@@ -6,11 +6,14 @@ import dataclasses
 from collections.abc import Sequence
 
 from forcegrasp.diagnosis.evidence import LEAST_RISE, is_beyond_chance
-from forcegrasp.diagnosis.families import refit_without
+from forcegrasp.diagnosis.families import refit_without, roughly_without
 from forcegrasp.diagnosis.result import Step
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.identify.cross_validation import rms
 from forcegrasp.identify.fit import Fit
+
+# Few grasps decide if they ask so many times as clearly for an effect as is enough.
+_SURELY = 10.0
 
 
 def drop_needless(study: Study, step: Step, fit: Fit, given: int) -> tuple[Step, Fit]:
@@ -55,10 +58,19 @@ def drop_all_needless(study: Study, steps: Sequence[Step], fit: Fit, given: int)
     return left, fit
 
 
+def _is_surely_needed(name: str, fit: Fit, study: Study) -> bool:
+    """Whether few grasps say so clearly that the model needs an effect that all need not be asked."""
+    some, part = study.on_few(fit)
+    less = None if some is study else roughly_without(name, part, some)
+    return less is not None and is_beyond_chance(some.gains(less.residual, part.residual), _SURELY * LEAST_RISE)
+
+
 def _without_needless(study: Study, fit: Fit, names: Sequence[str]) -> tuple[str, Fit] | None:
     """That one of these effects which held-out grasps ask for least, if they don't, and the fit without it."""
     held, without = study.heldout(fit), {}
     for name in names:
+        if _is_surely_needed(name, fit, study):
+            continue
         study.progress(f"fitting without {name}")
         less = refit_without(name, fit, study)
         if not is_beyond_chance(study.gains(study.heldout(less), held), LEAST_RISE):

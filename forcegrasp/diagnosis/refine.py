@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -49,7 +50,18 @@ def refine(scores: Sequence[Score], study: Study, fit: Fit, background: Backgrou
 
 
 def _fit_with(setting: EffectSetting, study: Study, fit: Fit) -> Fit:
+    """Few grasps lead most of the way."""
+    some, part = study.on_few(fit)
+    start = fit.vector
+    if some is not study:
+        few = _fit_from(part.vector, setting, some, part)
+        before, setting = few.vector[: len(part.problem)], few.problem.case(few.vector).effects[-1]
+        start = fit.moved(dataclasses.replace(part, vector=before))
+    return _fit_from(start, setting, study, fit)
+
+
+def _fit_from(start: np.ndarray, setting: EffectSetting, study: Study, fit: Fit) -> Fit:
     old = fit.problem
     problem = Problem(old.gripper, old.grasps, [*old.effects, setting])
-    start = np.r_[fit.vector, problem.start()[len(old) :]]
+    start = np.r_[start, problem.start()[len(old) :]]
     return fit_once(study.target, problem, study.simulators, start, fit.correction, rounds=0, known_slopes=fit.jacobian)

@@ -9,11 +9,12 @@ import numpy as np
 
 from forcegrasp.diagnosis import families
 from forcegrasp.diagnosis.evidence import LEAST_SHARE_TOGETHER
+from forcegrasp.diagnosis.few import with_few
 from forcegrasp.diagnosis.needless import drop_needless
 from forcegrasp.diagnosis.noise_check import Noise, unexpected_noise
 from forcegrasp.diagnosis.odd_grasps import odd_grasps
 from forcegrasp.diagnosis.result import Diagnosis, Step, kept_steps, settle_ties
-from forcegrasp.diagnosis.signatures import Signatures
+from forcegrasp.diagnosis.screen import Screen
 from forcegrasp.diagnosis.step import look_further
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.diagnosis.verdict import conclude, explained_share
@@ -68,7 +69,7 @@ def diagnose(
     if (rounding := target.rounding) is not None and start is None:
         progress(f"found {rounding.effect.name}: readings are multiples of one step")
         steps.append(Step((rounding.effect.name,), (), (), error_before, rms(study.heldout(fit), target)))
-    signatures = Signatures(effects, study)
+    screen = Screen(effects, study)
     believed: tuple[list[Step], Fit, Study] | None = None  # what is, if the rest explains too little in the end
     for _ in range(MOST_EFFECTS):
         known, dropped = {setting.effect for setting in fit.problem.effects}, {step.replaces for step in steps}
@@ -79,7 +80,8 @@ def diagnose(
         richer = list(families.extensions(fit, effects))
         if not untried and not richer:
             break
-        step = look_further(study, fit, signatures, untried, rng, richer)
+        study = with_few(study, fit)
+        step = look_further(study, fit, screen, untried, rng, richer)
         if not step.effects:
             steps.append(step)
             break

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,6 +28,7 @@ class Score(ShortRepr):
     setting: EffectSetting  #: with the values that fit best, as far as a signature tells
     gain: float  #: fall of the sum of squared residuals
     signature: np.ndarray  #: unit vector over all residuals, base parameters projected out, ``(N,)``
+    tried: tuple[EffectSetting, ...] = ()  #: the trials that it is made of
 
 
 class Background:
@@ -52,40 +53,38 @@ class Background:
         return vectors - self._basis @ (self._basis.T @ vectors)
 
 
+def trials(effects: Sequence[type[Effect]]) -> list[EffectSetting]:
+    """Every trial of every variant of these effects."""
+    return [EffectSetting(e, variant, values) for e in effects for variant in e.variants for values in e.trials()]
+
+
 class Signatures:
-    """What every effect changes of the signals, for each of its variants and trials, as it was simulated last.
+    """What trials change of the signals, as they were simulated last.
 
     An effect that another one is added to changes its signature little. So a signature need not be simulated anew in
     each round, only where it may count.
     """
 
-    def __init__(self, effects: Sequence[type[Effect]], study: Study) -> None:
+    def __init__(self, study: Study) -> None:
         self._study = study
-        self._tried = [
-            EffectSetting(e, variant, values) for e in effects for variant in e.variants for values in e.trials()
-        ]
         self._changes: dict[EffectSetting, np.ndarray] = {}  # each ``(N,)``
 
-    def _trials(self, effects: Collection[type[Effect]]) -> list[EffectSetting]:
-        return [trial for trial in self._tried if trial.effect in effects]
+    def missing(self, tried: Sequence[EffectSetting]) -> list[EffectSetting]:
+        """Those of the trials that were never simulated."""
+        return [trial for trial in tried if trial not in self._changes]
 
-    def missing(self, effects: Sequence[type[Effect]]) -> list[type[Effect]]:
-        """Those of the effects that were never simulated."""
-        return [e for e in effects if any(trial not in self._changes for trial in self._trials([e]))]
+    def simulate(self, fit: Fit, tried: Sequence[EffectSetting]) -> None:
+        """Simulates trials on top of a fit, all at once."""
+        if tried:
+            self._changes.update(zip(tried, _changes(tried, self._study, fit).T, strict=True))
 
-    def simulate(self, fit: Fit, effects: Collection[type[Effect]]) -> None:
-        """Simulates these effects on top of a fit, all at once."""
-        trials = self._trials(effects)
-        if trials:
-            self._changes.update(zip(trials, _changes(trials, self._study, fit).T, strict=True))
-
-    def scores(self, fit: Fit, background: Background, effects: Sequence[type[Effect]]) -> list[list[Score]]:
-        """How well these effects fit what a fit leaves.
+    def scores(self, fit: Fit, background: Background, tried: Sequence[EffectSetting]) -> list[list[Score]]:
+        """How well trials fit what a fit leaves.
 
         Returns:
           For each effect and variant all its trials' scores, best first; effects that leave no trace are missing.
         """
-        residual, tried = (fit.weight * fit.residual).ravel(), self._trials(effects)
+        residual = (fit.weight * fit.residual).ravel()
         if not tried:
             return []
         change = _weighted(np.stack([self._changes[trial] for trial in tried], axis=1), fit)
@@ -110,6 +109,8 @@ def share_together(scores: Sequence[Score], fit: Fit, beyond: float) -> float:
       fit: what they are signatures on.
       beyond: sum of squares that it leaves beyond the noise.
     """
+    if not scores:
+        return 0.0
     signatures = np.stack([score.signature for score in scores], axis=1)
     residual = (fit.weight * fit.residual).ravel()
     sizes = np.linalg.lstsq(signatures, residual, rcond=1e-6)[0]
@@ -119,23 +120,30 @@ def share_together(scores: Sequence[Score], fit: Fit, beyond: float) -> float:
 def best_sizes(scores: Sequence[Score], study: Study, fit: Fit, background: Background) -> list[Score]:
     """The same effects with their first parameters at the sizes that minimise the residual, and what these gain.
 
-    A signature is straight, and thresholds are not: several sizes around the one it promises are simulated, those of
-    all effects at once.
+    A signature is straight, and thresholds are not: several sizes around the one it promises are simulated on few
+    grasps, those of all effects at once, and the best one of each on all.
     """
     options = [_sizes(score.setting) for score in scores]
-    tried = [setting for sizes in options for setting in sizes]
+    some, part = study.on_few(fit)
+    gains = iter(_gains([one for sizes in options for one in sizes], some, part, Background(part, some.numerical)))
+    best: list[EffectSetting | None] = []
+    for sizes in options:
+        gain = [next(gains) for _ in sizes]
+        best.append(sizes[int(np.argmax(gain))] if sizes else None)
+    gains = iter(_gains([one for one in best if one is not None], study, fit, background))
+    return [
+        score if one is None else dataclasses.replace(score, setting=one, gain=next(gains))
+        for score, one in zip(scores, best, strict=True)
+    ]
+
+
+def _gains(tried: Sequence[EffectSetting], study: Study, fit: Fit, background: Background) -> list[float]:
+    """By how much each of these effects lowers the sum of squares, as it is."""
     if not tried:
-        return list(scores)
+        return []
     residual = (fit.weight * fit.residual).reshape(-1, 1)
-    left = np.sum(background.remove(residual - _weighted(_changes(tried, study, fit), fit)) ** 2, axis=0)
-    gains, found, low = np.sum(background.remove(residual) ** 2) - left, [], 0
-    for score, sizes in zip(scores, options, strict=True):
-        if sizes:
-            best = int(np.argmax(gains[low : low + len(sizes)]))
-            score = dataclasses.replace(score, setting=sizes[best], gain=float(gains[low + best]))
-        found.append(score)
-        low += len(sizes)
-    return found
+    left = background.remove(residual - _weighted(_changes(tried, study, fit), fit))
+    return (np.sum(background.remove(residual) ** 2) - np.sum(left**2, axis=0)).tolist()
 
 
 def _sizes(one: EffectSetting) -> list[EffectSetting]:
@@ -232,7 +240,7 @@ def _single(clean: np.ndarray, change: np.ndarray, residual: np.ndarray, one: Ef
     gain = 2 * factor * size * along - (factor * size) ** 2
     if not first.logarithmic:  # a threshold that starts at infinity does not scale
         values = np.array([np.clip(values[0] * factor, first.low, first.high), *values[1:]])
-    return Score(dataclasses.replace(one, values=values), gain, unit)
+    return Score(dataclasses.replace(one, values=values), gain, unit, (one,))
 
 
 def _joint(clean: np.ndarray, residual: np.ndarray, trials: Sequence[EffectSetting]) -> Score | None:
@@ -243,4 +251,4 @@ def _joint(clean: np.ndarray, residual: np.ndarray, trials: Sequence[EffectSetti
     fitted = clean @ factors
     size = np.linalg.norm(fitted)
     values = np.sum([factor * one.values for factor, one in zip(factors, trials, strict=True)], axis=0)
-    return Score(dataclasses.replace(trials[0], values=values), float(size**2), fitted / size)
+    return Score(dataclasses.replace(trials[0], values=values), float(size**2), fitted / size, tuple(trials))

@@ -8,7 +8,6 @@ import numpy as np
 
 from forcegrasp.diagnosis import families
 from forcegrasp.diagnosis.evidence import (
-    ALARM,
     LEAST_RISE,
     LEAST_SHARE,
     LEAST_SHARE_OF_MANY,
@@ -23,7 +22,8 @@ from forcegrasp.diagnosis.noise_check import unexpected_noise
 from forcegrasp.diagnosis.other_starts import other_starts
 from forcegrasp.diagnosis.refine import refine
 from forcegrasp.diagnosis.result import Candidate, Step
-from forcegrasp.diagnosis.signatures import Background, Score, Signatures, null_gains, share_together
+from forcegrasp.diagnosis.screen import MAX_GAIN_FACTOR, Screen
+from forcegrasp.diagnosis.signatures import Background, Score
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.diagnosis.verdict import explained_share
 from forcegrasp.effects import Effect
@@ -38,12 +38,6 @@ LEAST_GAIN, LEAST_GAIN_AT_FLOOR = 0.02, 0.1
 _REFITTED = 5
 # Of these the best ones are fitted to the end.
 _REFINED = 3
-# A signature this much worse than the best is not refitted.
-_MIN_GAIN_RATIO = 0.2
-# A refit gains at most about twice what a signature promises.
-_MAX_GAIN_FACTOR = 0.5
-# A signature of an earlier round is simulated anew if it gains this share of what makes its effect worth a fit.
-_RESIMULATE_RATIO = 0.3
 # A rough fit whose cost is no smaller share of another's is no better; rough ones end within a tenth of that.
 _NO_BETTER = 0.99
 # An error of so many times the noise leaves nothing to look for; beyond the other, no start will find it.
@@ -53,7 +47,7 @@ _ALL_FITTED, _FAR = 1.05, 10.0
 def look_further(
     study: Study,
     fit: Fit,
-    signatures: Signatures,
+    screen: Screen,
     effects: Sequence[type[Effect]],
     rng: np.random.Generator,
     richer: Sequence[tuple[str, type[Effect]]] = (),
@@ -63,33 +57,23 @@ def look_further(
     Args:
       study: the measurements.
       fit: with the effects that were found so far.
-      signatures: of all effects, as they were simulated last.
+      screen: of the catalogue.
       effects: those that are not in the model.
       rng: for the null distribution.
       richer: names of effects in the model, each with one that contains it and may take its place.
     """
     start = _Start(study, fit)
     study.progress(f"trying {len(effects)} effects")
-    new = signatures.missing(effects)
-    signatures.simulate(fit, new)
-    groups = signatures.scores(fit, start.background, effects)
-    null = null_gains(groups, rng, noise=start.noise, memory=start.memory)
-    threshold = start.refit_threshold(groups, null)
-    stale = {g[0].setting.effect for g in groups if g[0].gain > _RESIMULATE_RATIO * threshold} - set(new)
-    if stale:
-        signatures.simulate(fit, stale)
-        groups = signatures.scores(fit, start.background, effects)
-        threshold = start.refit_threshold(groups, null)
-    ranked = sorted((group[0] for group in groups), key=lambda s: -s.gain)
-    candidates = start.refit([s for s in ranked if s.gain > threshold][:_REFITTED], null)
-    candidates += start.refit_richer(richer, null)
+    look = screen.look(study, fit, start.background, effects, start.noise, rng)
+    candidates = start.refit(look.worth_a_fit[:_REFITTED], look.null)
+    candidates += start.refit_richer(richer, look.null)
     best: dict[str, Candidate] = {}
     for candidate in sorted(candidates, key=start.place):
         best.setdefault(candidate.effect.name, candidate)  # of several variants the best one
     ordered, redundant = start.refine_on_reference_tier(tuple(best.values()))
     of_many = bool(ordered) and not is_significant(ordered[0], start.least_gain)
-    if not ordered or (of_many and not start.may_be_of_many(ordered[0], ranked)):
-        return Step((), ordered, tuple(ranked), start.error, start.error)
+    if not ordered or (of_many and not start.may_be_of_many(ordered[0], look.share_together)):
+        return Step((), ordered, look.scores, start.error, start.error)
     winner = ordered[0]
     # of those that can't be told apart the simplest comes first
     equal = sorted(
@@ -98,7 +82,7 @@ def look_further(
     )
     ordered = (*equal, *(c for c in ordered if c not in equal))
     names = tuple(c.effect.name for c in equal)
-    return Step(names, ordered, tuple(ranked), start.error, equal[0].error_after, of_many)
+    return Step(names, ordered, look.scores, start.error, equal[0].error_after, of_many)
 
 
 class _Start:
@@ -114,32 +98,18 @@ class _Start:
         self.background = Background(fit, study.numerical)
         self.held = study.heldout(fit)  #: residuals of held-out grasps, ``(G, S, C)``
         self.error = rms(self.held, study.target)
-        noise = unexpected_noise(self.held, study.numerical, study.target, fit.predicted)
-        #: of noise that is not as was assumed: its size ÷ that, ``(C,)``, and its memory, for :func:`null_gains`
-        self.noise = None if noise is None else np.maximum(noise.ratio, 1.0)
-        self.memory = None if noise is None else (noise.memory, self.held.shape[1])
+        self.noise = unexpected_noise(self.held, study.numerical, study.target, fit.predicted)
         left = excess(self.held, study.numerical, study.target)
         self.least_gain = LEAST_GAIN if left else LEAST_GAIN_AT_FLOOR
-        self.beyond = fit.cost - study.target.cost_of_noise  #: sum of squares beyond the noise
 
     def place(self, candidate: Candidate) -> tuple[bool, float]:
         """See :func:`.evidence.place`."""
         return place(candidate, self.least_gain)
 
-    def may_be_of_many(self, candidate: Candidate, ranked: Sequence[Score]) -> bool:
+    def may_be_of_many(self, candidate: Candidate, share_together: float) -> bool:
         """Whether an effect that explains little is worth a trial: all signatures together must promise enough."""
         return (
-            is_significant(candidate, self.least_gain, LEAST_SHARE_OF_MANY)
-            and share_together(ranked, self._fit, self.beyond) >= LEAST_SHARE_TOGETHER
-        )
-
-    def refit_threshold(self, groups: Sequence[Sequence[Score]], null: np.ndarray) -> float:
-        """What a signature must gain for its effect to be worth a fit."""
-        if not groups:
-            return np.inf
-        best = max(group[0].gain for group in groups)
-        return max(
-            float(np.quantile(null, 1 - ALARM)), _MIN_GAIN_RATIO * best, _MAX_GAIN_FACTOR * LEAST_SHARE * self.beyond
+            is_significant(candidate, self.least_gain, LEAST_SHARE_OF_MANY) and share_together >= LEAST_SHARE_TOGETHER
         )
 
     def refit(self, scores: Sequence[Score], null: np.ndarray) -> list[Candidate]:
@@ -154,6 +124,8 @@ class _Start:
         """Fits with effects in the place of those in the model that they contain."""
         candidates = []
         for name, effect in richer if excess(self.held, self._study.numerical, self._study.target) else ():
+            if not self._may_explain_enough(effect, name):
+                continue
             self._study.progress(f"refitting with {effect.name} in place of {name}")
             refit = families.refit_as_richer(effect, self._fit, name, self._study)
             if not any(families.falls_back(refit, nested) for nested in effect.contains):
@@ -161,6 +133,14 @@ class _Start:
                 p_family = (1 + int(np.sum(null >= self._fit.cost - refit.cost))) / (1 + len(null))
                 candidates.append(self._judge(refit, p_family, change / max(np.linalg.norm(change), 1e-9), name))
         return candidates
+
+    def _may_explain_enough(self, richer: type[Effect], name: str) -> bool:
+        """Whether few grasps let an effect gain enough in the place of one that it contains."""
+        some, part = self._study.on_few(self._fit)
+        if some is self._study:
+            return True
+        rough = families.roughly_as_richer(richer, part, name, some)
+        return part.cost - rough.cost > MAX_GAIN_FACTOR * LEAST_SHARE * some.target.beyond_noise(part.residual)
 
     def refine_on_reference_tier(self, ordered: Sequence[Candidate]) -> tuple[tuple[Candidate, ...], set[str]]:
         """Fits the best one, and those indistinguishable from it, on the reference tier: rough fits may stop short.
@@ -224,16 +204,17 @@ class _Start:
         if not _ALL_FITTED < rms_error(exact, target) < _FAR:
             return exact
         # it may have ended where an effect's size meets a step of the simulation, or in another valley
-        # slopes of all but its last effect hardly change
-        known = exact.jacobian[..., : exact.problem.first_entry(len(exact.problem.effects) - 1)]
-        ends = [
-            fit_once(target, exact.problem, simulators, start, exact.correction, rounds=0, known_slopes=known)
-            for start in other_starts(exact, self._study)
-        ]
-        best = min(ends, key=lambda fit: fit.cost, default=exact)
-        if best.cost > _NO_BETTER * exact.cost:
+        # few grasps tell where; slopes of all but its last effect hardly change
+        some, part = self._study.on_few(exact)
+        known = part.jacobian[..., : part.problem.first_entry(len(part.problem.effects) - 1)]
+        own, *others = (
+            fit_once(some.target, part.problem, some.simulators, start, part.correction, rounds=0, known_slopes=known)
+            for start in (part.vector, *other_starts(part, some))
+        )
+        best = min(others, key=lambda fit: fit.cost, default=own)
+        if best.cost > _NO_BETTER * own.cost:
             return exact
-        again = fit_exactly(target, exact.problem, simulators, best.vector)
+        again = fit_exactly(target, exact.problem, simulators, exact.moved(best))
         return min([exact, again], key=lambda fit: fit.cost)
 
     def _judge(self, refit: Fit, p_family: float, signature: np.ndarray, replaces: str = "") -> Candidate:

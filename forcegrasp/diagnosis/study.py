@@ -17,6 +17,14 @@ _RECORDINGS = 3
 
 
 @dataclass(frozen=True, eq=False)
+class Few:
+    """Some grasps of a set."""
+
+    keep: np.ndarray  #: their indices
+    simulators: Simulators  #: of them
+
+
+@dataclass(frozen=True, eq=False)
 class Study:
     """The measurements, and what they are simulated and judged with."""
 
@@ -25,6 +33,7 @@ class Study:
     folds: Sequence[np.ndarray]  #: indices of the grasps that are held out together
     numerical: Sequence[np.ndarray] = ()  #: the model's own numerical errors, which no effect gets credit for
     progress: Progress = silent
+    few: Few | None = None  #: grasps that stand for all where a rough answer will do; none are chosen by default
     # fits and what they leave of held-out grasps: several parts of a search ask for the same, and some is simulated
     _known: list[tuple[Fit, np.ndarray]] = field(default_factory=list, init=False, repr=False)
 
@@ -35,6 +44,14 @@ class Study:
             known = heldout_residual(fit, self.target, self.folds)
             self._known.append((fit, known))
         return known
+
+    def on_few(self, fit: Fit) -> tuple[Study, Fit]:
+        """The few grasps alone, none of them held out, and what a fit says of them; all where none are chosen."""
+        if self.few is None:
+            return self, fit
+        keep, target = self.few.keep, self.target.subset(self.few.keep)
+        numerical = tuple(one[keep][:, : target.mask.shape[1]] for one in self.numerical)
+        return Study(target, self.few.simulators, (), numerical, self.progress), fit.subset(keep)
 
     def gains(self, before: np.ndarray, after: np.ndarray) -> np.ndarray:
         """By how much each grasp's held-out log-likelihood rises, ``(G,)``; NaN of those that were not held out.

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from forcegrasp.identify.fit import Fit, Simulators, fit_once
+from forcegrasp.identify.fit import Fit, Simulators, cheap_tier, fit_once
 from forcegrasp.identify.intervals import listed
 from forcegrasp.identify.predict import Case, predict
 from forcegrasp.identify.problem import Problem
@@ -168,6 +168,7 @@ def _numbers(measured: MeasurementSet, target: Target) -> tuple[_Number, ...]:
 def _columns(target: Target, fit: Fit, numbers: Sequence[_Number]) -> np.ndarray:
     """What a standard deviation of each number changes of the signals ÷ noise, ``(N, numbers)``."""
     gripper, grasps, case = fit.problem.gripper, fit.problem.grasps, fit.problem.case(fit.vector)
+    tier = cheap_tier(gripper)
     stds = {number.kind: number.std for number in numbers}
     together = {SKEW: (SKEW, FORCE_SKEW)}  # forces are read with the positions, or by so much later
     # what is read after a command shows what it does at once, what is read before does not: slopes either way
@@ -176,10 +177,10 @@ def _columns(target: Target, fit: Fit, numbers: Sequence[_Number]) -> np.ndarray
         Case(case.base | {n: case.base[n] + way * stds[kind] for n in together.get(kind, (kind,))}, case.effects)
         for kind, way in trials
     )
-    as_said, *signals = predict(Replay(gripper, grasps), [case, *moved])
+    as_said, *signals = predict(Replay(gripper, grasps, tier), [case, *moved])
     if _PERIOD in stds:
         slower = [dataclasses.replace(g, time_s=g.time_s * (1 + stds[_PERIOD])) for g in grasps]
-        signals.append(predict(Replay(gripper, slower), [case])[0])
+        signals.append(predict(Replay(gripper, slower, tier), [case])[0])
         trials.append((_PERIOD, 1))
     columns: dict[str, tuple[float, np.ndarray]] = {}
     for (kind, way), one in zip(trials, signals, strict=True):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -48,7 +49,7 @@ def fit_base(
     first = fit_once(target, problem, simulators, guess(target, problem))
     progress(f"base model, start 1 of {STARTS}: {rms_error(first, target):.2f} × noise")
     few = _few_grasps(target)
-    small = _Subset(target, problem, few, first)
+    small = _Subset(target, few, first)
     ends = [small.fit(small.known)]
     while len(ends) < STARTS or (len(ends) < MOST_STARTS and not _ends_agree(ends, small.target)):
         ends.append(small.fit(_random_start(small.problem, guess(small.target, small.problem), rng)))
@@ -135,15 +136,11 @@ class _End:
 class _Subset:
     """The same problem on some of its grasps, with the cheap model corrected as in a fit of all of them."""
 
-    def __init__(self, target: Target, problem: Problem, keep: np.ndarray, fitted: Fit) -> None:
-        self.target = target.subset(keep)
-        self.problem = Problem(problem.gripper, self.target.grasps, problem.effects)
+    def __init__(self, target: Target, keep: np.ndarray, fitted: Fit) -> None:
+        self.target, part = target.subset(keep), fitted.subset(keep)
+        self.problem, self.known, self._correction = part.problem, part.vector, part.correction
         self._simulators = Simulators(self.problem)
-        self._correction = fitted.correction[keep][:, : self._simulators.exact.mask.shape[1]]
-        self._full, self._fitted = problem, fitted
-        names = [e.name for e in problem.entries]
-        self._places = [names.index(e.name) for e in self.problem.entries]
-        self.known = fitted.vector[self._places]
+        self._fitted, self._part = fitted, part
 
     def fit(self, start: np.ndarray) -> _End:
         vector, residual = descend_roughly(self.target, self.problem, self._simulators, start, self._correction)
@@ -152,6 +149,4 @@ class _Subset:
 
     def enlarge(self, part: np.ndarray) -> np.ndarray:
         """Coordinates for the whole problem: what these grasps don't fix stays as it was."""
-        vector = self._fitted.vector.copy()
-        vector[self._places] = part
-        return vector
+        return self._fitted.moved(dataclasses.replace(self._part, vector=part))

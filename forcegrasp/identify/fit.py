@@ -11,11 +11,12 @@ from scipy.optimize import least_squares
 from forcegrasp.identify.predict import predict
 from forcegrasp.identify.problem import Problem
 from forcegrasp.identify.target import Target
+from forcegrasp.physics.gripper import Gripper
 from forcegrasp.replay.replay import Replay
 from forcegrasp.short_repr import ShortRepr, counted
 
 # Slopes are measured anew after so many steps; in between they follow the values (Broyden 1965), if they are few.
-_SLOPES_LAST, _FEW = 3, 16
+_SLOPES_LAST, _FEW = 3, 30
 #: Step of the finite differences in a problem's coordinates: above contact noise, within the linear range; and one that
 #: smooths the signals of a finger that sticks and slips.
 STEP, LARGE_STEP = 0.02, 0.06
@@ -37,8 +38,14 @@ class Simulators:
     def __init__(self, problem: Problem, exact: bool = False) -> None:
         gripper, grasps = problem.gripper, problem.grasps
         self.exact = Replay(gripper, grasps)
-        self.cheap = self.exact if exact or gripper.fast == "none" else Replay(gripper, grasps, tier="fitting")
+        cheap = "reference" if exact else cheap_tier(gripper)
+        self.cheap = self.exact if cheap == "reference" else Replay(gripper, grasps, cheap)
         self.step = STEP  #: of the finite differences, in coordinates
+
+
+def cheap_tier(gripper: Gripper) -> str:
+    """Physics tier that is good enough for slopes."""
+    return "reference" if gripper.fast == "none" else "fitting"
 
 
 @dataclass(frozen=True, repr=False)
@@ -73,9 +80,37 @@ class Fit(ShortRepr):
         """The weighted Jacobian, ``(N, p)``."""
         return (self.weight[..., None] * self.jacobian).reshape(-1, len(self.problem))
 
+    def subset(self, keep: np.ndarray) -> Fit:
+        """What it says of the grasps of these indices, without the parameters that none of them follows."""
+        old = self.problem
+        problem = Problem(old.gripper, [old.grasps[i] for i in keep], old.effects)
+        places, samples = _places(old, problem), max(len(g.time_s) for g in problem.grasps)
+        return dataclasses.replace(
+            self,
+            problem=problem,
+            vector=self.vector[places],
+            predicted=self.predicted[keep][:, :samples],
+            residual=self.residual[keep][:, :samples],
+            jacobian=self.jacobian[keep][:, :samples][..., places],
+            correction=self.correction[keep][:, :samples],
+            weight=self.weight[keep],
+        )
+
+    def moved(self, part: Fit) -> np.ndarray:
+        """Its coordinates, ``(p,)``, with those that a fit of some of its grasps has, as that has them."""
+        vector = self.vector.copy()
+        vector[_places(self.problem, part.problem)] = part.vector
+        return vector
+
     def covariance(self) -> np.ndarray:
         """Covariance of the coordinates, ``(p, p)``, if the noise is white; see :mod:`.intervals`."""
         return np.linalg.pinv(self.slopes.T @ self.slopes, rcond=1e-12)
+
+
+def _places(whole: Problem, part: Problem) -> list[int]:
+    """Where the entries of a problem of some of its grasps stand among those of a problem of all."""
+    names = [entry.name for entry in whole.entries]
+    return [names.index(entry.name) for entry in part.entries]
 
 
 def fit_once(
@@ -135,14 +170,22 @@ def descend_roughly(
     return vector, target.residual(local.value(vector) + correction)
 
 
-def fit_exactly(target: Target, problem: Problem, simulators: Simulators, start: np.ndarray) -> Fit:
+def fit_exactly(
+    target: Target, problem: Problem, simulators: Simulators, start: np.ndarray, slopes: np.ndarray | None = None
+) -> Fit:
     """Fits the model itself, near an optimum, with slopes from the cheap one.
 
     For effects with memory, such as play: where the two models differ, no correction makes up for it.
+
+    Args:
+      target, problem, simulators, start: as for :func:`fit_once`.
+      slopes: as they were found near the start, ``(G, S, C, p)``, which spares finding them there.
     """
     local = _Local(target, problem, simulators.exact, simulators.cheap, None, simulators.step)
     free = np.ones(len(problem), bool)
     start = np.clip(start, problem.low + 1e-9, problem.high - 1e-9)
+    if slopes is not None:
+        local.begin(start, slopes)
     vector, total = _descend(local, start, 0.0, free, _TOLERANCE)
     exact = local.value(vector)
     cheap = exact if simulators.exact is simulators.cheap else predict(simulators.cheap, [problem.case(vector)])[0]
@@ -218,6 +261,10 @@ class _Local:
         if self._value is None or not np.array_equal(self._value[0], x):
             self._value = (x.copy(), predict(self._values, [self.problem.case(x)])[0])
         return self._value[1]
+
+    def begin(self, x: np.ndarray, slopes: np.ndarray) -> None:
+        """Takes slopes for those at a point."""
+        self._slope, self._age = (x.copy(), self.value(x), slopes), 1
 
     def slopes(self, x: np.ndarray, anew: bool = False) -> np.ndarray:
         """Slopes of the signals ÷ noise over the coordinates, ``(G, S, C, p)``."""

@@ -103,6 +103,10 @@ class Target(ShortRepr):
         """The weighted sum of squares that noise alone leaves."""
         return float(np.sum(self.mask[..., None] * self.weight**2)) * self.signals.shape[-1]
 
+    def beyond_noise(self, residual: np.ndarray) -> float:
+        """The weighted sum of squares of residuals ÷ noise ``(G, S, C)``, less what noise alone leaves."""
+        return float(np.sum((self.weight * residual) ** 2)) - self.cost_of_noise
+
 
 def make_target(measured: MeasurementSet, gripper: Gripper) -> Target:
     """Lines up a measurement set, estimates its noise where it is not given, and finds the phases."""

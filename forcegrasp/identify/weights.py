@@ -29,5 +29,5 @@ def reweigh(target: Target, fit: Fit, simulators: Simulators) -> tuple[Target, F
         if np.all(np.abs(np.log(weight / target.weight)) < np.log(_SAME)):
             break
         target = dataclasses.replace(target, weight=weight)
-        fit = fit_exactly(target, fit.problem, simulators, fit.vector)
+        fit = fit_exactly(target, fit.problem, simulators, fit.vector, fit.jacobian)
     return target, fit

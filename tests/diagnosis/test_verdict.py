@@ -246,7 +246,8 @@ def found_by(made_up, monkeypatch):
         base = made_up.base.fit
         monkeypatch.setattr(search, "look_further", lambda *a: next(following))
         monkeypatch.setattr(search, "numerical_error", lambda fit, target: (0 * fit.residual + 0.1,) * 2)
-        monkeypatch.setattr(search, "Signatures", lambda *a: None)
+        monkeypatch.setattr(search, "Screen", lambda *a: None)
+        monkeypatch.setattr(search, "with_few", lambda study, fit: study)
         effects = [get_effect(name) for name in ("force_bias", "force_drift", "backlash", "stiction")]
         nothing = cast(Any, SimpleNamespace())
         assert base.problem.effects == ()

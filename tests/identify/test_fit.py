@@ -15,7 +15,7 @@ from forcegrasp.diagnosis import signatures as score_module
 from forcegrasp.diagnosis.refine import refine
 from forcegrasp.diagnosis.result import Diagnosis
 from forcegrasp.diagnosis.search import diagnose
-from forcegrasp.diagnosis.signatures import Background, Signatures, best_sizes
+from forcegrasp.diagnosis.signatures import Background, Signatures, best_sizes, trials
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.effects import get_effect
 from forcegrasp.effects.setting import EffectSetting
@@ -301,9 +301,9 @@ def threshold(fitted) -> SimpleNamespace:
 
 def test_refining_finds_a_large_threshold(fitted, threshold):
     study, target, fit, zone = threshold.study, threshold.study.target, threshold.fit, threshold.zone
-    signatures = Signatures([zone], study)
-    signatures.simulate(fit, [zone])
-    scores = [group[0] for group in signatures.scores(fit, threshold.background, [zone])]
+    signatures, tried = Signatures(study), trials([zone])
+    signatures.simulate(fit, tried)
+    scores = [group[0] for group in signatures.scores(fit, threshold.background, tried)]
     assert {score.setting.variant for score in scores} == set(zone.variants)
     sized = best_sizes(scores, study, fit, threshold.background)
     assert [s.setting.kind for s in sized] == [s.setting.kind for s in scores]
@@ -320,13 +320,13 @@ def test_refining_finds_a_large_threshold(fitted, threshold):
 
 def test_signatures_are_simulated_when_asked_for_and_kept(fitted, threshold, monkeypatch):
     zone, limit = threshold.zone, get_effect("force_limit")
-    signatures = Signatures([zone, limit], threshold.study)
-    assert signatures.missing([zone, limit]) == [zone, limit]
-    signatures.simulate(threshold.fit, [zone])
-    assert signatures.missing([zone, limit]) == [limit]
+    signatures, of_zone, of_limit = Signatures(threshold.study), trials([zone]), trials([limit])
+    assert signatures.missing([*of_zone, *of_limit]) == [*of_zone, *of_limit]
+    signatures.simulate(threshold.fit, of_zone)
+    assert signatures.missing([*of_zone, *of_limit]) == of_limit
     monkeypatch.setattr(score_module, "predict", lambda *a: pytest.fail("simulated again"))
     signatures.simulate(threshold.fit, [])
-    one, other = (signatures.scores(f, threshold.background, [zone])[0][0].gain for f in (threshold.fit, fitted.fit))
+    one, other = (signatures.scores(f, threshold.background, of_zone)[0][0].gain for f in (threshold.fit, fitted.fit))
     assert one > 10 * other  # scored against what each fit leaves
 
 

@@ -1,0 +1,112 @@
+"""Which effects are worth a fit: all are tried on few grasps, and what shows there, or not at all, on every grasp."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from forcegrasp.diagnosis.evidence import ALARM, LEAST_SHARE
+from forcegrasp.diagnosis.noise_check import Noise
+from forcegrasp.diagnosis.signatures import Background, Score, Signatures, null_gains, share_together, trials
+from forcegrasp.diagnosis.study import Study
+from forcegrasp.effects import Effect
+from forcegrasp.identify.fit import Fit
+
+# A signature this much worse than the best is not refitted.
+_MIN_GAIN_RATIO = 0.2
+#: A refit gains at most about twice what a signature promises.
+MAX_GAIN_FACTOR = 0.5
+# A signature on few grasps, or of an earlier round, is simulated anew on all if it gains this share of what makes its
+# effect worth a fit.
+_RESIMULATE_RATIO = 0.4
+
+
+@dataclass(frozen=True)
+class Look:
+    """What signatures say of a fit."""
+
+    scores: tuple[Score, ...]  #: the best one of each effect and variant, best first
+    worth_a_fit: tuple[Score, ...]  #: those of them that gain enough
+    null: np.ndarray  #: gains of the best signature of noise, from :func:`.null_gains`
+    share_together: float  #: of the squares beyond the noise that all signatures explain together
+
+
+class Screen:
+    """Signatures of a catalogue, over the rounds of a search.
+
+    Most effects show as little on few grasps as on all. Those that may be worth a fit are simulated on every grasp, and
+    so is what few grasps show no trace of: force may saturate in one grasp only.
+
+    Args:
+      effects: the catalogue.
+      study: the measurements.
+    """
+
+    def __init__(self, effects: Sequence[type[Effect]], study: Study) -> None:
+        self._tried = trials(effects)
+        self._on_all, self._few = Signatures(study), study.few
+        self._on_few: Signatures | None = None
+
+    def look(
+        self,
+        study: Study,
+        fit: Fit,
+        background: Background,
+        effects: Collection[type[Effect]],
+        noise: Noise | None,
+        rng: np.random.Generator,
+    ) -> Look:
+        """Ranks effects by how well their signatures fit what a fit leaves.
+
+        Args:
+          study: the measurements.
+          fit: of the model without these effects.
+          background: what gets no credit on all grasps.
+          effects: those of the catalogue that are tried.
+          noise: where it is not as was assumed.
+          rng: for the null distribution.
+        """
+        tried = [trial for trial in self._tried if trial.effect in effects]
+        some, part = study.on_few(fit)
+        if study.few is not self._few or self._on_few is None:
+            self._few, self._on_few = study.few, self._on_all if some is study else Signatures(some)
+        new = self._on_few.missing(tried)
+        self._on_few.simulate(part, new)
+        few = self._on_few.scores(part, Background(part, some.numerical), tried)
+        null = null_gains(
+            few,
+            rng,
+            noise=None if noise is None else np.maximum(noise.ratio, 1.0),
+            memory=None if noise is None else (noise.memory, part.residual.shape[1]),
+        )
+        beyond = some.target.beyond_noise(part.residual)
+        least = _RESIMULATE_RATIO * _least_gain(few, null, beyond)
+        best = [group[0] for group in few]
+        promising = [trial for score in best if score.gain > least for trial in score.tried]
+        if some is study:  # what was simulated just now need not be again
+            self._on_all.simulate(fit, [trial for trial in promising if trial not in new])
+        else:
+            shown = {score.setting.kind for score in best}
+            unseen = [trial for trial in tried if trial.kind not in shown]
+            self._on_all.simulate(fit, [*promising, *self._on_all.missing(unseen)])
+            promising += unseen
+        groups = self._on_all.scores(fit, background, promising)
+        found = sorted((group[0] for group in groups), key=lambda score: -score.gain)
+        others = sorted((score for score in best if score.gain <= least), key=lambda score: -score.gain)
+        enough = _least_gain(groups, null, study.target.beyond_noise(fit.residual))
+        worth_a_fit = tuple(score for score in found if score.gain > enough)
+        return Look((*found, *others), worth_a_fit, null, share_together(best, part, beyond))
+
+
+def _least_gain(groups: Sequence[Sequence[Score]], null: np.ndarray, beyond: float) -> float:
+    """What a signature must gain for its effect to be worth a fit.
+
+    Args:
+      groups: the scores of each effect and variant, best first.
+      null: gains of the best signature of noise.
+      beyond: sum of squares that is left beyond the noise.
+    """
+    best = max((group[0].gain for group in groups), default=np.inf)
+    return max(float(np.quantile(null, 1 - ALARM)), _MIN_GAIN_RATIO * best, MAX_GAIN_FACTOR * LEAST_SHARE * beyond)
