@@ -37,7 +37,7 @@ def find(source: Path) -> list[Path]:
     """Tables and bags at or below a folder, or the file itself."""
     if source.is_file() or (source / "metadata.yaml").is_file():  # a bag of ROS 2 is a folder
         return [source]
-    below = sorted(f for f in source.glob("**/*") if f.suffix in (".csv", ".parquet", *_BAGS))
+    below = sorted(f for f in source.glob("**/*") if f.suffix.lower() in (".csv", ".tsv", ".parquet", *_BAGS))
     found = [f.parent if (f.parent / "metadata.yaml").is_file() else f for f in below]
     return list(dict.fromkeys(found))
 
@@ -53,30 +53,33 @@ def read_all(place: Path, how: Map) -> Iterator[Recording]:
     if is_bag != how.is_of_bag:
         needs = "each column needs a topic in the map" if is_bag else "the map is of a bag"
         raise OtherFileError(f"{place}: is a {'bag' if is_bag else 'table'}: {needs}")
-    read = parquet_columns if place.suffix == ".parquet" else read_columns
+    read = parquet_columns if place.suffix.lower() == ".parquet" else read_columns
     table = _bag(place, how) if is_bag else read(place)
     wanted = how.places()
-    _check_columns(place, table, list(wanted))
+    run_key = how.recording.key() if how.recording else ""
+    _check_columns(place, table, list(wanted), run_key)
     skipped = sorted(set(table.numbers) | set(table.texts)) if not how.is_of_bag else []
-    skipped = [name for name in skipped if name not in wanted]
+    skipped = [name for name in skipped if name and name not in wanted]
     notes = (*table.notes, *([f"skipped: {', '.join(skipped)}"] if skipped else []))
-    columns = {name: table.numbers[name] for name in (*wanted, *([_STAMP] if is_bag else []))}
-    runs = columns[how.recording.key()] if how.recording else np.zeros(table.rows)
+    columns = {name: table.numbers[name] for name in (*wanted, *([_STAMP] if is_bag else [])) if name in table.numbers}
+    labels = table.texts.get(run_key, []) if run_key else []
+    known = list(dict.fromkeys(label.strip() for label in labels))
+    runs = columns.get(run_key, np.zeros(table.rows)) if run_key else np.zeros(table.rows)
+    runs = np.array([float(known.index(label.strip())) for label in labels]) if labels else runs
     for run in dict.fromkeys(runs[np.isfinite(runs)].tolist()):
-        name = f"{place.stem}_{run:g}" if how.recording else place.stem
+        word = known[int(run)] if labels else f"{run:g}"
+        name = f"{place.stem}_{word}" if run_key else place.stem
         yield _recording(name, {name: values[runs == run] for name, values in columns.items()}, how, notes)
 
 
-def _check_columns(place: Path, table: Table, wanted: list[str]) -> None:
+def _check_columns(place: Path, table: Table, wanted: list[str], may_be_text: str) -> None:
     missing = [name for name in wanted if name not in table.numbers and name not in table.texts]
-    there = ", ".join([*table.numbers, *table.texts]) or "none"
-    if len(missing) == len(wanted):
-        raise OtherFileError(f"{place}: no column called {', '.join(missing)}; it has {there}")
-    if missing:
-        raise MeasurementError(f"{place}: no column called {', '.join(missing)}; it has {there}")
-    texts = [f"{name} ({table.texts[name]})" for name in wanted if name in table.texts]
-    if texts:
-        raise MeasurementError(f"{place}: no numbers in column {', '.join(texts)}")
+    texts = [table.why_text(name) for name in wanted if name in table.texts and name != may_be_text]
+    wrong = [f"no column called {', '.join(missing)}; it has {table.holds()}"] if missing else []
+    wrong += [f"no numbers in column {', '.join(texts)}"] if texts else []
+    if wrong:
+        kind = OtherFileError if len(missing) == len(wanted) else MeasurementError
+        raise kind(f"{place}: {'; '.join(wrong)}")
 
 
 def _recording(name: str, rows: Mapping[str, np.ndarray], how: Map, notes: tuple[str, ...]) -> Recording:

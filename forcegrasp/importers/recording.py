@@ -53,6 +53,17 @@ class Recording(ShortRepr):
         )  # fmt: skip
 
 
+def is_jaw(joint: str) -> bool:
+    """Whether a joint is a gripper's, by its name."""
+    return any(word in joint.lower() for word in ("jaw", "gripper"))
+
+
+def unlike_a_jaw(one: Recording) -> str:
+    """What to say where a recording may be of no jaw, which is what it is compared with by default."""
+    others = ", ".join(joint for joint in one.joints if not is_jaw(joint))
+    return f"so101_jaw is an empty jaw without gravity: if {others} is none, give mechanism=" if others else ""
+
+
 class OtherFileError(MeasurementError):
     """A file that is no recording of the format at all; in a folder it is left out."""
 
