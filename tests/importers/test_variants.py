@@ -162,6 +162,7 @@ def test_a_control_loop_of_dfki_that_was_stopped_leaves_zeros(tmp_path):
     (tmp_path / "measured_data.csv").write_text("\n".join(["time,pos,vel,tau", *rows]))
     one = read(tmp_path, "dfki")
     np.testing.assert_allclose(one.position[:, 0], POSITION)
+    np.testing.assert_allclose(one.command[:, 0], COMMAND)
     assert one.notes[-1] == "measured_data.csv: left out 5 rows of zeros after the end"
     (tmp_path / "measured_data.csv").write_text("time,pos,vel,torque\n0,(1+2j),0,1\n1,(1+2j),0,1\n")
     refused(tmp_path, "dfki", "no numbers in a column position; it has time, vel, torque, pos")
@@ -240,6 +241,7 @@ def test_units_of_other_robots_are_guessed_and_said(tmp_path):
         "taken as degrees: a, b, gripper; if they are shares of a range, say which column is what with map=",
     )
     np.testing.assert_allclose(one.position[:, 0], np.deg2rad(100 * POSITION[:30]))
+    np.testing.assert_allclose(one.command, one.position + np.deg2rad(0.1))
     lerobot(tmp_path, None, robot=None, state=np.array(POSITION), command=np.array(COMMAND))  # one number is no list
     one = read_source([tmp_path], "lerobot", "", [])[0]
     assert (one.joints, one.notes[-1]) == (("joint_0",), "positions are taken as radians")
