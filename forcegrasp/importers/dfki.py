@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from forcegrasp.errors import MeasurementError
-from forcegrasp.importers.recording import OtherFileError, Recording
+from forcegrasp.importers.recording import OtherFileError, Recording, files_below
 from forcegrasp.importers.tables import read_columns
 
 MECHANISM = "dfki_pendulum"
@@ -20,9 +20,7 @@ _NAMES = {
 
 def find(source: Path) -> list[Path]:
     """Files of recordings at or below a folder, or the file itself."""
-    if source.is_file():
-        return [source]
-    return sorted({*source.glob("**/*measured*.csv"), *source.glob("**/experiment_*.csv")})
+    return files_below(source, "*measured*.csv", "experiment_*.csv")
 
 
 def read(file: Path) -> Recording:

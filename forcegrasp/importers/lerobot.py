@@ -13,7 +13,7 @@ import polars as pl
 from forcegrasp.errors import MeasurementError
 from forcegrasp.files.bounded import read_bytes
 from forcegrasp.importers.encoder import COUNTS, radians_per_unit
-from forcegrasp.importers.recording import OtherFileError, Recording, is_jaw, unlike_a_jaw
+from forcegrasp.importers.recording import OtherFileError, Recording, files_below, is_jaw, unlike_a_jaw
 from forcegrasp.importers.tables import read_parquet
 
 MECHANISM, unlike = "so101_jaw", unlike_a_jaw
@@ -39,7 +39,7 @@ def read_all(place: Path) -> Iterator[Recording]:
     Raises:
       MeasurementError: if a column is missing, all are named; or if actions and states are not of the same joints.
     """
-    files = [place] if place.is_file() else _frames(place)
+    files = _frames(place) if place.is_dir() else [place]
     dataset = _dataset(files[0])
     info = _info(dataset) if dataset else {}
     frames = [_columns(file) for file in files]
@@ -59,7 +59,7 @@ def read_all(place: Path) -> Iterator[Recording]:
 
 
 def _frames(folder: Path) -> list[Path]:
-    found = {file: file.relative_to(folder).parts for file in sorted(folder.glob("**/*.parquet"))}
+    found = {file: file.relative_to(folder).parts for file in files_below(folder, "*.parquet")}
     return [f for f in found if "data" in found[f]] or [f for f in found if "meta" not in found[f]]
 
 

@@ -24,7 +24,7 @@ import numpy as np
 
 from forcegrasp.errors import MeasurementError
 from forcegrasp.importers.column_map import FORCES, Map, Quantity
-from forcegrasp.importers.recording import OtherFileError, Recording
+from forcegrasp.importers.recording import OtherFileError, Recording, files_below
 from forcegrasp.importers.tables import Table, parquet_columns, read_columns
 from forcegrasp.measure.rosbag import Signal, read_bag
 
@@ -37,7 +37,7 @@ def find(source: Path) -> list[Path]:
     """Tables and bags at or below a folder, or the file itself."""
     if source.is_file() or (source / "metadata.yaml").is_file():  # a bag of ROS 2 is a folder
         return [source]
-    below = sorted(f for f in source.glob("**/*") if f.suffix.lower() in (".csv", ".tsv", ".parquet", *_BAGS))
+    below = [f for f in files_below(source, "*") if f.suffix.lower() in (".csv", ".tsv", ".parquet", *_BAGS)]
     found = [f.parent if (f.parent / "metadata.yaml").is_file() else f for f in below]
     return list(dict.fromkeys(found))
 

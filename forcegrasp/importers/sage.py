@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -12,20 +13,24 @@ import numpy as np
 from forcegrasp.errors import MeasurementError
 from forcegrasp.files.bounded import read_bytes
 from forcegrasp.importers.encoder import COUNTS, radians_per_unit
-from forcegrasp.importers.recording import Recording, unlike_a_jaw
+from forcegrasp.importers.recording import Recording, files_below, unlike_a_jaw
 
 #: What the importer tells of itself.
 MECHANISM, unlike = "so101_jaw", unlike_a_jaw
 _MAX_BYTES = 200_000_000
+#: How NumPy shows its own numbers in a list.
+_WRAPPED = re.compile(r"np\.\w+\(([^()]*)\)")
+#: More than two turns are taken as degrees.
+_SPAN_RAD = 4 * np.pi
 #: The range of the jaw of the public recordings, where a log has too few steps to count them.
 _RANGE_RAD = 1521 / COUNTS * 2 * np.pi
 
 
 def find(source: Path) -> list[Path]:
     """Folders of recordings at or below a folder, or the one that a file is in."""
-    if source.is_file():
-        return [source.parent]
-    return [source] if (source / "control.csv").is_file() else sorted(f.parent for f in source.glob("**/control.csv"))
+    if source.is_file() or (source / "control.csv").is_file():
+        return [source.parent if source.is_file() else source]
+    return [file.parent for file in files_below(source, "control.csv")]
 
 
 def read(folder: Path) -> Recording:
@@ -55,6 +60,9 @@ def read(folder: Path) -> Recording:
     time_s = stamps[both] * unit_s
     command = commands["positions"][newest][:, -len(joints) :]
     position = states["positions"][both][:, -len(joints) :]
+    if np.nanmax(np.abs(position), initial=0) > _SPAN_RAD:
+        command, position = np.deg2rad(command), np.deg2rad(position)
+        notes.append("positions are taken as degrees")
     for index, joint in enumerate(joints):
         if _is_share(joint, position[:, index]):
             scale = radians_per_unit(position[:, index])
@@ -117,9 +125,11 @@ def _table(path: Path, columns: tuple[str, ...], optional: tuple[str, ...] = ())
     wanted = [name for name in columns if name in there]
     found: dict[str, list[list[float]]] = {name: [] for name in wanted}
     for number, row in enumerate(rows, start=2):
+        if row.get("type") == "EVENT":
+            continue
         for name in wanted:
             try:
-                value = json.loads((row[name] or "").replace("nan", "NaN"))
+                value = json.loads(_WRAPPED.sub(r"\1", row[name] or "").replace("nan", "NaN"))
                 numbers = [float(v) for v in value] if isinstance(value, list) else [float(value)]
             except (ValueError, TypeError) as error:
                 raise MeasurementError(f"{path}, row {number}: {name}={row[name]!r}: must be numbers") from error

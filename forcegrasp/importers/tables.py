@@ -14,6 +14,7 @@ import polars as pl
 
 from forcegrasp.errors import MeasurementError
 from forcegrasp.files.bounded import read_bytes
+from forcegrasp.importers.recording import OtherFileError
 from forcegrasp.measure.folder import show
 from forcegrasp.short_repr import counted
 
@@ -77,7 +78,7 @@ def read_columns(file: Path) -> Table:
         if len(above) == len(rows[0]):  # as numpy.savetxt writes it
             rows.insert(0, above)
     if len(rows) < 3:
-        raise MeasurementError(f"{file}: needs a header and at least two rows")
+        raise OtherFileError(f"{file}: needs a header and at least two rows")
     header = [name.strip() for name in rows[0]]
     if separator != ",":
         notes.append(f"{file.name}: its cells are separated by {_SEPARATORS[separator]}")

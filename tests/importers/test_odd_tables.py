@@ -104,6 +104,17 @@ def test_words_for_numbers_and_names_of_runs(tmp_path):
     np.testing.assert_allclose(first.position[:, 0], POSITION[:10])
 
 
+def test_a_folder_may_hold_hidden_and_empty_tables(tmp_path):
+    (tmp_path / "log.csv").write_text("t,goal,pos\n" + lines("{t},{c},{p}"))
+    (tmp_path / "stopped.csv").write_text("t,goal,pos\n")
+    for hidden in (tmp_path / "._log.csv", tmp_path / ".ipynb_checkpoints" / "log.csv"):
+        hidden.parent.mkdir(exist_ok=True)
+        hidden.write_bytes(b"\0\5")
+    (tmp_path / "map.yaml").write_text(MAP)
+    (one,) = read_source([tmp_path], "", str(tmp_path / "map.yaml"), [])
+    assert one.notes == ("left out, for it is no recording: stopped.csv",)
+
+
 def test_all_columns_that_are_wrong_are_told_at_once(tmp_path):
     (tmp_path / "log.csv").write_text("t,goal,pos,on\n" + lines("{t} s,{c},{p},yes"))
     with pytest.raises(MeasurementError) as caught:

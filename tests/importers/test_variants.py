@@ -11,6 +11,7 @@ import pytest
 import scipy.io
 import torch
 
+from forcegrasp.cli.main import main
 from forcegrasp.errors import MeasurementError
 from forcegrasp.importers import Recording, read_source, unlike
 
@@ -30,15 +31,17 @@ def refused(source: Path, name: str, match: str) -> None:
     assert "\n" not in str(caught.value)
 
 
-def sage(folder: Path, joints: list[str], unit: float = 1e6, commands: int = 2, late: float = 0.0) -> Path:
+def sage(
+    folder: Path, joints: list[str], unit: float = 1e6, commands: int = 2, late: float = 0.0, scale: float = 1.0
+) -> Path:
     """Joints that all do the same; two of them in a state; states so much later than commands, from the second on."""
     folder.mkdir(exist_ok=True)
     (folder / "joint_list.txt").write_text("".join(f"/robot/{name}\n" for name in joints))
-    rows = [f'CONTROL,{t * unit},"{[c] * commands}"\n' for t, c in zip(TIME, COMMAND.tolist(), strict=True)]
+    rows = [f'CONTROL,{t * unit},"{[c] * commands}"\n' for t, c in zip(TIME, (scale * COMMAND).tolist(), strict=True)]
     (folder / "control.csv").write_text("type,timestamp,positions\n" + "".join(rows))
     rows = [
         f'STATE_MOTOR,{(t + late) * unit},"{[p] * 2}","{[0.0] * 2}","{[-p] * 2}"\n'
-        for t, p in list(zip(TIME, POSITION.tolist(), strict=True))[1:]
+        for t, p in list(zip(TIME, (scale * POSITION).tolist(), strict=True))[1:]
     ]
     (folder / "state_motor.csv").write_text("type,timestamp,positions,velocities,torques\n" + "".join(rows))
     return folder
@@ -67,6 +70,21 @@ def test_sage_joins_commands_and_states_by_their_stamps(tmp_path):
     np.testing.assert_allclose(np.diff(one.time_s), 0.02)
     (tmp_path / "sim" / "joint_list.txt").unlink()
     assert read(tmp_path / "sim", "sage").joints == ("joint_0", "joint_1")
+
+
+def test_sage_with_events_between_the_rows_degrees_and_numbers_of_numpy(tmp_path):
+    folder = sage(tmp_path / "arm", ["left", "right"])
+    plain = read(folder, "sage")
+    for name in ("control.csv", "state_motor.csv"):
+        head, *rows = (folder / name).read_text().splitlines()
+        rows = [r.replace("[", "[np.float64(").replace(", ", "), np.float64(").replace("]", ")]") for r in rows]
+        (folder / name).write_text("\n".join([head, 'EVENT,0,"MOTION_START"', *rows]))
+    np.testing.assert_array_equal(read(folder, "sage").position, plain.position)
+    folder = sage(tmp_path / "degrees", ["left", "right"], scale=90.0)
+    one = read(folder, "sage")
+    np.testing.assert_allclose(one.position, np.deg2rad(90 * plain.position))
+    np.testing.assert_allclose(one.command, np.deg2rad(90 * plain.command))
+    assert "positions are taken as degrees" in one.notes
 
 
 def test_a_number_that_a_joint_lacks_costs_the_row_only_where_the_joint_is_asked_for(tmp_path):
@@ -123,6 +141,13 @@ def test_bam_of_other_recorders(tmp_path):
         refused(tmp_path / "at.json", "bam", "is no log of BAM")
     refused(bam(tmp_path / "at.json", entries=[{"timestamp": 0, "goal_position": 0, "position": "x"}]), "bam",
             "at.json: entry 0: position must be a number")  # fmt: skip
+
+
+def test_the_verb_warns_of_another_servo_where_no_mechanism_is_given(tmp_path, capsys):
+    log = str(bam(tmp_path / "mx.json"))
+    for given, warned in (("", True), ("mechanism=xl330_pendulum", False)):
+        assert main(["import", log, "format=bam", f"out={tmp_path / str(warned)}", *given.split()]) == 0
+        assert ("warning: xl330_pendulum is of motor xl330" in capsys.readouterr().out) == warned
 
 
 def test_emps_without_the_constants_of_its_drive_and_with_broken_signals(tmp_path):
