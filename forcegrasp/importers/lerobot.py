@@ -23,6 +23,8 @@ _NEEDED = ("action", "observation.state", "timestamp", "episode_index")
 _SPAN_RAD = 7.0
 #: Beginnings of the names of robots whose servos have encoders of 4096 counts.
 _COUNTING = ("so100", "so101", "so_", "bi_so", "koch", "lekiwi", "moss", "omx")
+#: A unit of theirs is at most a per cent of a turn, rounding up; steps that say otherwise are no counts.
+_MOST_RAD = 2 * np.pi / 98
 _MAP = "say which column is what with map="
 
 
@@ -140,7 +142,7 @@ def _units(joints: tuple[str, ...], position: np.ndarray, robot: str) -> tuple[n
     scale, counted, guessed = np.ones(len(joints)), [], []
     for i in set(range(len(joints))) - radians:
         degree, count = np.pi / 180, radians_per_unit(position[:, i])
-        if count and (robot.startswith(_COUNTING) or abs(count / degree - 1) < 0.01):
+        if count and count < _MOST_RAD and (robot.startswith(_COUNTING) or abs(count / degree - 1) < 0.01):
             scale[i] = count
             counted.append(f"{joints[i]} {np.rad2deg(count):.4g}°")
         else:

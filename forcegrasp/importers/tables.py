@@ -16,6 +16,7 @@ from forcegrasp.errors import MeasurementError
 from forcegrasp.files.bounded import read_bytes
 from forcegrasp.importers.recording import OtherFileError
 from forcegrasp.measure.folder import show
+from forcegrasp.measure.parquet_file import without_stderr
 from forcegrasp.short_repr import counted
 
 _MAX_BYTES = 400_000_000
@@ -110,10 +111,12 @@ def read_parquet(file: Path, only: Collection[str] | None = None) -> pl.DataFram
     """
     try:
         content = read_bytes(file, _MAX_BYTES)
-        there = pl.read_parquet_schema(io.BytesIO(content))
-        return pl.read_parquet(io.BytesIO(content), columns=[n for n in there if only is None or n in only])
-    except (OSError, pl.exceptions.PolarsError) as error:
-        raise MeasurementError(f"{file}: can't be read as Parquet: {error}") from error
+        with without_stderr():
+            there = pl.read_parquet_schema(io.BytesIO(content))
+            return pl.read_parquet(io.BytesIO(content), columns=[n for n in there if only is None or n in only])
+    except (OSError, pl.exceptions.PolarsError, pl.exceptions.PanicException) as error:  # a broken file may panic
+        reason = " ".join(str(error).split())
+        raise MeasurementError(f"{file}: can't be read as Parquet: {reason}") from error
 
 
 def parquet_columns(file: Path) -> Table:

@@ -267,6 +267,8 @@ def test_units_of_other_robots_are_guessed_and_said(tmp_path):
     )
     np.testing.assert_allclose(one.position[:, 0], np.deg2rad(100 * POSITION[:30]))
     np.testing.assert_allclose(one.command, one.position + np.deg2rad(0.1))
+    lerobot(tmp_path, ["a", "b", "gripper"], robot="so101", state=np.round(state, 2), command=state)  # hundredths
+    assert read_source([tmp_path], "lerobot", "", [])[0].notes == one.notes
     lerobot(tmp_path, None, robot=None, state=np.array(POSITION), command=np.array(COMMAND))  # one number is no list
     one = read_source([tmp_path], "lerobot", "", [])[0]
     assert (one.joints, one.notes[-1]) == (("joint_0",), "positions are taken as radians")
