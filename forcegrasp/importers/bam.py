@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import glob
 import json
 from pathlib import Path
 from typing import Any
@@ -21,8 +22,14 @@ _BENCH = {"motor": "xl330", "mass": 0.49, "length": 0.1}
 
 
 def find(source: Path) -> list[Path]:
-    """Files of recordings at or below a folder, or the file itself."""
-    return files_below(source, "*.json")
+    """Files of recordings at or below a folder, or the file itself; of a log and its resampled copy, the log alone."""
+    found = files_below(source, "*.json")
+    raw = {file.name for file in found if not _is_copy(file)}
+    return [file for file in found if not (_is_copy(file) and file.name in raw)]
+
+
+def _is_copy(file: Path) -> bool:
+    return "processed" in file.parent.name
 
 
 def read(file: Path) -> Recording:
@@ -52,6 +59,8 @@ def read(file: Path) -> Recording:
     settings = {name: float(log[name]) for name in _SETTINGS if isinstance(log.get(name), int | float)}
     skipped = sorted(there - set(columns))
     notes = (f"skipped: {', '.join(skipped)}",) if skipped else ()
+    if not _is_copy(file) and any(file.resolve().parents[1].glob(f"*processed*/{glob.escape(file.name)}")):
+        notes = (*notes, "logs are taken as they were recorded, and their copies in processed left out")
     load = columns.get("load")
     name = f"{file.stem}_{log.get('trajectory', '')}".rstrip("_")
     return Recording(

@@ -62,14 +62,19 @@ def read_all(place: Path, how: Map) -> Iterator[Recording]:
     skipped = [name for name in skipped if name and name not in wanted]
     notes = (*table.notes, *([f"skipped: {', '.join(skipped)}"] if skipped else []))
     columns = {name: table.numbers[name] for name in (*wanted, *([_STAMP] if is_bag else [])) if name in table.numbers}
-    labels = table.texts.get(run_key, []) if run_key else []
-    known = list(dict.fromkeys(label.strip() for label in labels))
-    runs = columns.get(run_key, np.zeros(table.rows)) if run_key else np.zeros(table.rows)
-    runs = np.array([float(known.index(label.strip())) for label in labels]) if labels else runs
-    for run in dict.fromkeys(runs[np.isfinite(runs)].tolist()):
-        word = known[int(run)] if labels else f"{run:g}"
-        name = f"{place.stem}_{word}" if run_key else place.stem
-        yield _recording(name, {name: values[runs == run] for name, values in columns.items()}, how, notes)
+    for run, rows in _runs(table, run_key):
+        yield _recording(place.stem + run, {name: values[rows] for name, values in columns.items()}, how, notes)
+
+
+def _runs(table: Table, key: str) -> Iterator[tuple[str, np.ndarray]]:
+    """What each recording's name ends with, and which rows are its own; those that name none are nobody's."""
+    if not key:
+        yield "", np.ones(table.rows, bool)
+        return
+    cells = np.array([cell.strip() for cell in table.texts[key]]) if key in table.texts else table.numbers[key]
+    for run in dict.fromkeys(cells.tolist()):
+        if run != "" and run == run:  # not empty, and not NaN
+            yield f"_{run}" if isinstance(run, str) else f"_{run:g}", cells == run
 
 
 def _check_columns(place: Path, table: Table, wanted: list[str], may_be_text: str) -> None:

@@ -89,10 +89,10 @@ def test_times_of_every_kind(tmp_path):
 
 def test_words_for_numbers_and_names_of_runs(tmp_path):
     rows = [f"{t},{c},{p},{i < 10},{'up' if i < 12 else 'down'}" for i, (t, c, p) in enumerate(ROWS)]
-    rows[3], rows[4] = "0.03,NA,0,True,up", "0.04,0,nan,True,up"
+    rows[3], rows[4], rows[19] = "0.03,NA,0,True,up", "0.04,0,nan,True,up", "0.19,0,0,True,"
     (tmp_path / "log.csv").write_text("t,goal,pos,on,run\n" + "\n".join(rows))
     up, down = read(tmp_path / "log.csv", MAP + "enabled: on\nrecording: run\n")
-    assert (up.name, down.name, len(up.time_s), len(down.time_s)) == ("log_up", "log_down", 10, 8)
+    assert (up.name, down.name, len(up.time_s), len(down.time_s)) == ("log_up", "log_down", 10, 7)
     assert up.enabled is not None
     assert down.enabled is not None
     assert (up.enabled.sum(), down.enabled.sum()) == (8, 0)

@@ -143,6 +143,16 @@ def test_bam_of_other_recorders(tmp_path):
             "at.json: entry 0: position must be a number")  # fmt: skip
 
 
+def test_bam_s_resampled_copies_are_not_taken_for_more_recordings(tmp_path):
+    for folder in ("data_raw", "data_processed"):
+        (tmp_path / folder).mkdir()
+        bam(tmp_path / folder / "2026.json")
+    one = read(tmp_path, "bam")
+    assert one.name == "2026"
+    assert one.notes[-1] == "logs are taken as they were recorded, and their copies in processed left out"
+    assert not [note for note in read(tmp_path / "data_processed", "bam").notes if "copies" in note]
+
+
 def test_the_verb_warns_of_another_servo_where_no_mechanism_is_given(tmp_path, capsys):
     log = str(bam(tmp_path / "mx.json"))
     for given, warned in (("", True), ("mechanism=xl330_pendulum", False)):
