@@ -63,12 +63,13 @@ def read_columns(file: Path) -> Table:
     except OSError as error:
         raise MeasurementError(f"{file}: can't be read: {error}") from error
     text, notes = _decoded(content, file)
+    text = text.partition("\n")[2] if text.startswith("sep=") else text  # a word of one spreadsheet to itself
     first = next((line for line in text.splitlines() if line.strip() and not line.startswith("#")), "")
     # a semicolon weighs twice, for the commas beside it are those of numbers; and spaces stand beside any other
     there = [separator for separator in _SEPARATORS if separator in first.strip()]
     separator = max(there, key=lambda s: (s != " ", first.count(s) * (2 if s == ";" else 1)), default=",")
     try:
-        lines = csv.reader(io.StringIO(text), delimiter=separator, skipinitialspace=True)
+        lines = csv.reader(io.StringIO(text, newline=None), delimiter=separator, skipinitialspace=True)
         rows = [row for row in lines if any(cell.strip() for cell in row)]
     except csv.Error as error:
         raise MeasurementError(f"{file}: can't be read: {error}") from error

@@ -37,6 +37,8 @@ def lines(row: str) -> str:
         ("\ufefft,goal,pos,\n" + lines("{t},{c},{p},"), None),
         ("t,goal,pos\n" + lines("{t},{c},{p},"), None),
         ("t\tgoal\tpos\r\n" + lines("{t}\t{c}\t{p}").replace("\n", "\r\n"), "separated by tabs"),
+        ("sep=;\r\nt;goal;pos\r\n" + lines("{t};{c};{p}").replace("\n", "\r\n"), "separated by semicolons"),
+        ("t,goal,pos\r" + lines("{t},{c},{p}").replace("\n", "\r"), None),
         ("t goal  pos\n" + lines("  {t}  {c} {p} "), "separated by spaces"),
         ("# made with numpy.savetxt\n# t goal pos\n" + lines("{t:.18e} {c:.18e} {p:.18e}"), "separated by spaces"),
         ("# t,goal,pos\n" + lines("{t},{c},{p}"), None),
@@ -45,7 +47,7 @@ def lines(row: str) -> str:
     ],
 )
 def test_tables_that_say_the_same(text, note, tmp_path):
-    (tmp_path / "log.csv").write_text(text)
+    (tmp_path / "log.csv").write_bytes(text.encode())
     (one,) = read(tmp_path / "log.csv")
     np.testing.assert_allclose(one.time_s, TIME, atol=1e-9)
     np.testing.assert_allclose(one.command[:, 0], COMMAND)
