@@ -140,7 +140,7 @@ def _units(joints: tuple[str, ...], position: np.ndarray, robot: str) -> tuple[n
     arm = [i for i, joint in enumerate(joints) if not is_jaw(joint)]
     radians = {i for i in range(len(joints)) if size[i] <= _SPAN_RAD and (i not in arm or size[arm].max() <= _SPAN_RAD)}
     scale, counted, guessed = np.ones(len(joints)), [], []
-    for i in set(range(len(joints))) - radians:
+    for i in sorted(set(range(len(joints))) - radians):
         degree, count = np.pi / 180, radians_per_unit(position[:, i])
         if count and count < _MOST_RAD and (robot.startswith(_COUNTING) or abs(count / degree - 1) < 0.01):
             scale[i] = count

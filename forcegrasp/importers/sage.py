@@ -121,7 +121,7 @@ def _table(path: Path, columns: tuple[str, ...], optional: tuple[str, ...] = ())
     rows = csv.DictReader(io.StringIO(_text(path)))
     there = rows.fieldnames or []
     if missing := [name for name in columns if name not in there and name not in optional]:
-        raise MeasurementError(f"{path}: no column {', '.join(missing)}; it has {', '.join(there)}")
+        raise MeasurementError(f"{path}: no column {', '.join(missing)}; it has {' '.join(', '.join(there).split())}")
     wanted = [name for name in columns if name in there]
     found: dict[str, list[list[float]]] = {name: [] for name in wanted}
     for number, row in enumerate(rows, start=2):
