@@ -20,7 +20,7 @@ NOTES = """
 
 def run(config: ImportConfig) -> None:
     """Runs the verb."""
-    from forcegrasp.importers import FORMATS, read_source
+    from forcegrasp.importers import FORMATS, read_source, unlike
     from forcegrasp.importers.example import example_set
     from forcegrasp.importers.servo_set import as_set
     from forcegrasp.measure import check_servo, write_servo_set
@@ -42,6 +42,8 @@ def run(config: ImportConfig) -> None:
     measured = as_set(recordings, mechanism, ", ".join(config.source), config.license)
     for note in dict.fromkeys(note for one in recordings for note in one.notes):
         print(f"note: {note}")
+    for line in unlike(form, recordings) if form and not config.mechanism else ():
+        print(f"warning: {line}")
     for warning in check_servo(measured, [motor.stroke for motor in mechanism.motors], mechanism.unsigned):
         print(f"warning: {warning}")
     write_servo_set(measured, out)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import glob
 import json
 from pathlib import Path
 from typing import Any
@@ -16,15 +17,25 @@ MECHANISM = "xl330_pendulum"
 _MAX_BYTES = 200_000_000
 _NEEDED = ("timestamp", "goal_position", "position")
 _SETTINGS = ("kp", "mass", "length", "arm_mass", "vin")
+#: What of a log the shipped mechanism is of.
+_BENCH = {"motor": "xl330", "mass": 0.49, "length": 0.1}
 
 
 def find(source: Path) -> list[Path]:
-    """Files of recordings at or below a folder, or the file itself."""
-    return files_below(source, "*.json")
+    """Files of recordings at or below a folder, or the file itself; of a log and its resampled copy, the log alone."""
+    found = files_below(source, "*.json")
+    raw = {file.name for file in found if not _is_copy(file)}
+    return [file for file in found if not (_is_copy(file) and file.name in raw)]
+
+
+def _is_copy(file: Path) -> bool:
+    return "processed" in file.parent.name
 
 
 def read(file: Path) -> Recording:
     """Reads one recording. The load that it holds has no unit that is known, and is kept as it is.
+
+    Logs that were resampled need no time stamps: they say ``dt``.
 
     Raises:
       MeasurementError: if it is not such a log; all missing columns are named.
@@ -32,29 +43,45 @@ def read(file: Path) -> Recording:
     try:
         log = json.loads(read_bytes(file, _MAX_BYTES))
         entries: list[dict[str, Any]] = log["entries"]
-        there = set(entries[0])
-    except (OSError, ValueError, KeyError, IndexError, TypeError, RecursionError) as error:
+        there = set(entries[0]).union(*(entry.keys() for entry in entries))
+    except OSError as error:
+        raise MeasurementError(f"{file}: can't be read: {error}") from error
+    except (ValueError, KeyError, IndexError, TypeError, AttributeError, RecursionError) as error:
         raise OtherFileError(f"{file}: is no log of BAM: a JSON object with a list `entries` is needed") from error
+    dt = log.get("dt")
+    if "timestamp" not in there and isinstance(dt, int | float):
+        entries = [{**entry, "timestamp": row * dt} for row, entry in enumerate(entries)]
+        there.add("timestamp")
     if missing := [name for name in _NEEDED if name not in there]:
         raise MeasurementError(f"{file}: entries lack {', '.join(missing)}; they have {', '.join(sorted(there))}")
     columns = {name: _column(file, entries, name) for name in (*_NEEDED, "load", "torque_enable") if name in there}
+    log = {name.replace("-", "_"): value for name, value in log.items()}  # one of its recorders says arm-mass
     settings = {name: float(log[name]) for name in _SETTINGS if isinstance(log.get(name), int | float)}
     skipped = sorted(there - set(columns))
     notes = (f"skipped: {', '.join(skipped)}",) if skipped else ()
+    if not _is_copy(file) and any(file.resolve().parents[1].glob(f"*processed*/{glob.escape(file.name)}")):
+        notes = (*notes, "logs are taken as they were recorded, and their copies in processed left out")
     load = columns.get("load")
     name = f"{file.stem}_{log.get('trajectory', '')}".rstrip("_")
     return Recording(
         name, (str(log.get("motor", "joint")),),
         columns["timestamp"] - columns["timestamp"][0], columns["goal_position"][:, None], columns["position"][:, None],
         effort=None if load is None else load[:, None], effort_unit="1" if load is not None else "",
-        enabled=columns["torque_enable"] > 0.5 if "torque_enable" in columns else None,
-        settings=settings, notes=notes,
+        enabled=columns.get("torque_enable"), settings=settings, notes=notes,
     )  # fmt: skip
 
 
 def _column(file: Path, entries: list[dict[str, Any]], name: str) -> np.ndarray:
     try:
-        return np.array([float(entry[name]) for entry in entries])
-    except (KeyError, TypeError, ValueError) as error:
-        row = next(i for i, entry in enumerate(entries) if not isinstance(entry.get(name), int | float))
+        return np.array([np.nan if entry.get(name) is None else float(entry[name]) for entry in entries])
+    except (TypeError, ValueError) as error:
+        row = next(i for i, entry in enumerate(entries) if not isinstance(entry.get(name, 0), int | float | None))
         raise MeasurementError(f"{file}: entry {row}: {name} must be a number") from error
+
+
+def unlike(one: Recording) -> str:
+    """What to say of a log of another servo or pendulum than that of the shipped mechanism; empty if of none."""
+    of = {"motor": one.joints[0], **one.settings}
+    differ = [f"{name} {of[name]}" for name, value in _BENCH.items() if of.get(name, value) != value]
+    bench = ", ".join(f"{name} {value}" for name, value in _BENCH.items())
+    return f"{MECHANISM} is of {bench}, and these logs of {', '.join(differ)}: give mechanism=" if differ else ""

@@ -13,7 +13,9 @@ from forcegrasp.importers.recording import OtherFileError, Recording, files_belo
 
 MECHANISM = "emps"
 _MAX_BYTES = 200_000_000
-_NEEDED = ("t", "qg", "qm", "vir", "gtau", "kp", "kv")
+_NEEDED = ("t", "qg", "qm", "vir")
+#: The drive's constants as they were published, where a copy of the data lacks them: N/V, 1/s, V·s/m.
+_DRIVE = {"gtau": 35.15, "kp": 160.18, "kv": 243.45}
 
 
 def find(source: Path) -> list[Path]:
@@ -31,23 +33,34 @@ def read(file: Path) -> Recording:
 
     try:
         content = loadmat(io.BytesIO(read_bytes(file, _MAX_BYTES)))
+    except OSError as error:
+        raise MeasurementError(f"{file}: can't be read: {error}") from error
     except Exception as error:  # scipy raises whatever its reader meets
-        raise MeasurementError(f"{file}: is no MATLAB file that can be read (version 7 or older)") from error
+        raise MeasurementError(f"{file}: is no MATLAB file that can be read (version 7 or older: -v7)") from error
     if missing := [name for name in _NEEDED if name not in content]:
         there = ", ".join(sorted(name for name in content if not name.startswith("__")))
         kind = OtherFileError if len(missing) == len(_NEEDED) else MeasurementError
         raise kind(f"{file}: lacks {', '.join(missing)}; it has {there}")
-    one = {name: np.asarray(content[name], float).ravel() for name in _NEEDED}
-    settings = {name: float(one[name][0]) for name in ("gtau", "kp", "kv")}
-    load, notes = None, ()
+    there = [name for name in (*_NEEDED, *_DRIVE, "pulses_N") if name in content]
+    try:
+        one = {name: np.asarray(content[name], float).ravel() for name in there}
+    except (TypeError, ValueError) as error:
+        raise MeasurementError(f"{file}: {', '.join(there)} must be numbers") from error
+    sizes = {name: len(values) for name, values in one.items() if name not in _DRIVE}
+    if len(set(sizes.values())) > 1 or any(not one[name].size for name in one):
+        lengths = ", ".join(f"{name} {size}" for name, size in sizes.items())
+        raise MeasurementError(f"{file}: signals of different lengths: {lengths}")
+    settings = {name: float(one[name][0]) if name in one else value for name, value in _DRIVE.items()}
+    load, without = None, [name for name in _DRIVE if name not in one]
+    notes = [f"{name}: not in it, taken as published, {settings[name]}" for name in without]
     force = settings["gtau"] * one["vir"]
     if "pulses_N" in content:  # positions move by what volts would do, not newtons, and vir holds them already
-        load = settings["gtau"] * np.asarray(content["pulses_N"], float).ravel()
+        load = settings["gtau"] * one["pulses_N"]
         force = force - load
-        notes = ("pulses_N: taken as volts that were added at the drive, gtau newtons each",)
+        notes.append("pulses_N: taken as volts that were added at the drive, gtau newtons each")
     force = np.r_[force[:1], force[:-1]]  # what a row holds follows from its position, and acts until the next
     return Recording(
         file.stem, ("carriage",), one["t"] - one["t"][0], one["qg"][:, None], one["qm"][:, None],
         effort=force[:, None], effort_unit="N", load=load, settings=settings,
-        notes=notes,
+        notes=tuple(notes),
     )  # fmt: skip

@@ -7,6 +7,8 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from forcegrasp.errors import ConfigError, MeasurementError, closest
 from forcegrasp.importers import bam, dfki, emps, lerobot, mapped, pace, sage
 from forcegrasp.importers.column_map import Map, read_map
@@ -25,6 +27,8 @@ def read_source(sources: Sequence[Path], format_name: str, map_file: str, joints
       format_name: one of :data:`FORMATS`, or empty with a map.
       map_file: a map of columns, see :mod:`forcegrasp.importers.mapped`; empty with a format.
       joints: which joints, in which order; all if empty.
+
+    Rows without a number are left out, but a joint that nobody asked for may lack some.
 
     Raises:
       ConfigError: unless one of format and map is given.
@@ -46,9 +50,16 @@ def read_source(sources: Sequence[Path], format_name: str, map_file: str, joints
             raise MeasurementError(f"{source}: holds no recording{' of format ' + format_name if format_name else ''}")
         found += _read_places(module, places, how)
     for _, one in found:
-        if not one.command_unit:
-            refuse_swapped(one.name, one.joints, one.command, one.position)
-    return [one.of_joints(joints) if joints else one for one in _with_own_names(found)]
+        whole = np.isfinite(one.command).all(axis=1) & np.isfinite(one.position).all(axis=1)
+        if not one.command_unit and whole.any():
+            refuse_swapped(one.name, one.joints, one.command[whole], one.position[whole])
+    return [tidy(one.of_joints(joints) if joints else one) for one in _with_own_names(found)]
+
+
+def unlike(format_name: str, recordings: Sequence[Recording]) -> list[str]:
+    """In what recordings may be unlike the mechanism that their format is of by default; a line each."""
+    ask = getattr(FORMATS[format_name], "unlike", None)
+    return list(dict.fromkeys(line for one in recordings if ask and (line := ask(one))))
 
 
 def _read_places(module: Any, places: Sequence[Path], how: Map | None) -> list[tuple[Path, Recording]]:
@@ -56,7 +67,7 @@ def _read_places(module: Any, places: Sequence[Path], how: Map | None) -> list[t
     found, others = [], []
     for place in places:
         try:
-            found += [(place, tidy(one)) for one in _recordings(module, place, how)]
+            found += [(place, one) for one in _recordings(module, place, how)]
         except OtherFileError as error:
             others.append(error)
     if not found:
@@ -78,7 +89,17 @@ def _recordings(module: Any, place: Path, how: Map | None) -> Iterator[Recording
 
 
 def _with_own_names(found: Sequence[tuple[Path, Recording]]) -> list[Recording]:
-    """The recordings; such as have the same name are told apart by their folders."""
+    """The recordings; such as have the same name are told apart by their folders, as many as it takes."""
     names = [one.name for _, one in found]
-    own = [f"{place.parent.name}_{one.name}" if names.count(one.name) > 1 else one.name for place, one in found]
+    folders = [
+        (place if place.is_dir() and place.name != one.name else place.parent).resolve().parts for place, one in found
+    ]
+    own = names
+    for depth in range(1, 1 + max(map(len, folders), default=0)):
+        if len(set(own)) == len(own):
+            break
+        own = [
+            "_".join((*folder[-depth:], name)) if names.count(name) > 1 else name
+            for folder, name in zip(folders, names, strict=True)
+        ]
     return [dataclasses.replace(one, name=name) for (_, one), name in zip(found, own, strict=True)]

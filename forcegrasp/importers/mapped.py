@@ -24,7 +24,7 @@ import numpy as np
 
 from forcegrasp.errors import MeasurementError
 from forcegrasp.importers.column_map import FORCES, Map, Quantity
-from forcegrasp.importers.recording import OtherFileError, Recording
+from forcegrasp.importers.recording import OtherFileError, Recording, files_below
 from forcegrasp.importers.tables import Table, parquet_columns, read_columns
 from forcegrasp.measure.rosbag import Signal, read_bag
 
@@ -37,7 +37,7 @@ def find(source: Path) -> list[Path]:
     """Tables and bags at or below a folder, or the file itself."""
     if source.is_file() or (source / "metadata.yaml").is_file():  # a bag of ROS 2 is a folder
         return [source]
-    below = sorted(f for f in source.glob("**/*") if f.suffix in (".csv", ".parquet", *_BAGS))
+    below = [f for f in files_below(source, "*") if f.suffix.lower() in (".csv", ".tsv", ".parquet", *_BAGS)]
     found = [f.parent if (f.parent / "metadata.yaml").is_file() else f for f in below]
     return list(dict.fromkeys(found))
 
@@ -53,30 +53,38 @@ def read_all(place: Path, how: Map) -> Iterator[Recording]:
     if is_bag != how.is_of_bag:
         needs = "each column needs a topic in the map" if is_bag else "the map is of a bag"
         raise OtherFileError(f"{place}: is a {'bag' if is_bag else 'table'}: {needs}")
-    read = parquet_columns if place.suffix == ".parquet" else read_columns
+    read = parquet_columns if place.suffix.lower() == ".parquet" else read_columns
     table = _bag(place, how) if is_bag else read(place)
     wanted = how.places()
-    _check_columns(place, table, list(wanted))
+    run_key = how.recording.key() if how.recording else ""
+    _check_columns(place, table, list(wanted), run_key)
     skipped = sorted(set(table.numbers) | set(table.texts)) if not how.is_of_bag else []
-    skipped = [name for name in skipped if name not in wanted]
+    skipped = [name for name in skipped if name and name not in wanted]
     notes = (*table.notes, *([f"skipped: {', '.join(skipped)}"] if skipped else []))
-    columns = {name: table.numbers[name] for name in (*wanted, *([_STAMP] if is_bag else []))}
-    runs = columns[how.recording.key()] if how.recording else np.zeros(table.rows)
-    for run in dict.fromkeys(runs[np.isfinite(runs)].tolist()):
-        name = f"{place.stem}_{run:g}" if how.recording else place.stem
-        yield _recording(name, {name: values[runs == run] for name, values in columns.items()}, how, notes)
+    columns = {name: table.numbers[name] for name in (*wanted, *([_STAMP] if is_bag else [])) if name in table.numbers}
+    for run, rows in _runs(table, run_key):
+        yield _recording(place.stem + run, {name: values[rows] for name, values in columns.items()}, how, notes)
 
 
-def _check_columns(place: Path, table: Table, wanted: list[str]) -> None:
+def _runs(table: Table, key: str) -> Iterator[tuple[str, np.ndarray]]:
+    """What each recording's name ends with, and which rows are its own; those that name none are nobody's."""
+    if not key:
+        yield "", np.ones(table.rows, bool)
+        return
+    cells = np.array([cell.strip() for cell in table.texts[key]]) if key in table.texts else table.numbers[key]
+    for run in dict.fromkeys(cells.tolist()):
+        if run != "" and run == run:  # not empty, and not NaN
+            yield f"_{run}" if isinstance(run, str) else f"_{run:g}", cells == run
+
+
+def _check_columns(place: Path, table: Table, wanted: list[str], may_be_text: str) -> None:
     missing = [name for name in wanted if name not in table.numbers and name not in table.texts]
-    there = ", ".join([*table.numbers, *table.texts]) or "none"
-    if len(missing) == len(wanted):
-        raise OtherFileError(f"{place}: no column called {', '.join(missing)}; it has {there}")
-    if missing:
-        raise MeasurementError(f"{place}: no column called {', '.join(missing)}; it has {there}")
-    texts = [f"{name} ({table.texts[name]})" for name in wanted if name in table.texts]
-    if texts:
-        raise MeasurementError(f"{place}: no numbers in column {', '.join(texts)}")
+    texts = [table.why_text(name) for name in wanted if name in table.texts and name != may_be_text]
+    wrong = [f"no column called {', '.join(missing)}; it has {table.holds()}"] if missing else []
+    wrong += [f"no numbers in column {', '.join(texts)}"] if texts else []
+    if wrong:
+        kind = OtherFileError if len(missing) == len(wanted) else MeasurementError
+        raise kind(f"{place}: {'; '.join(wrong)}")
 
 
 def _recording(name: str, rows: Mapping[str, np.ndarray], how: Map, notes: tuple[str, ...]) -> Recording:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from forcegrasp.errors import MeasurementError
-from forcegrasp.importers.recording import Recording, files_below
+from forcegrasp.importers.recording import OtherFileError, Recording, files_below
 from forcegrasp.importers.torch_file import read_tensors
 
 MECHANISM = ""  #: none that comes with the package
@@ -28,21 +28,26 @@ def read(file: Path) -> Recording:
     """
     try:
         content = read_tensors(file)
-    except (OSError, ValueError) as error:
+    except OSError as error:
+        raise MeasurementError(f"{file}: can't be read: {error}") from error
+    except ValueError as error:
         raise MeasurementError(
-            f"{file}: holds more than tensors, or is no .pt file ({error}); nothing in it was executed"
+            f"{file}: holds more than tensors, or is no .pt file ({error}); nothing in it was executed: save"
+            f" {', '.join(_NEEDED)} again as tensors alone"
         ) from error
-    if missing := [name for name in _NEEDED if not isinstance(content.get(name), np.ndarray)]:
-        raise MeasurementError(
-            f"{file}: no tensor {', '.join(missing)}; it has {', '.join(map(str, content)) or 'none'}"
-        )
-    time_s, position, command = (content[name].astype(float) for name in _NEEDED)
-    position, command = (np.atleast_2d(a.T).T for a in (position, command))
-    if not len(time_s) == len(position) == len(command) or position.shape != command.shape:
+    if missing := [name for name in _NEEDED if not isinstance(content.get(name), np.ndarray | list)]:
+        kind = OtherFileError if len(missing) == len(_NEEDED) else MeasurementError
+        raise kind(f"{file}: no tensor {', '.join(missing)}; it has {', '.join(map(str, content)) or 'none'}")
+    try:
+        time_s, position, command = (np.array(content[name], float) for name in _NEEDED)
+    except (TypeError, ValueError) as error:
+        raise MeasurementError(f"{file}: {', '.join(_NEEDED)} must be numbers, as many in each row") from error
+    time_s, position, command = time_s.ravel(), np.atleast_2d(position.T).T, np.atleast_2d(command.T).T
+    if len(time_s) != len(position) or position.shape != command.shape or position.ndim != 2:
         raise MeasurementError(
             f"{file}: time {time_s.shape}, dof_pos {position.shape}, des_dof_pos {command.shape} differ"
         )
-    names: Any = content.get("joint_names")
+    names: Any = content.get("joint_names", content.get("joint_order"))
     known = isinstance(names, list | tuple) and len(names) == position.shape[1]
     joints = tuple(map(str, names)) if known else tuple(f"joint_{i}" for i in range(position.shape[1]))
     notes = () if known else (f"the joints have no names in it: they are called {joints[0]} to {joints[-1]}",)

@@ -53,13 +53,27 @@ class Recording(ShortRepr):
         )  # fmt: skip
 
 
+def is_jaw(joint: str) -> bool:
+    """Whether a joint is a gripper's, by its name."""
+    return any(word in joint.lower() for word in ("jaw", "gripper"))
+
+
+def unlike_a_jaw(one: Recording) -> str:
+    """What to say where a recording may be of no jaw, which is what it is compared with by default."""
+    others = ", ".join(joint for joint in one.joints if not is_jaw(joint))
+    return f"so101_jaw is an empty jaw without gravity: if {others} is none, give mechanism=" if others else ""
+
+
 class OtherFileError(MeasurementError):
     """A file that is no recording of the format at all; in a folder it is left out."""
 
 
-def files_below(source: Path, pattern: str) -> list[Path]:
-    """The file itself, or the files of a folder, and of those below it, whose names are like the pattern."""
-    return [source] if source.is_file() else sorted(source.glob(f"**/{pattern}"))
+def files_below(source: Path, *patterns: str) -> list[Path]:
+    """The file itself, or the files in and below a folder whose names are like a pattern; hidden ones are left out."""
+    if source.is_file():
+        return [source]
+    found = {file: file.relative_to(source).parts for pattern in patterns for file in source.glob(f"**/{pattern}")}
+    return sorted(file for file, parts in found.items() if not any(part.startswith(".") for part in parts))
 
 
 def tidy(one: Recording) -> Recording:

@@ -29,12 +29,12 @@ def read_parquet(path: Path, columns: FileColumns) -> Table:
     if footer.bytes > 2 * MAX_BYTES:
         raise MeasurementError(f"{show(path)}: {footer.bytes / 1e9:.1f} GB when unpacked; split it into several sets")
     try:
-        with _without_stderr():
+        with without_stderr():
             schema = pl.read_parquet_schema(path)
         skipped = columns.check_header(path, list(schema))
         schema = {name: kind for name, kind in schema.items() if name not in skipped}
         _check_types(path, schema, columns)
-        with _without_stderr():
+        with without_stderr():
             frame = pl.read_parquet(path, columns=list(schema), use_statistics=False)
     except MeasurementError:
         raise
@@ -50,8 +50,8 @@ def read_parquet(path: Path, columns: FileColumns) -> Table:
 
 
 @contextmanager
-def _without_stderr() -> Iterator[None]:
-    """Polars panics on some broken files, and Rust prints where before Python hears of it."""
+def without_stderr() -> Iterator[None]:
+    """Keeps quiet what Rust prints before Python hears of it: Polars panics on some broken files."""
     kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
     try:
         os.dup2(nowhere, 2)

@@ -168,10 +168,10 @@ def read_bag(path: Path, signals: dict[str, Signal]) -> dict[str, np.ndarray]:
     try:
         with AnyReader([path], default_typestore=get_typestore(Stores.LATEST)) as bag:
             topics = {connection.topic for connection in bag.connections}
-            for name, signal in signals.items():
-                if signal.topic not in topics:
-                    hint = closest(signal.topic, topics)
-                    raise MeasurementError(f"{show(path)}: {name}: no topic {show(signal.topic)}{hint}")
+            missing = {name: signal.topic for name, signal in signals.items() if signal.topic not in topics}
+            if missing:
+                lines = [f"{name}: no topic {show(topic)}{closest(topic, topics)}" for name, topic in missing.items()]
+                raise MeasurementError(f"{show(path)}: {'; '.join(lines)}")
             connections = [connection for connection in bag.connections if connection.topic in wanted]
             for connection, stamp, data in bag.messages(connections):
                 message = bag.deserialize(data, connection.msgtype)
@@ -186,9 +186,11 @@ def read_bag(path: Path, signals: dict[str, Signal]) -> dict[str, np.ndarray]:
     except Exception as error:  # whatever rosbags, SQLite, the decompressors and the disk can say about a broken bag
         reason = " ".join(str(error).split()) or type(error).__name__
         raise MeasurementError(f"{show(path)}: not a bag that can be read: {show(reason, 150)}") from error
-    for name, values in readings.items():
-        if not values:
-            raise MeasurementError(f"{show(path)}: {name}: never {show(signals[name].field)} in {signals[name].topic}")
+    never = [
+        f"{name}: never {show(signals[name].field)} in {signals[name].topic}" for name in readings if not readings[name]
+    ]
+    if never:
+        raise MeasurementError(f"{show(path)}: {'; '.join(never)}")
     return {name: np.array(values) for name, values in readings.items()}
 
 

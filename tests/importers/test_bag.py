@@ -70,8 +70,8 @@ def test_joint_states_and_goals_of_a_bag(ros, tmp_path):
 def test_what_does_not_fit_a_bag_is_told(tmp_path):
     bag = write(tmp_path, 2)
     for old, new, match in (
-        ("/goal", "/gaol", "no topic '/gaol'"),
-        ("elbow", "ellbow", r"never 'position\[name=ellbow\]' in /goal"),
+        ("topic: /", "topic: /a/", "no topic '/a/goal'.*; /a/joint_states .*no topic '/a/joint_states'"),
+        ("elbow, jaw", "ellbow, yaw", r"never 'position\[name=ellbow\]' in /goal; .*\[name=yaw\]' in /joint_states"),
         ("topic: /goal, column", "column", "command.topic: missing; position has one, and a log is a bag or a table"),
     ):
         (tmp_path / "map.yaml").write_text(MAP.replace(old, new))
