@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from forcegrasp.identify.fit import Fit, cheap_tier
+from forcegrasp.identify.fit import Fit
 from forcegrasp.identify.predict import predict
 from forcegrasp.identify.target import Target
 from forcegrasp.measure.schema import MeasuredGrasp
@@ -77,16 +77,12 @@ def heldout_residual(fit: Fit, target: Target, folds: Sequence[np.ndarray]) -> n
 
 
 def _simulate(fit: Fit, target: Target, doubtful: list[tuple[np.ndarray, np.ndarray]], held: np.ndarray) -> None:
-    """Replaces residuals of folds by simulated ones, of the longest step that lowers the error of the others.
-
-    What a step changes the cheap model knows as well.
-    """
-    problem, replay = fit.problem, Replay(fit.problem.gripper, fit.problem.grasps, cheap_tier(fit.problem.gripper))
+    """Replaces residuals of folds by simulated ones, of the longest step that lowers the error of the others."""
+    problem, replay = fit.problem, Replay(fit.problem.gripper, fit.problem.grasps)
     squares = np.sum((fit.weight * fit.residual) ** 2, axis=(1, 2))
     for scale in _SHARES:
         vectors = [np.clip(fit.vector + scale * step, problem.low, problem.high) for _, step in doubtful]
-        before, *after = predict(replay, [problem.case(vector) for vector in (fit.vector, *vectors)])
-        residuals = [target.residual(fit.predicted + one - before) for one in after]
+        residuals = target.residual(predict(replay, [problem.case(vector) for vector in vectors]))
         left = []
         for (fold, step), residual in zip(doubtful, residuals, strict=True):
             others = np.delete(np.sum((fit.weight * residual) ** 2, axis=(1, 2)), fold)
