@@ -15,7 +15,7 @@ from rich.progress import Progress
 from forcegrasp.config import EvaluateConfig, RewardConfig
 from forcegrasp.env.episodes import METRICS, summarise
 from forcegrasp.evaluate.grids import PAPER_OBJECTS, Grid, make_grid
-from forcegrasp.evaluate.policies import EvaluatedPolicy, gripper_of, load_policies
+from forcegrasp.evaluate.policies import EvaluatedPolicy, load_policies
 from forcegrasp.evaluate.robot_figure import draw_robots
 from forcegrasp.evaluate.robot_report import print_robots, robots_markdown, write_robots_page
 from forcegrasp.evaluate.robot_statistics import describe_robots
@@ -39,9 +39,9 @@ def compare_robots(config: EvaluateConfig, out: Path, console: Console) -> dict:
     """
     torch.set_num_threads(1)
     check_engine(config.physics)
-    gripper = gripper_of(config.policies, config.gripper)
+    policies = load_policies(config.policies, config.gripper)
+    gripper = policies[0].gripper
     config = complete(config, gripper)
-    policies = load_policies(config.policies, gripper)
     robots, grid = population(gripper, config.robots), make_grid(config, gripper)
     everywhere = _repeated(grid, robots)
     out.mkdir(parents=True, exist_ok=True)
