@@ -189,8 +189,9 @@ def report(result: ModelResult | TableResult, out: str | Path | None = None) -> 
         result.advice.next_grasp.write_commands(folder / measuring.NEXT_GRASP, result.data.gripper)
     if isinstance(result, DiagnoseResult) and result.diagnosis.law is not None:
         write_law(result.diagnosis.law.law, folder / measuring.PROPOSED_LAW)
-    return measuring.write_files(
-        folder, result.file, result.to_dict(), result.title, result.box(folder), result.sections(), result.data
+    content, box = result.to_dict(), result.box(folder)
+    return measuring.write_results(
+        folder, result.file, content, result.title, box, result.sections(), result.data, silent
     )
 
 

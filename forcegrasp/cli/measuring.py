@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -87,22 +87,9 @@ def write_results(
     lead: str | Answer,
     sections: Sequence[Section],
     loaded: Loaded,
-) -> None:
-    """Writes the report and the JSON file beside it, and says where."""
-    report = write_files(out, name, content, title, lead, sections, loaded)
-    print(f"report: {report}, figures: {out / f'{name}.json'}")
-
-
-def write_files(
-    out: Path,
-    name: str,
-    content: dict[str, Any],
-    title: str,
-    lead: str | Answer,
-    sections: Sequence[Section],
-    loaded: Loaded,
+    show: Callable[[str], None] = print,
 ) -> Path:
-    """Writes the report and the JSON file beside it; returns the report's path."""
+    """Writes the report and the JSON file beside it, and says where; returns the report's path."""
     import mujoco
 
     from forcegrasp.reports.html import Section, Text, write_report
@@ -113,7 +100,9 @@ def write_files(
     facts = {"set": str(measured.path), "gripper": measured.gripper, "source": measured.source}
     facts |= {"fingerprint": measured.fingerprint, "mujoco": mujoco.__version__}
     write_json(out / f"{name}.json", content)
-    return write_report(out / "report.html", title, lead, sections, facts)
+    report = write_report(out / "report.html", title, lead, sections, facts)
+    show(f"report: {report}, figures: {out / f'{name}.json'}")
+    return report
 
 
 def base_model(base: BaseFit, target: Target, loaded: Loaded[MeasurementSet]) -> Model:
