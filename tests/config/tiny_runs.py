@@ -105,7 +105,7 @@ def threads_asked() -> Iterator[list[int]]:
         return Batch(model, n, nthread)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("forcegrasp.physics.plant.Batch", engine)
+        patch.setattr("forcegrasp.physics.model_fields.Batch", engine)
         yield asked
 
 
