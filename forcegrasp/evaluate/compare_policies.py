@@ -23,7 +23,7 @@ from forcegrasp.evaluate.policies import load_policies
 from forcegrasp.evaluate.rollouts import roll_out
 from forcegrasp.evaluate.statistics import Bootstrap
 from forcegrasp.evaluate.summary import print_summary, simulator_notes
-from forcegrasp.evaluate.tables import markdown
+from forcegrasp.evaluate.tables import markdown, sheets
 from forcegrasp.evaluate.trials_file import write_trials
 from forcegrasp.gpu import check_engine
 from forcegrasp.models.variation import read_model_of, with_noise_of
@@ -90,7 +90,7 @@ def evaluate(config: EvaluateConfig, out: str | Path, console: Console | None = 
         "notes": simulator_notes(config.model, policies),
         "policies": _describe(metrics, baseline, config.seed),
     }
-    (out / "tables.md").write_text(markdown(report), "utf-8")
+    (out / "tables.md").write_text(markdown(sheets(report)), "utf-8")
     (out / "evaluation.json").write_text(json.dumps(report, indent=1, ensure_ascii=False) + "\n", "utf-8")
     write_trials(out / "trials.csv", grid, metrics)
     boxes = _boxes(metrics, grid, config.grasp.steps)
