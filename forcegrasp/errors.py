@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Generator, Iterable
+from contextlib import contextmanager
 
 
 class ForcegraspError(Exception):
@@ -28,6 +29,15 @@ class CheckpointError(ForcegraspError):
 
 class DeployError(ForcegraspError):
     """An exported policy is missing, damaged or can't be run here, or a controller has nothing to hold."""
+
+
+@contextmanager
+def writing(out: object) -> Generator[None]:
+    """Raises ConfigError about ``out=`` if what is written meanwhile can't be."""
+    try:
+        yield
+    except OSError as error:
+        raise ConfigError(f"out={out}: could not write ({error.strerror})") from error
 
 
 def closest(name: str, known: Iterable[str]) -> str:

@@ -25,6 +25,10 @@ LONGEST = (
     *("identify", "transforms", "env", "reports", "deploy", "replay", "grippers", "physics", "independent"),
 )
 
+#: Folders that train and evaluate by the hundred, in environments whose shapes the other folders check: to check them
+#: there again would take a third of their time.
+WHOLE_RUNS = ("config", "train", "evaluate", "cli", "docs")
+
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Puts the tests in the order in which xdist hands their files to its workers."""
@@ -40,6 +44,16 @@ def pytest_collection_finish() -> None:
     torch.set_num_threads(1)
     replay.THREADS = 1
     gc.freeze()  # what is imported by now stays: to look for garbage in it took a tenth of the tests' time
+
+
+@pytest.fixture(autouse=True, scope="module")
+def shapes_are_checked(request) -> Iterator[None]:
+    """Each annotated shape at each call, but in the folders of WHOLE_RUNS."""
+    from jaxtyping import config
+
+    config.update("jaxtyping_disable", request.path.parent.name in WHOLE_RUNS)
+    yield
+    config.update("jaxtyping_disable", False)
 
 
 @pytest.fixture(scope="session")

@@ -137,3 +137,15 @@ def shortened(measured: MeasurementSet, samples: int) -> MeasurementSet:
     names = ("time_s", "command_m", "position_m", "force_n")
     grasps = [dataclasses.replace(g, **{name: getattr(g, name)[:samples] for name in names}) for g in measured.grasps]
     return dataclasses.replace(measured, grasps=tuple(grasps))
+
+
+def result_of(title: str, answer, sections, data: Loaded, figures: dict | None = None) -> SimpleNamespace:
+    """What a report is written from, as results of the verbs have it; its JSON file is ``x.json``."""
+    return SimpleNamespace(
+        file="x",
+        title=title,
+        data=data,
+        sections=lambda: sections,
+        box=lambda out: answer,
+        to_dict=lambda: figures or {},
+    )

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import argparse
 import csv
-import json
 import sys
 import time
 from collections.abc import Iterator
@@ -32,16 +31,17 @@ class Results:
     """What was found so far, a line of JSON each; the last one of a key counts."""
 
     def __init__(self, folder: Path) -> None:
+        from tools.json_lines import read
+
         self.file = folder / "results.jsonl"
-        folder.mkdir(parents=True, exist_ok=True)
-        lines = self.file.read_text("utf-8").splitlines() if self.file.exists() else []
-        self.rows: dict[str, dict[str, Any]] = {row["key"]: row for row in map(json.loads, lines)}
+        self.rows = {row["key"]: row for row in read(self.file)}
 
     def add(self, key: str, row: dict[str, Any]) -> None:
         """Keeps a row, on the disk at once."""
+        from tools.json_lines import append
+
         self.rows[key] = {"key": key} | row
-        with self.file.open("a", encoding="utf-8") as file:
-            file.write(json.dumps(self.rows[key]) + "\n")
+        append(self.file, self.rows[key])
 
     def of(self, stage: str, gripper: str) -> list[dict[str, Any]]:
         """Rows of a stage and a gripper."""
@@ -94,14 +94,15 @@ def evaluate(gripper: str, policies: dict[str, str], trials: int) -> dict[str, d
     from forcegrasp.config import EvaluateConfig
     from forcegrasp.env.episodes import summarise
     from forcegrasp.evaluate.grids import kappa_grid
-    from forcegrasp.evaluate.policies import gripper_of, load_policies
+    from forcegrasp.evaluate.policies import load_policies
     from forcegrasp.evaluate.rollouts import roll_out
     from forcegrasp.physics.completion import complete
 
-    hand = gripper_of(list(policies.values()), gripper)
+    loaded = load_policies(list(policies.values()), gripper)
+    hand = loaded[0].gripper
     config = complete(EvaluateConfig(), hand)
     grid, found = kappa_grid(config.grasp, config.kappas, trials, config.seed, hand), {}
-    for name, evaluated in zip(policies, load_policies(list(policies.values()), hand), strict=True):
+    for name, evaluated in zip(policies, loaded, strict=True):
         parts = {"action": evaluated.action, "observation": evaluated.observation}
         sensors = config.sensors
         episodes = roll_out(

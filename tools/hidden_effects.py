@@ -12,7 +12,6 @@ part of them is a fair sample of all. A set takes about a minute of one core.
 from __future__ import annotations
 
 import argparse
-import json
 import random
 import re
 import shutil
@@ -225,12 +224,12 @@ def _intervals(model, truth) -> list[list]:
 
 def run(only: str, workers: int, renew: bool) -> None:
     """Works through what has no result yet, or none of the present code."""
+    from tools.json_lines import append
     from tools.measured_code import stamp
 
     code = stamp()  # of what the workers are about to import
     done = {row["name"] for row in load_results() if not renew or row.get("digest") == code["digest"]}
     todo = [job for job in jobs() if job.name not in done and re.search(only, job.name)]
-    RESULTS.parent.mkdir(exist_ok=True)
     print(f"{len(todo)} sets to diagnose, {len(done)} done")
     with ProcessPoolExecutor(workers) as pool:
         running = {pool.submit(run_job, job): job for job in todo}
@@ -245,8 +244,7 @@ def run(only: str, workers: int, renew: bool) -> None:
                     "error": repr(error),
                 }
             row |= code
-            with RESULTS.open("a") as file:
-                file.write(json.dumps(row) + "\n")
+            append(RESULTS, row)
             said = ", ".join(row.get("effects", [])) or row.get("error", "")
             print(
                 f"[{number}/{len(todo)}] {row['name']}: {row['verdict']} {said} ({row.get('processor_s', 0):.0f} s)",
@@ -256,10 +254,9 @@ def run(only: str, workers: int, renew: bool) -> None:
 
 def load_results() -> list[dict]:
     """All results so far, the last of each name."""
-    if not RESULTS.exists():
-        return []
-    rows = [json.loads(line) for line in RESULTS.read_text().splitlines()]
-    return list({row["name"]: row for row in rows}.values())
+    from tools.json_lines import read
+
+    return list({row["name"]: row for row in read(RESULTS)}.values())
 
 
 def check() -> int:

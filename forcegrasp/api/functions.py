@@ -6,20 +6,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TypeVar
 
-from forcegrasp.api.results import (
-    AddResult,
-    CompareResult,
-    DiagnoseResult,
-    FitResult,
-    ModelResult,
-    TableResult,
-)
 from forcegrasp.cli import measuring
 from forcegrasp.cli.results import default_out
 from forcegrasp.config import CompareConfig, DiagnoseConfig, FitConfig, validate
 from forcegrasp.diagnosis import add_effect, diagnose_set
 from forcegrasp.diagnosis.advice import advise
-from forcegrasp.effects.law import write_law
 from forcegrasp.errors import ConfigError
 from forcegrasp.final_force.analysis import analyse_table
 from forcegrasp.identify import comparison, fit_set, loading
@@ -27,6 +18,15 @@ from forcegrasp.identify.loading import Loaded
 from forcegrasp.identify.progress import Progress, silent
 from forcegrasp.measure import FinalForceTable, MeasurementSet
 from forcegrasp.models.model_file import Model, read_model, write_model
+from forcegrasp.reports.results import (
+    AddResult,
+    CompareResult,
+    DiagnoseResult,
+    FitResult,
+    ModelResult,
+    TableResult,
+    base_model,
+)
 from forcegrasp.short_repr import cut
 
 Writable = TypeVar("Writable", FitResult, AddResult)
@@ -95,7 +95,7 @@ def fit(data: AnySet, *, out: str | Path | None = None, seed: int = 0, progress:
     loaded, show = _open(data, progress)
     grasps = measuring.refuse_table(loaded, "fit")
     target, _, base = fit_set.fit_model(grasps, seed, show)
-    return _written(FitResult(grasps, target, base, measuring.base_model(base, target, grasps), path))
+    return _written(FitResult(grasps, target, base, base_model(base, target, grasps), path))
 
 
 def diagnose(
@@ -183,15 +183,8 @@ def report(result: ModelResult | TableResult, out: str | Path | None = None) -> 
     """
     verb = "diagnose" if result.file == "diagnosis" else result.file
     folder = measuring.check_folder(default_out(verb, str(out or "")))
-    for name, model in result.models().items():
-        write_model(model, folder / name)
-    if isinstance(result, DiagnoseResult) and result.advice is not None:
-        result.advice.next_grasp.write_commands(folder / measuring.NEXT_GRASP, result.data.gripper)
-    if isinstance(result, DiagnoseResult) and result.diagnosis.law is not None:
-        write_law(result.diagnosis.law.law, folder / measuring.PROPOSED_LAW)
-    return measuring.write_files(
-        folder, result.file, result.to_dict(), result.title, result.box(folder), result.sections(), result.data
-    )
+    result.write_beside(folder)
+    return measuring.write_results(folder, result, silent)
 
 
 def _open(data: AnySet, progress: Progress | None) -> tuple[Loaded[MeasurementSet] | Loaded[FinalForceTable], Progress]:

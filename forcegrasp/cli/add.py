@@ -40,7 +40,7 @@ def run(config: AddConfig) -> None:
     from forcegrasp.identify import loading
     from forcegrasp.models.model_file import write_model
     from forcegrasp.reports import fit as fit_report
-    from forcegrasp.reports.next_step import after_adding
+    from forcegrasp.reports.results import AddResult
 
     check_effects("effect", [config.effect])
     folder = check_folder(default_out("add", ""))
@@ -53,22 +53,13 @@ def run(config: AddConfig) -> None:
     tell_warnings(loaded)
     added = add_effect.add_effect(loaded, model, effect, progress_printer())
     refuse_useless(added, effect, shlex.join(["forcegrasp", "diagnose", f"data={data}", f"model={old}"]))
-    lead = fit_report.add_answer(added, effect)
+    result = AddResult(loaded, added, effect, path)
     print_table(fit_report.printed_fall(added, effect))
     print_table(fit_report.printed_parameters(added.model))
-    print("\n".join([lead, *(f"warning: {warning}" for warning in added.model.warnings)]))
+    print("\n".join([result.answer, *(f"warning: {warning}" for warning in added.model.warnings)]))
     write_model(added.model, path)
-    command = after_adding(data, path, added.model.gripper)
-    print(f"wrote {path}\nnext: {command}")
-    write_results(
-        folder,
-        "add",
-        fit_report.add_json(added, effect, loaded.measured.name, path),
-        f"{effect.name} added: {loaded.measured.name}",
-        fit_report.model_box(lead, added.model, [command]),
-        fit_report.add_sections(added, effect),
-        loaded,
-    )
+    print(f"wrote {path}\nnext: {result.commands(folder)[0]}")
+    write_results(folder, result)
 
 
 VERB = Verb(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from pathlib import Path
 
 from forcegrasp.cli.results import default_out, need_sets, print_table, progress_printer
@@ -21,50 +20,30 @@ def run(config: CompareConfig) -> None:
     """Runs the verb."""
     folders = need_sets(config.data)
 
-    from forcegrasp.cli.measuring import (
-        BASE_MODEL,
-        check_folder,
-        is_table,
-        report_table,
-        take_model,
-        tell_warnings,
-        write_results,
-    )
+    from forcegrasp.cli.measuring import check_folder, is_table, report_table, take_model, tell_warnings, write_results
     from forcegrasp.identify import comparison, loading
-    from forcegrasp.models.model_file import write_model
     from forcegrasp.reports import between_sets
     from forcegrasp.reports import comparison as comparison_report
-    from forcegrasp.reports.next_step import after_comparison
+    from forcegrasp.reports.results import BASE_MODEL, CompareResult
 
     out = check_folder(default_out("compare", config.out))
     loaded = loading.load(folders)
-    data = loaded.measured.path
     if is_table(loaded):
         report_table(loaded, "compare", out, model=config.model)
         return
     model, loaded = take_model(Path(config.model), loaded) if config.model else (None, loaded)
     tell_warnings(loaded)
     found, used, notes = comparison.compare(loaded, model, config.seed, progress_printer())
-    notes, name = [*notes, *used.warnings], config.model or "base model, fitted to this set"
-    lead = comparison_report.answer(found)
+    result = CompareResult(loaded, found, used, config.model, (*notes, *used.warnings), config.model)
     print_table(comparison_report.printed(found))
-    print("\n".join([lead, *comparison_report.details(found), *(f"note: {note}" for note in notes)]))
+    print("\n".join([result.answer, *comparison_report.details(found), *(f"note: {note}" for note in result.notes)]))
     if found.between is not None:
         print_table(between_sets.printed(found.between))
+    result.write_beside(out)
     if model is None:
-        write_model(dataclasses.replace(used, warnings=tuple(notes)), out / BASE_MODEL)
         print(f"wrote {out / BASE_MODEL}: the base model, fitted to this set")
-    commands = after_comparison(found, data, config.model or out / BASE_MODEL)
-    print(f"next: {commands[0]}")
-    write_results(
-        out,
-        "compare",
-        comparison_report.compare_json(found, loaded.measured.name, name, notes),
-        f"Where the model fails: {loaded.measured.name}",
-        comparison_report.answer_box(found, notes, commands),
-        comparison_report.sections(found, notes),
-        loaded,
-    )
+    print(f"next: {result.commands(out)[0]}")
+    write_results(out, result)
 
 
 VERB = Verb(

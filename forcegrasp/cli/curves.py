@@ -6,7 +6,7 @@ from pathlib import Path
 
 from forcegrasp.cli.verb import Verb
 from forcegrasp.config.verbs import CurvesConfig
-from forcegrasp.errors import ConfigError
+from forcegrasp.errors import ConfigError, writing
 
 NOTES = """
   FOLDER     a sweep's folder, a run's, or any folder with runs below it; several are drawn together
@@ -24,10 +24,8 @@ def run(config: CurvesConfig) -> None:
     from forcegrasp.evaluate.curves import learning_curves
 
     out = Path(config.out) if config.out else folders[0]
-    try:
+    with writing(out):
         learning_curves(folders, out)
-    except OSError as error:
-        raise ConfigError(f"out={out}: could not write ({error.strerror})") from error
 
 
 VERB = Verb(

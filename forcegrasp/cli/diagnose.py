@@ -30,11 +30,6 @@ def run(config: DiagnoseConfig) -> None:
     folders = need_sets(config.data)
 
     from forcegrasp.cli.measuring import (
-        BASE_MODEL,
-        FOUND_MODEL,
-        NEXT_GRASP,
-        PROPOSED_LAW,
-        base_model,
         check_effects,
         check_folder,
         is_table,
@@ -45,18 +40,14 @@ def run(config: DiagnoseConfig) -> None:
     )
     from forcegrasp.diagnosis import diagnose_set
     from forcegrasp.diagnosis.advice import advise
-    from forcegrasp.effects.law import write_law
     from forcegrasp.identify import loading
-    from forcegrasp.identify.fitted_model import model_of
-    from forcegrasp.models.model_file import write_model
     from forcegrasp.reports import diagnosis as diagnosis_report
-    from forcegrasp.reports.diagnosis_box import answer_box
-    from forcegrasp.reports.next_step import added_law, after_diagnosis, next_grasp_words
+    from forcegrasp.reports.next_step import added_law, next_grasp_words
+    from forcegrasp.reports.results import BASE_MODEL, FOUND_MODEL, NEXT_GRASP, PROPOSED_LAW, DiagnoseResult
 
     check_effects("effects", config.effects)
     out = check_folder(default_out("diagnose", config.out))
     loaded = loading.load(folders)
-    data = loaded.measured.path
     if is_table(loaded):
         report_table(loaded, "diagnosis", out, model=config.model, effects=config.effects)
         return
@@ -66,38 +57,24 @@ def run(config: DiagnoseConfig) -> None:
     names, progress = [e.name for e in tried], progress_printer()
     diagnosis, _ = diagnose_set.diagnose_set(loaded, model, names, config.seed, progress, law=config.law)
     advice = advise(diagnosis)
-    lead, table = diagnosis_report.answer(diagnosis), diagnosis_report.printed(diagnosis)
-    note = f"Only {', '.join(config.effects)} were tried." if config.effects else ""
-    lead = f"{lead} {note}".rstrip()
-    if table is not None:
+    result = DiagnoseResult(loaded, diagnosis, advice, tuple(tried), tuple(config.effects), config.model)
+    if (table := diagnosis_report.printed(diagnosis)) is not None:
         print_table(table)
-    print("\n".join([f"{diagnosis.verdict}: {lead}", *diagnosis_report.lines(diagnosis, advice)]))
+    print("\n".join([f"{diagnosis.verdict}: {result.answer}", *diagnosis_report.lines(diagnosis, advice)]))
+    result.write_beside(out)
     known, found = config.model or out / BASE_MODEL, out / FOUND_MODEL
-    commands = after_diagnosis(diagnosis, advice, data, known, found)
     if model is None:
-        write_model(base_model(diagnosis.base, diagnosis.target, loaded), out / BASE_MODEL)
         print(f"wrote {known}: the base model, fitted to this set")
     if diagnosis.verdict.lacks_effects:
-        better = model_of(diagnosis.fit, diagnosis.target, loaded, diagnosis.numerical)
-        write_model(better, found)
-        print(f"wrote {found}: the model with {', '.join(e.effect.name for e in better.effects)}")
+        print(f"wrote {found}: the model with {', '.join(e.effect.name for e in result.model.effects)}")
     if advice is not None:
-        advice.next_grasp.write_commands(out / NEXT_GRASP, loaded.gripper)
         print(f"wrote {out / NEXT_GRASP}: {next_grasp_words(loaded.measured, out / 'diagnosis.json')}")
     if diagnosis.law is not None:
-        write_law(diagnosis.law.law, law := out / PROPOSED_LAW)
-        with_it = found if diagnosis.verdict.lacks_effects else known
-        print(f"wrote {law}: the law, to name, edit and add: {added_law(data, with_it, law)}")
-    print("\n".join(f"{'or' if k else 'next'}: {command}" for k, command in enumerate(commands)))
-    write_results(
-        out,
-        "diagnosis",
-        diagnosis_report.diagnosis_json(diagnosis, advice, tried, loaded.measured.name),
-        f"What the model lacks: {loaded.measured.name}",
-        answer_box(diagnosis, advice, commands, note),
-        diagnosis_report.sections(diagnosis, advice, tried),
-        loaded,
-    )
+        law, with_it = out / PROPOSED_LAW, found if diagnosis.verdict.lacks_effects else known
+        told = added_law(loaded.measured.path, with_it, law)
+        print(f"wrote {law}: the law, to name, edit and add: {told}")
+    print("\n".join(f"{'or' if k else 'next'}: {command}" for k, command in enumerate(result.commands(out))))
+    write_results(out, result)
 
 
 VERB = Verb(

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import time
-from pathlib import Path
-
+from forcegrasp.cli.results import default_out
 from forcegrasp.cli.verb import Verb
 from forcegrasp.config.verbs import EvaluateConfig
-from forcegrasp.errors import ConfigError
+from forcegrasp.errors import writing
 from forcegrasp.policies import shipped_policies
 
 NOTES = f"""
@@ -23,14 +21,12 @@ NOTES = f"""
 
 def run(config: EvaluateConfig) -> None:
     """Runs the verb."""
-    out = Path(config.out or f"runs/evaluate_{time.strftime('%Y-%m-%d_%H-%M-%S')}")
+    out = default_out("evaluate", config.out)
 
     from forcegrasp.evaluate.compare_policies import evaluate
 
-    try:
+    with writing(out):
         evaluate(config, out)
-    except OSError as error:
-        raise ConfigError(f"out={out}: could not write ({error.strerror})") from error
 
 
 VERB = Verb(

@@ -6,7 +6,7 @@ from forcegrasp.cli.measuring import check_folder
 from forcegrasp.cli.results import default_out
 from forcegrasp.cli.verb import Verb
 from forcegrasp.config.verbs import ExportConfig
-from forcegrasp.errors import ConfigError
+from forcegrasp.errors import ConfigError, writing
 
 NOTES = """
   RUN        a run directory of forcegrasp train, the name of a policy that comes with the package, or force_pi,
@@ -26,10 +26,8 @@ def run(config: ExportConfig) -> None:
 
     from forcegrasp.runs.export import CHECKS, export_policy
 
-    try:
+    with writing(out):
         done = export_policy(config.run, out, config.ceiling_n, config.gripper)
-    except OSError as error:
-        raise ConfigError(f"out={out}: could not write ({error.strerror})") from error
     if done.difference is None:
         print(f"{out}: contract.json ({done.contract})")
     else:

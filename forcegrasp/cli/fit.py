@@ -17,41 +17,23 @@ def run(config: FitConfig) -> None:
     """Runs the verb."""
     folders = need_sets(config.data)
 
-    from forcegrasp.cli.measuring import (
-        base_model,
-        check_file,
-        check_folder,
-        refuse_table,
-        tell_warnings,
-        write_results,
-    )
+    from forcegrasp.cli.measuring import check_file, check_folder, refuse_table, tell_warnings, write_results
     from forcegrasp.identify import fit_set, loading
     from forcegrasp.models.model_file import write_model
     from forcegrasp.reports import fit as fit_report
-    from forcegrasp.reports.next_step import after_fit
+    from forcegrasp.reports.results import FitResult, base_model
 
     folder = check_folder(default_out("fit", ""))
     path = check_file(folder / "model.yaml" if not config.out else need(config.out, "out", "model.yaml"))
     loaded = refuse_table(loading.load(folders), "fit")
-    data = loaded.measured.path
     tell_warnings(loaded)
     target, _, base = fit_set.fit_model(loaded, config.seed, progress_printer())
-    model = base_model(base, target, loaded)
-    lead = fit_report.fit_answer(base, target)
-    print_table(fit_report.printed_parameters(model))
-    print("\n".join([lead, *(f"warning: {warning}" for warning in model.warnings)]))
-    write_model(model, path)
-    command = after_fit(data, path)
-    print(f"wrote {path}\nnext: {command}")
-    write_results(
-        folder,
-        "fit",
-        fit_report.fit_json(base, target, model, loaded.measured.name, path),
-        f"Base model of {loaded.measured.name}",
-        fit_report.model_box(lead, model, [command]),
-        fit_report.fit_sections(base, target, model),
-        loaded,
-    )
+    result = FitResult(loaded, target, base, base_model(base, target, loaded), path)
+    print_table(fit_report.printed_parameters(result.model))
+    print("\n".join([result.answer, *(f"warning: {warning}" for warning in result.model.warnings)]))
+    write_model(result.model, path)
+    print(f"wrote {path}\nnext: {result.commands(folder)[0]}")
+    write_results(folder, result)
 
 
 VERB = Verb(

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import dataclasses
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from forcegrasp.cli.results import write_json
 from forcegrasp.errors import ConfigError, closest
@@ -16,24 +15,13 @@ if TYPE_CHECKING:
 
     from forcegrasp.diagnosis.add_effect import Added
     from forcegrasp.effects import Effect
-    from forcegrasp.final_force.analysis import TableAnalysis
-    from forcegrasp.identify.base_fit import BaseFit
     from forcegrasp.identify.loading import Loaded
-    from forcegrasp.identify.target import Target
     from forcegrasp.measure import FinalForceTable, MeasurementSet
     from forcegrasp.models.model_file import Model
     from forcegrasp.physics.gripper import Gripper
-    from forcegrasp.reports.html import Answer, Section
+    from forcegrasp.reports.results import Result
 
 
-#: The base model that compare and diagnose fit where none is given, beside their report.
-BASE_MODEL = "base_model.yaml"
-#: The model with all effects that a diagnosis found, beside its report.
-FOUND_MODEL = "model.yaml"
-#: The commands of the grasp that a diagnosis proposes, beside its report.
-NEXT_GRASP = "next_grasp.csv"
-#: The law that a diagnosis proposes, beside its report.
-PROPOSED_LAW = "law.yaml"
 #: With an effect added, the error must fall to less than this share.
 LEAST_FALL = 0.995
 
@@ -79,52 +67,22 @@ def tell_warnings(loaded: Loaded) -> None:
         print(f"warning: {warning}")
 
 
-def write_results(
-    out: Path,
-    name: str,
-    content: dict[str, Any],
-    title: str,
-    lead: str | Answer,
-    sections: Sequence[Section],
-    loaded: Loaded,
-) -> None:
-    """Writes the report and the JSON file beside it, and says where."""
-    report = write_files(out, name, content, title, lead, sections, loaded)
-    print(f"report: {report}, figures: {out / f'{name}.json'}")
-
-
-def write_files(
-    out: Path,
-    name: str,
-    content: dict[str, Any],
-    title: str,
-    lead: str | Answer,
-    sections: Sequence[Section],
-    loaded: Loaded,
-) -> Path:
-    """Writes the report and the JSON file beside it; returns the report's path."""
+def write_results(out: Path, result: Result, show: Callable[[str], None] = print) -> Path:
+    """Writes the report and the JSON file beside it, and says where; returns the report's path."""
     import mujoco
 
     from forcegrasp.reports.html import Section, Text, write_report
 
-    if loaded.warnings:
-        sections = [*sections, Section("Odd in this set", [Text(warning) for warning in loaded.warnings])]
-    measured = loaded.measured
+    sections, measured, warnings = result.sections(), result.data.measured, result.data.warnings
+    if warnings:
+        sections = [*sections, Section("Odd in this set", [Text(warning) for warning in warnings])]
     facts = {"set": str(measured.path), "gripper": measured.gripper, "source": measured.source}
     facts |= {"fingerprint": measured.fingerprint, "mujoco": mujoco.__version__}
-    write_json(out / f"{name}.json", content)
-    return write_report(out / "report.html", title, lead, sections, facts)
-
-
-def base_model(base: BaseFit, target: Target, loaded: Loaded[MeasurementSet]) -> Model:
-    """A fitted base model, which says if it is not to be believed."""
-    from forcegrasp.identify.fitted_model import model_of
-    from forcegrasp.identify.noise_floor import numerical_error
-
-    model = model_of(base.fit, target, loaded, numerical_error(base.fit, target))
-    if base.converged:
-        return model
-    return dataclasses.replace(model, warnings=(f"the fit did not converge: {base.reason}", *model.warnings))
+    figures = out / f"{result.file}.json"
+    write_json(figures, result.to_dict())
+    report = write_report(out / "report.html", result.title, result.box(out), sections, facts)
+    show(f"report: {report}, figures: {figures}")
+    return report
 
 
 def is_table(loaded: Loaded) -> TypeIs[Loaded[FinalForceTable]]:
@@ -162,15 +120,14 @@ def report_table(loaded: Loaded[FinalForceTable], name: str, out: Path, **unused
     """
     refuse_options(loaded, **unused)
     from forcegrasp.final_force.analysis import analyse_table
-    from forcegrasp.reports import final_force as final_force_report
+    from forcegrasp.reports.final_force import lines
+    from forcegrasp.reports.results import TableResult
 
     tell_warnings(loaded)
-    analysis = analyse_table(loaded.measured, loaded.gripper)
-    for line in final_force_report.lines(analysis):
+    result = TableResult(loaded, analyse_table(loaded.measured, loaded.gripper), name)
+    for line in lines(result.analysis):
         print(line)
-    as_json = final_force_report.compare_json if name == "compare" else final_force_report.diagnosis_json
-    title, lead = table_title(loaded, name), table_answer(analysis)
-    write_results(out, name, as_json(analysis), title, lead, final_force_report.sections(analysis), loaded)
+    write_results(out, result)
 
 
 def refuse_options(loaded: Loaded[FinalForceTable], **unused: object) -> None:
@@ -181,18 +138,6 @@ def refuse_options(loaded: Loaded[FinalForceTable], **unused: object) -> None:
                 f"{option}: {loaded.measured.path} is a table of final forces, which is held against the static law and"
                 f" all shapes that effects give it; leave {option}= out"
             )
-
-
-def table_title(loaded: Loaded[FinalForceTable], name: str) -> str:
-    """Heading of a table's report."""
-    question = "Where the static law fails" if name == "compare" else "What the static law lacks"
-    return f"{question}: {loaded.measured.name}"
-
-
-def table_answer(analysis: TableAnalysis) -> str:
-    """What a table of final forces says, in words."""
-    lead = f"{analysis.verdict.replace('_', ' ').capitalize()}: {analysis.reason}."
-    return f"{lead} It could be any of {', '.join(analysis.effects)}." if analysis.effects else lead
 
 
 def refuse_one_grasp(loaded: Loaded[MeasurementSet]) -> None:

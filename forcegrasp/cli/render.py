@@ -8,7 +8,7 @@ from pathlib import Path
 
 from forcegrasp.cli.verb import Verb
 from forcegrasp.config.verbs import RenderConfig
-from forcegrasp.errors import ConfigError
+from forcegrasp.errors import ConfigError, writing
 
 NOTES = """
   policy=NAME        a run directory, a shipped policy or a controller
@@ -34,10 +34,8 @@ def run(config: RenderConfig) -> None:
 
     from forcegrasp.evaluate.render import render
 
-    try:
+    with writing(out):
         render(config, out if config.out or not config.live else None)
-    except OSError as error:
-        raise ConfigError(f"out={out}: could not write ({error.strerror})") from error
 
 
 VERB = Verb(

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from forcegrasp.errors import ConfigError
+from forcegrasp.errors import ConfigError, writing
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -79,11 +79,9 @@ def write_json(path: Path, content: dict[str, Any]) -> None:
     Raises:
       ConfigError: if the file can't be written.
     """
-    try:
+    with writing(path.parent):
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(json.dumps(_finite(content), indent=2, ensure_ascii=False, allow_nan=False) + "\n", "utf-8")
-    except OSError as error:
-        raise ConfigError(f"out={path.parent}: could not write ({error.strerror})") from error
 
 
 def _finite(value: Any) -> Any:

@@ -142,13 +142,15 @@ class ImportConfig:
     example: bool = option(False, "write a starter set instead")
 
 
+def _sets() -> list[str]:
+    return option([], "folder of the measurement set, or of several of one gripper to join; also given without data=")
+
+
 @dataclass
 class CompareConfig:
     """`forcegrasp compare`."""
 
-    data: list[str] = option(
-        [], "folder of the measurement set, or of several of one gripper to join; also given without data="
-    )
+    data: list[str] = _sets()
     model: str = option("", "model file; the gripper's base model, fitted to the set, if empty")
     out: str = option("", "where to write report.html, compare.json and base_model.yaml; runs/compare_TIME if empty")
     seed: int = option(0, "seed of the fit's starts", low=0, high=2**31 - 1)
@@ -158,9 +160,7 @@ class CompareConfig:
 class FitConfig:
     """`forcegrasp fit`."""
 
-    data: list[str] = option(
-        [], "folder of the measurement set, or of several of one gripper to join; also given without data="
-    )
+    data: list[str] = _sets()
     out: str = option("", "model file to write; runs/fit_TIME/model.yaml if empty")
     seed: int = option(0, "seed of the fit's starts", low=0, high=2**31 - 1)
 
@@ -169,9 +169,7 @@ class FitConfig:
 class DiagnoseConfig:
     """`forcegrasp diagnose`."""
 
-    data: list[str] = option(
-        [], "folder of the measurement set, or of several of one gripper to join; also given without data="
-    )
+    data: list[str] = _sets()
     model: str = option("", "model file to start from; the base model is fitted to the set if empty")
     out: str = option("", "where to write report.html, diagnosis.json and models; runs/diagnose_TIME if empty")
     effects: list[str] = option([], "effects to consider; all of the catalogue if empty")
@@ -183,9 +181,7 @@ class DiagnoseConfig:
 class AddConfig:
     """`forcegrasp add`."""
 
-    data: list[str] = option(
-        [], "folder of the measurement set, or of several of one gripper to join; also given without data="
-    )
+    data: list[str] = _sets()
     model: str = option("", "model file to add to")
     effect: str = option("", "effect to add, see forcegrasp effects; or the file of a law")
     out: str = option("", "model file to write; runs/add_TIME/model.yaml if empty")

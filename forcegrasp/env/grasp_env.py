@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import torch
@@ -130,27 +131,31 @@ class GraspEnv(EnvBase):
         else:
             self.simulator.step(delta.numpy().astype(np.float64))
         state, config = self._state(), self.reward_config
-        goal = state.get("goal_force")
-        judged = state.get("measured_force" if config.forces == "measured" else "force")
-        form = force_reward(goal - judged) if config.form == "paper" else normalised_force_reward(goal - judged, goal)
-        reward = config.force_weight * form + config.object_weight * state["reward_terms", "object"]
-        reward = reward + config.overshoot_weight * overshoot_penalty(judged, goal, config.overshoot_margin)
+        terms: Any = state.get("reward_terms")
+        judged = terms if config.forces == "actual" else self._force_terms(state["measured_force"], state["goal_force"])
+        form = judged["force_paper" if config.form == "paper" else "force_normalised"]
+        reward = config.force_weight * form + config.object_weight * terms["object"]
+        reward = reward + config.overshoot_weight * judged["overshoot"]
         return state.set("reward", reward).update(self._done())
 
     def _column(self, values: Shaped[np.ndarray | Tensor, "{self.simulator.n} ..."]) -> Float[Tensor, "n k"]:
         """A simulator's values ``(n,)`` or ``(n, k)`` as a float32 tensor ``(n, k)`` on the env's device."""
         return torch.as_tensor(values, dtype=torch.float32, device=self.device).reshape(self.simulator.n, -1)
 
+    def _force_terms(self, force: Tensor, goal: Tensor) -> dict[str, Tensor]:
+        """The reward's terms that follow from forces, newtons, ``(n, 2)`` or ``(n, channels)``; unweighted."""
+        error = goal - force
+        return {
+            "force_paper": force_reward(error),
+            "force_normalised": normalised_force_reward(error, goal),
+            "overshoot": overshoot_penalty(force, goal, self.reward_config.overshoot_margin),
+        }
+
     def _state(self) -> TensorDict:
         simulator, column, parameters = self.simulator, self._column, self._drawn.clone()
         force, goal, speed = column(simulator.force), parameters[:, -1:], column(simulator.object_speed)
-        error = goal - force
-        terms = {
-            "force_paper": force_reward(error),
-            "force_normalised": normalised_force_reward(error, goal),
-            "object": object_penalty(speed, self.reward_config.speed_threshold_m),
-            "overshoot": overshoot_penalty(force, goal, self.reward_config.overshoot_margin),
-        }
+        terms = self._force_terms(force, goal)
+        terms["object"] = object_penalty(speed, self.reward_config.speed_threshold_m)
         state = TensorDict(
             {
                 "joint_position": column(simulator.joint_position),

@@ -19,11 +19,11 @@ from forcegrasp.evaluate.compare_robots import compare_robots
 from forcegrasp.evaluate.grids import Grid, make_grid
 from forcegrasp.evaluate.page import write_page
 from forcegrasp.evaluate.plots import cell_boxes, force_traces
-from forcegrasp.evaluate.policies import gripper_of, load_policies
+from forcegrasp.evaluate.policies import load_policies
 from forcegrasp.evaluate.rollouts import roll_out
 from forcegrasp.evaluate.statistics import Bootstrap
 from forcegrasp.evaluate.summary import print_summary, simulator_notes
-from forcegrasp.evaluate.tables import markdown
+from forcegrasp.evaluate.tables import markdown, sheets
 from forcegrasp.evaluate.trials_file import write_trials
 from forcegrasp.gpu import check_engine
 from forcegrasp.models.variation import read_model_of, with_noise_of
@@ -49,10 +49,10 @@ def evaluate(config: EvaluateConfig, out: str | Path, console: Console | None = 
         return compare_robots(config, out, console)
     torch.set_num_threads(1)
     check_engine(config.physics)
-    gripper = gripper_of(config.policies, config.gripper)
+    policies = load_policies(config.policies, config.gripper)
+    gripper = policies[0].gripper
     model = read_model_of(gripper, config.model) if config.model else None
     config = complete(config, with_noise_of(gripper, model))
-    policies = load_policies(config.policies, gripper)
     baseline = config.baseline if config.baseline in {c.name for c in policies} else ""
     grid, colours = make_grid(config, gripper), policy_colours(c.name for c in policies)
     out.mkdir(parents=True, exist_ok=True)
@@ -90,7 +90,7 @@ def evaluate(config: EvaluateConfig, out: str | Path, console: Console | None = 
         "notes": simulator_notes(config.model, policies),
         "policies": _describe(metrics, baseline, config.seed),
     }
-    (out / "tables.md").write_text(markdown(report), "utf-8")
+    (out / "tables.md").write_text(markdown(sheets(report)), "utf-8")
     (out / "evaluation.json").write_text(json.dumps(report, indent=1, ensure_ascii=False) + "\n", "utf-8")
     write_trials(out / "trials.csv", grid, metrics)
     boxes = _boxes(metrics, grid, config.grasp.steps)

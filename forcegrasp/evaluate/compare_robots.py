@@ -15,12 +15,13 @@ from rich.progress import Progress
 from forcegrasp.config import EvaluateConfig, RewardConfig
 from forcegrasp.env.episodes import METRICS, summarise
 from forcegrasp.evaluate.grids import PAPER_OBJECTS, Grid, make_grid
-from forcegrasp.evaluate.policies import EvaluatedPolicy, gripper_of, load_policies
+from forcegrasp.evaluate.policies import EvaluatedPolicy, load_policies
 from forcegrasp.evaluate.robot_figure import draw_robots
-from forcegrasp.evaluate.robot_report import print_robots, robots_markdown, write_robots_page
+from forcegrasp.evaluate.robot_report import print_robots, robot_sheets, write_robots_page
 from forcegrasp.evaluate.robot_statistics import describe_robots
 from forcegrasp.evaluate.rollouts import BATCH, roll_out
 from forcegrasp.evaluate.table1 import PAPER, nearest_to_table
+from forcegrasp.evaluate.tables import markdown
 from forcegrasp.evaluate.trials_file import write_trials
 from forcegrasp.gpu import check_engine
 from forcegrasp.models.robots import FixedRobots, Robots, population
@@ -39,9 +40,9 @@ def compare_robots(config: EvaluateConfig, out: Path, console: Console) -> dict:
     """
     torch.set_num_threads(1)
     check_engine(config.physics)
-    gripper = gripper_of(config.policies, config.gripper)
+    policies = load_policies(config.policies, config.gripper)
+    gripper = policies[0].gripper
     config = complete(config, gripper)
-    policies = load_policies(config.policies, gripper)
     robots, grid = population(gripper, config.robots), make_grid(config, gripper)
     everywhere = _repeated(grid, robots)
     out.mkdir(parents=True, exist_ok=True)
@@ -72,7 +73,7 @@ def compare_robots(config: EvaluateConfig, out: Path, console: Console) -> dict:
     report |= describe_robots(metrics, robots, report["baseline"], config.seed)
     if config.objects == PAPER_OBJECTS and PAPER.keys() <= metrics.keys():
         report["table1"] = nearest_to_table(metrics, robots)
-    (out / "tables.md").write_text(robots_markdown(report), "utf-8")
+    (out / "tables.md").write_text(markdown(robot_sheets(report)), "utf-8")
     (out / "evaluation.json").write_text(json.dumps(report, indent=1, ensure_ascii=False) + "\n", "utf-8")
     write_trials(out / "trials.csv", everywhere, metrics)
     figure = draw_robots(report)

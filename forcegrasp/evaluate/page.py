@@ -7,7 +7,7 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from forcegrasp.evaluate.summary import legend, sentences, short_sheet
-from forcegrasp.evaluate.tables import Sheet, sheets
+from forcegrasp.evaluate.tables import sheets
 from forcegrasp.reports.html import Picture, Section, Table, Text, write_report
 
 
@@ -25,7 +25,7 @@ def write_page(path: Path, report: dict, boxes: dict[str, Figure], traces: dict[
     """
     said = sentences(report)
     sections = [
-        Section("In short", [_table(short_sheet(report)), Text(legend(report)), *map(Text, said[2:])]),
+        Section("In short", [Table(*short_sheet(report).in_lines()), Text(legend(report)), *map(Text, said[2:])]),
         Section(
             "By " + report["what"],
             [
@@ -40,14 +40,9 @@ def write_page(path: Path, report: dict, boxes: dict[str, Figure], traces: dict[
                 for name, figure in traces.items()
             ],
         ),
-        *(Section(sheet.title[:1].upper() + sheet.title[1:], [_table(sheet)]) for sheet in sheets(report)),
+        *(Section(sheet.title[:1].upper() + sheet.title[1:], [Table(*sheet.in_lines())]) for sheet in sheets(report)),
     ]
     facts = {name: str(report[name]) for name in ("seed", "trials", "steps", "physics", "model", "baseline")}
     return write_report(
         path, f"Policies compared: {', '.join(report['policies'])}", " ".join(said[:2]), sections, facts
     )
-
-
-def _table(sheet: Sheet) -> Table:
-    rows = [[cell.replace("\n", "; ") for cell in row] for row in sheet.rows]
-    return Table([cell.replace("-\n", "").replace("\n", " ") for cell in sheet.header], rows)

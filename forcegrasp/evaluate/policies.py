@@ -7,10 +7,11 @@ from pathlib import Path
 
 from tensordict.nn import TensorDictModuleBase
 
+from forcegrasp.assets import DEFAULT_GRIPPER
 from forcegrasp.config import ActionConfig, ObservationConfig, TrainConfig
 from forcegrasp.controllers import CONTROLLERS, make_controller
 from forcegrasp.errors import ConfigError, closest
-from forcegrasp.physics import Gripper, default_gripper, load_gripper
+from forcegrasp.physics import Gripper, load_gripper
 from forcegrasp.policies import shipped_policies
 from forcegrasp.runs.policy import load_policy
 from forcegrasp.runs.run_dir import RunDir
@@ -22,31 +23,32 @@ class EvaluatedPolicy:
 
     name: str
     policy: TensorDictModuleBase
+    gripper: Gripper
     action: ActionConfig
     observation: ObservationConfig
     model: str = ""  #: what it was trained with, as it was named then
     model_file: Path | None = None  #: the run's own copy of it, if there is one
 
 
-def load_policies(names: list[str], gripper: Gripper | None = None) -> list[EvaluatedPolicy]:
+def load_policies(names: list[str], asked: str = "") -> list[EvaluatedPolicy]:
     """Loads controllers and policies; a controller's name wins over a policy's, and that over a folder's.
+
+    All of them move one gripper: the one that is asked for; else that of the first trained policy; else the paper's.
 
     Args:
       names: of controllers or shipped policies, or run directories.
-      gripper: that all of them are to move; the paper's by default.
+      asked: name or description of the gripper.
 
     Raises:
       ConfigError, CheckpointError: if one can't be loaded, or was trained on another gripper.
     """
-    gripper = gripper or default_gripper()
     if not all(names):
         raise ConfigError(f"policies={names}: a name is empty")
     paths = {name: Path(name).resolve() for name in names}
+    trained = {name: _trained(name, path) for name, path in paths.items() if name not in CONTROLLERS}
+    gripper = load_gripper(asked or next((config.gripper for _, config in trained.values()), DEFAULT_GRIPPER))
     loaded: dict[str, EvaluatedPolicy] = {}
     for name, path in paths.items():
-        known = [*CONTROLLERS, *shipped_policies()]
-        if name not in known and not ("/" in name or path.exists()):
-            raise ConfigError(f"no controller, policy or run directory named {name!r}{closest(name, known)}")
         if name in CONTROLLERS:
             label, policy = name, make_controller(name, gripper)
             config = TrainConfig(action=ActionConfig(inductive_bias=False))
@@ -55,32 +57,24 @@ def load_policies(names: list[str], gripper: Gripper | None = None) -> list[Eval
             label = path.name if len(same) == 1 else f"{path.parent.name}_{path.name}"
             if path.suffix == ".safetensors":  # RUN/checkpoints/best.safetensors
                 label = f"{path.parent.parent.name}_{path.stem}"
-            policy, config = load_policy(name)
-            trained = load_gripper(config.gripper)
-            if trained.name != gripper.name:
-                raise ConfigError(
-                    f"policies: {name} was trained on gripper {trained.name}, and can't move {gripper.name}"
-                )
+            policy, config = trained[name]
+            own = load_gripper(config.gripper)
+            if own.name != gripper.name:
+                raise ConfigError(f"policies: {name} was trained on gripper {own.name}, and can't move {gripper.name}")
         if label in loaded:
             raise ConfigError(f"policies: {label} is named twice")
-        parts = config.action, config.observation
+        parts = gripper, config.action, config.observation
         loaded[label] = EvaluatedPolicy(label, policy, *parts, config.model, _model_file(name, config))
     if len(paths) < len(names):
         raise ConfigError(f"policies={names}: one is named twice")
     return list(loaded.values())
 
 
-def gripper_of(names: list[str], asked: str) -> Gripper:
-    """The requested gripper; else the one that the first trained policy was trained on; else the paper's.
-
-    Raises:
-      ConfigError, CheckpointError: if it can't be read.
-    """
-    trained = [name for name in names if name and name not in CONTROLLERS]
-    for name in trained if not asked else ():
-        if name in shipped_policies() or Path(name).exists():
-            return load_gripper(load_policy(name)[1].gripper)
-    return load_gripper(asked) if asked else default_gripper()
+def _trained(name: str, path: Path) -> tuple[TensorDictModuleBase, TrainConfig]:
+    known = [*CONTROLLERS, *shipped_policies()]
+    if name not in known and not ("/" in name or path.exists()):
+        raise ConfigError(f"no controller, policy or run directory named {name!r}{closest(name, known)}")
+    return load_policy(name)
 
 
 def _model_file(name: str, config: TrainConfig) -> Path | None:

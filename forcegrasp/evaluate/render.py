@@ -12,7 +12,7 @@ from forcegrasp.env.episodes import summarise
 from forcegrasp.evaluate.grasp_figure import describe
 from forcegrasp.evaluate.live import LiveView
 from forcegrasp.evaluate.one_grasp import draw_one_grasp
-from forcegrasp.evaluate.policies import gripper_of, load_policies
+from forcegrasp.evaluate.policies import load_policies
 from forcegrasp.evaluate.rollouts import roll_out
 from forcegrasp.evaluate.video import grasp_video
 from forcegrasp.models.variation import read_model_of, with_noise_of
@@ -31,11 +31,11 @@ def render(config: RenderConfig, out: str | Path | None) -> dict[str, dict[str, 
       NoRendererError: where there is no OpenGL.
     """
     torch.set_num_threads(1)
-    gripper = gripper_of(config.policies, config.gripper)
+    policies = load_policies(config.policies, config.gripper)
+    gripper = policies[0].gripper
     model = read_model_of(gripper, config.model) if config.model else None
     config = complete(config, with_noise_of(gripper, model))
     grasp = draw_one_grasp(config, gripper)
-    policies = load_policies(config.policies, gripper)
     with LiveView(gripper.period_s) if config.live else contextlib.nullcontext() as view:
         episodes = {
             evaluated.name: roll_out(

@@ -48,16 +48,6 @@ def print_robots(report: dict, console: Console, detail: bool) -> None:
         print_sheet(sheet, console)
 
 
-def robots_markdown(report: dict) -> str:
-    """All tables as text to paste into a document."""
-    parts = []
-    for sheet in filter(lambda sheet: sheet.rows, robot_sheets(report)):
-        lines = [sheet.header, ["---"] * len(sheet.header), *sheet.rows]
-        rows = "\n".join(f"| {' | '.join(_flat(cell) for cell in line)} |" for line in lines)
-        parts.append(f"{sheet.title}\n\n{rows}\n")
-    return "\n".join(parts)
-
-
 def write_robots_page(path: Path, report: dict, figure: Figure) -> Path:
     """Writes the evaluation as one HTML file.
 
@@ -68,9 +58,9 @@ def write_robots_page(path: Path, report: dict, figure: Figure) -> Path:
     others = [sheet for sheet in others if sheet.rows]
     caption = "Above: every robot, by what the policies get on it. Below: how much more than the baseline, sorted."
     sections = [
-        Section("In short", [_table(first), Text(LEGEND), *map(Text, said[1:])]),
+        Section("In short", [Table(*first.in_lines()), Text(LEGEND), *map(Text, said[1:])]),
         Section("Robot by robot", [Picture(figure, caption)]),
-        *(Section(sheet.title, [_table(sheet)]) for sheet in others),
+        *(Section(sheet.title, [Table(*sheet.in_lines())]) for sheet in others),
     ]
     facts = {
         name: str(report[name]) for name in ("seed", "robots", "trials", "steps", "physics", "gripper", "baseline")
@@ -217,11 +207,3 @@ def _effect_rows(effects: list[dict]) -> Iterator[list[str]]:
 
 def _interval(found: dict, middle: str) -> str:
     return f"{found[middle]:+.2f} [{found['low']:+.2f}, {found['high']:+.2f}]"
-
-
-def _flat(cell: str) -> str:
-    return cell.replace("-\n", "").replace("\n", " ")
-
-
-def _table(sheet: Sheet) -> Table:
-    return Table([_flat(cell) for cell in sheet.header], sheet.rows)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from rich import box
@@ -49,6 +49,11 @@ class Sheet:
     header: list[str]
     rows: list[list[str]]
 
+    def in_lines(self) -> tuple[list[str], list[list[str]]]:
+        """Header and rows without line breaks in their cells."""
+        header = [name.replace("-\n", "").replace("\n", " ") for name in self.header]
+        return header, [[cell.replace("\n", "; ") for cell in row] for row in self.rows]
+
 
 def print_sheet(sheet: Sheet, console: Console) -> None:
     """Shows a table; what is too wide is folded, never cut off."""
@@ -74,15 +79,12 @@ def _fill(table: Table, sheet: Sheet, no_wrap: bool = False) -> None:
         table.add_row(*map(escape, row))
 
 
-def markdown(report: dict) -> str:
-    """The same as text to paste into a document."""
+def markdown(shown: Iterable[Sheet]) -> str:
+    """Tables as text to paste into a document; those without rows are left out."""
     parts = []
-    for sheet in sheets(report):
-        lines = [
-            sheet.header,
-            ["---"] * len(sheet.header),
-            *([c.replace("\n", "; ") for c in row] for row in sheet.rows),
-        ]
+    for sheet in filter(lambda sheet: sheet.rows, shown):
+        header, rows = sheet.in_lines()
+        lines = [header, ["---"] * len(header), *rows]
         parts.append(f"{sheet.title}\n\n" + "\n".join(f"| {' | '.join(line)} |" for line in lines) + "\n")
     return "\n".join(parts)
 

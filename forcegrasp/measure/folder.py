@@ -6,10 +6,15 @@ import difflib
 import shlex
 import stat
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from forcegrasp.assets import DEFAULT_GRIPPER
-from forcegrasp.errors import MeasurementError
+from forcegrasp.errors import ConfigError, MeasurementError
+from forcegrasp.files.validate import refusal
 from forcegrasp.measure.schema import FORMAT
+
+if TYPE_CHECKING:
+    from forcegrasp.physics.gripper import Gripper
 
 MAX_BYTES = 2_000_000_000
 MAX_ROWS = 20_000_000
@@ -76,3 +81,17 @@ def find_file(folder: Path, name: str) -> Path:
             f"{show(path)}: {facts.st_size / 1e9:.1f} GB is too large; split it into sets under 2 GB"
         )
     return path
+
+
+def described(name: str, folder: Path, place: str, key: str) -> Gripper:
+    """The gripper or mechanism of this name; ``folder`` is where the path of its description starts.
+
+    Raises:
+      MeasurementError: if there is none, or its description can't be right; names the file and the key that say it.
+    """
+    from forcegrasp.physics.gripper_file import load_gripper  # brings MuJoCo, which nothing else here needs
+
+    try:
+        return load_gripper(name, folder)
+    except ConfigError as error:
+        raise refusal(place, key, str(error).removeprefix("gripper="), MeasurementError) from error

@@ -9,10 +9,10 @@ import numpy as np
 import polars as pl
 from pydantic import Field
 
-from forcegrasp.errors import ConfigError, MeasurementError, closest
+from forcegrasp.errors import MeasurementError, closest
 from forcegrasp.files.validate import must, refusal, validate
 from forcegrasp.measure.csv_file import read_csv
-from forcegrasp.measure.folder import find_file, open_folder, show
+from forcegrasp.measure.folder import described, find_file, open_folder, show
 from forcegrasp.measure.joined import check_names, check_splits, read_samples, samples_of_each, side_by_side
 from forcegrasp.measure.samples import check_samples
 from forcegrasp.measure.schema import (
@@ -112,7 +112,7 @@ def _read_table(folder: Path, meta: Meta, facts: dict[str, Any]) -> FinalForceTa
 
 def _read_grasps(folder: Path, meta: Meta, facts: dict[str, Any]) -> MeasurementSet:
     _refuse_files(folder, "grasps", ("table.csv",))
-    columns = gripper_columns(meta.gripper, folder, show(folder / "meta.yaml"))
+    columns = columns_of(described(meta.gripper, folder, show(folder / "meta.yaml"), "gripper"))
     in_samples = FileColumns(("grasp",), (*columns.signals, OBJECT), optional=(OBJECT,), blank=(OBJECT,))
     table = read_csv(find_file(folder, "grasps.csv"), _GRASPS)
     _check_grasps(table)
@@ -128,20 +128,6 @@ def _read_grasps(folder: Path, meta: Meta, facts: dict[str, Any]) -> Measurement
         fingerprint=fingerprint_of_set(meta.gripper, meta.position_std_m, meta.force_std_n, grasps, tolerances),
         notes=table.notes() + samples.notes(),
     )
-
-
-def gripper_columns(gripper: str, folder: Path, place: str) -> Columns:
-    """What samples of a gripper hold; ``folder`` is where the path of its description starts.
-
-    Raises:
-      MeasurementError: if there is no such gripper, or its description can't be right; names the file that says it.
-    """
-    from forcegrasp.physics.gripper_file import load_gripper  # brings MuJoCo, which nothing else here needs
-
-    try:
-        return columns_of(load_gripper(gripper, folder))
-    except ConfigError as error:
-        raise refusal(place, "gripper", str(error).removeprefix("gripper="), MeasurementError) from error
 
 
 def _refuse_files(folder: Path, kind: str, names: tuple[str, ...]) -> None:

@@ -30,16 +30,16 @@ from pydantic import AfterValidator, model_validator
 
 from forcegrasp.errors import MeasurementError, closest
 from forcegrasp.files.validate import counted, must, refusal, text, validate, wrong
-from forcegrasp.measure.folder import MAX_ROWS, show
+from forcegrasp.measure.folder import MAX_ROWS, described, show
 from forcegrasp.measure.joined import side_by_side
 from forcegrasp.measure.names import misfits
-from forcegrasp.measure.read import gripper_columns
 from forcegrasp.measure.samples import check_samples
 from forcegrasp.measure.schema import (
     OBJECT,
     Columns,
     MeasuredGrasp,
     MeasurementSet,
+    columns_of,
     fingerprint_of_set,
 )
 from forcegrasp.measure.yaml_file import Name, Number, Positive, Text, TextRecord, load_yaml
@@ -128,7 +128,7 @@ def convert_bag(mapping_file: str | Path) -> MeasurementSet:
     path = Path(mapping_file)
     place = show(path)
     mapping = validate(_Mapping, load_yaml(path), place, MeasurementError)
-    columns, signals = gripper_columns(mapping.gripper, path.parent, place), mapping.signals
+    columns, signals = columns_of(described(mapping.gripper, path.parent, place, "gripper")), mapping.signals
     problem = misfits("key", list(signals), columns.signals[1:], (OBJECT,))
     if problem:
         raise refusal(place, "signals", problem, MeasurementError)

@@ -9,10 +9,10 @@ import numpy as np
 import polars as pl
 from pydantic import Field
 
-from forcegrasp.errors import ConfigError, MeasurementError
+from forcegrasp.errors import MeasurementError
 from forcegrasp.files.validate import refusal, validate
 from forcegrasp.measure.csv_file import read_csv
-from forcegrasp.measure.folder import find_file, show
+from forcegrasp.measure.folder import described, find_file, show
 from forcegrasp.measure.joined import check_names, check_splits, read_samples, samples_of_each, side_by_side
 from forcegrasp.measure.samples import check_samples
 from forcegrasp.measure.schema import (
@@ -52,14 +52,9 @@ def read_servo_set(folder: Path, content: dict[str, Any]) -> MeasurementSet:
     Raises:
       MeasurementError: if anything is missing, unknown or broken: file, row, column and what to do.
     """
-    from forcegrasp.physics.gripper_file import load_gripper  # brings MuJoCo, which nothing else here needs
-
     place = show(folder / "meta.yaml")
     meta = validate(ServoMeta, content, place, MeasurementError)
-    try:
-        mechanism = load_gripper(meta.mechanism, folder)
-    except ConfigError as error:
-        raise refusal(place, "mechanism", str(error).removeprefix("gripper="), MeasurementError) from error
+    mechanism = described(meta.mechanism, folder, place, "mechanism")
     if not mechanism.is_servo:
         raise refusal(
             place, "mechanism", f"{mechanism.name} has fingers; its sets are of kind grasps", MeasurementError

@@ -17,8 +17,8 @@ from forcegrasp.reports import between_sets, figures
 from forcegrasp.reports.html import Answer, Command, Picture, Section, Table, Text
 from forcegrasp.reports.view import view_section
 
-# Error ÷ floor up to which a model is as good as the data can tell.
-_AT_FLOOR = 1.03
+#: Error ÷ floor up to which a model is as good as the data can tell.
+AT_FLOOR = 1.03
 # Beyond it an error below the floor is excused by the simulation's numerical error, and not by noise.
 _MOST_NOISE = 1.2
 # Error ÷ noise beyond which a cell is marked.
@@ -121,7 +121,7 @@ def _cell_json(cell: Cell) -> dict[str, Any]:
 
 def at_floor(error: float, floor: float) -> bool:
     """Whether a model is as good as the data can tell."""
-    return error <= max(floor, 1.02) * _AT_FLOOR
+    return error <= max(floor, 1.02) * AT_FLOOR
 
 
 def worst_cell(cells: list[Cell]) -> Cell:

@@ -21,6 +21,7 @@ from forcegrasp.identify.intervals import listed, reached_bound
 from forcegrasp.identify.verdict import Verdict
 from forcegrasp.reports import figures
 from forcegrasp.reports.comparison import (
+    AT_FLOOR,
     dependence_section,
     grid_picture,
     noise_sentence,
@@ -58,8 +59,6 @@ from forcegrasp.reports.symptom import symptom_of
 from forcegrasp.reports.view import view_section
 
 _PRINTED = 5
-#: A held-out error of so many times the floor wants a reason where nothing is missing.
-UNSURE = 1.03
 
 
 def diagnosis_json(diagnosis: Diagnosis, advice: Advice | None, tried: Sequence[type[Effect]], name: str) -> dict:
@@ -139,7 +138,7 @@ def _of_model(diagnosis: Diagnosis) -> str:
         of_noise = f"the error on held-out {d.target.part}s is {d.error_after:.2f} × the sensor noise"
         if noise:
             return f"The model explains these data: they show no missing effect; {of_noise}. {noise}"
-        unsure = "" if d.error_after < UNSURE * d.floor else (
+        unsure = "" if d.error_after < AT_FLOOR * d.floor else (
             f" A fit of all {d.target.part}s leaves {rms(d.fit.residual, d.target):.2f} ×: where few are left to fit an"
             " object by, those held out are missed."
         )  # fmt: skip

@@ -17,7 +17,7 @@ from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from forcegrasp import __version__
-from forcegrasp.errors import ConfigError
+from forcegrasp.errors import writing
 
 
 @dataclass(frozen=True)
@@ -123,11 +123,9 @@ def write_report(
         # a browser runs this script and no other, whatever a name may smuggle in
         script_hash=base64.b64encode(hashlib.sha256(script.encode()).digest()).decode(),
     )
-    try:
+    with writing(path.parent):
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(html, encoding="utf-8")
-    except OSError as error:
-        raise ConfigError(f"out={path.parent}: could not write ({error.strerror})") from error
     return path
 
 

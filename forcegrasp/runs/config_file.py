@@ -36,10 +36,8 @@ def read_config(path: Path) -> TrainConfig:
     Raises:
       CheckpointError: if the file can't be read or holds unknown or invalid options.
     """
+    loaded = read_options(path)
     try:
-        loaded = plain_yaml.load(path)
-        if not isinstance(loaded, dict):  # text would be taken for more YAML
-            raise ConfigError("no options in it")
         _refuse_interpolations(loaded)
         merged = OmegaConf.merge(_schema(), loaded)
         config = cast(TrainConfig, OmegaConf.to_object(merged))
@@ -48,8 +46,26 @@ def read_config(path: Path) -> TrainConfig:
         model = read_model_of(gripper, model_path) if config.model and model_path.exists() else None
         return complete(config, with_noise_of(gripper, model))
     except (OSError, OmegaConfBaseException, ConfigError, ValueError) as error:
-        first_line = str(error).strip().splitlines()[0]
-        raise CheckpointError(f"{path}: not a valid configuration ({first_line})") from error
+        raise _invalid(path, error) from error
+
+
+def read_options(path: Path) -> dict[str, Any]:
+    """The options in a file as they stand there.
+
+    Raises:
+      CheckpointError: if the file can't be read or holds none.
+    """
+    try:
+        loaded = plain_yaml.load(path)
+        if not isinstance(loaded, dict):  # text would be taken for more YAML
+            raise ConfigError("no options in it")
+    except (OSError, ConfigError, ValueError) as error:
+        raise _invalid(path, error) from error
+    return loaded
+
+
+def _invalid(path: Path, error: Exception) -> CheckpointError:
+    return CheckpointError(f"{path}: not a valid configuration ({str(error).strip().splitlines()[0]})")
 
 
 @functools.cache  # to make it takes as long as to merge a file into it

@@ -15,13 +15,12 @@ from torch import Tensor
 
 from forcegrasp.config import TrainConfig
 from forcegrasp.errors import CheckpointError
-from forcegrasp.files import plain_yaml
 from forcegrasp.files.whole_file import write_whole
 from forcegrasp.models.model_file import Model, write_model
 from forcegrasp.models.variation import read_model_of
 from forcegrasp.physics import load_gripper
 from forcegrasp.runs import checkpoint, metrics_file
-from forcegrasp.runs.config_file import MODEL, fingerprint, read_config
+from forcegrasp.runs.config_file import MODEL, fingerprint, read_config, read_options
 from forcegrasp.runs.lock import only_writer
 from forcegrasp.runs.provenance import provenance
 
@@ -115,8 +114,7 @@ class RunDir:
     @functools.cached_property
     def fingerprint(self) -> str:
         """Of the configuration as created, or when first asked for: editing the file must not spoil a run at work."""
-        self.config()  # says what is wrong with the file, if anything
-        return fingerprint(plain_yaml.load(self.config_path))
+        return fingerprint(read_options(self.config_path))
 
     def config(self) -> TrainConfig:
         """The run's configuration.

@@ -8,6 +8,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
@@ -32,6 +33,12 @@ def own_folder(tmp_path, monkeypatch) -> Path:
     monkeypatch.setattr(sys, "argv", sys.argv)
     monkeypatch.setenv("HYDRA_FULL_ERROR", "0")
     return tmp_path
+
+
+@pytest.fixture
+def undrawn(monkeypatch) -> None:
+    """Leaves out the learning curves, which take longer than these trainings."""
+    monkeypatch.setattr("forcegrasp.cli.sweep._draw_curves", lambda folder: None)
 
 
 def runs_in(folder: Path) -> dict[tuple[bool, int], RunDir]:
@@ -72,6 +79,7 @@ def test_two_experiments_and_two_seeds_side_by_side(tiny, tmp_path, capfd):
     assert {path.name for path in tmp_path.iterdir()} == {"far", "sweep", "alone"}
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_one_after_the_other(tiny, tmp_path):
     assert main(["train", "--multirun", "seed=3,4", *tiny["train"]]) == 0
     (sweep,) = (tmp_path / "runs").iterdir()
@@ -103,26 +111,23 @@ def test_ctrl_c_ends_the_sweep_and_not_just_one_run(tiny, monkeypatch, capsys):
     assert started == [0]
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGHUP, signal.SIGUSR1])
-@pytest.mark.usefixtures("hang_ups_arrive")
-def test_the_same_sweep_again_goes_on(tiny, tmp_path, monkeypatch, capsys, number):
+@pytest.mark.usefixtures("hang_ups_arrive", "undrawn")
+def test_the_same_sweep_again_goes_on(tiny, monkeypatch, capsys):
     """As after a job that a scheduler ended and started anew: finished runs stay, the others end bit for bit alike."""
-    log, interrupt = TrainingLog.batch, [False]
+    log, signals = TrainingLog.batch, [signal.SIGINT, signal.SIGHUP, signal.SIGUSR1]
 
     def batch(self, *args):
         log(self, *args)
-        if interrupt[0] and self.config.seed == 1:
-            signal.raise_signal(number)
+        if signals and self.config.seed == 1:
+            signal.raise_signal(signals.pop(0))
 
     monkeypatch.setattr(TrainingLog, "batch", batch)
-    monkeypatch.setattr("forcegrasp.cli.sweep._draw_curves", lambda folder: None)
-    options = [*tiny["train"], "ppo.total_frames=24"]
+    options = [*tiny["train"], "ppo.total_frames=40"]
     sweep = ["train", "-m", "seed=0,1", *options, "hydra.sweep.dir=cut"]
-    interrupt[0] = True
-    assert main(sweep) == 130
-    assert RunDir("cut/ib_s1_1").load()[1]["frames"] == 8
-    interrupt[0] = False
-    capsys.readouterr()
+    for frames in (8, 16, 24):
+        assert main(sweep) == 130
+        assert RunDir("cut/ib_s1_1").load()[1]["frames"] == frames
+        assert capsys.readouterr().out.count("already trained to the end") == (frames > 8)
     assert main(sweep) == 0
     assert capsys.readouterr().out.count("already trained to the end") == 1
     assert main(["train", "seed=1", *options, "hydra.run.dir=alone"]) == 0
@@ -131,6 +136,7 @@ def test_the_same_sweep_again_goes_on(tiny, tmp_path, monkeypatch, capsys, numbe
         begin_or_resume(Path("alone"), compose("train", [*options, "seed=1", "ppo.epochs=3"]), [])
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_run_that_another_sweep_trains_is_named_and_the_others_are_trained(tiny, tmp_path, capsys):
     """As when jobs of a scheduler are still at work when the sweep is typed again."""
     sweep = ["train", "-m", "seed=0,1", *tiny["train"], "hydra.sweep.dir=sweep"]
@@ -143,24 +149,29 @@ def test_a_run_that_another_sweep_trains_is_named_and_the_others_are_trained(tin
     assert not list(Path("sweep").rglob("failed.txt"))
 
 
-def test_a_sweep_that_is_stopped_side_by_side_saves_its_runs(tiny, tmp_path):
+def test_a_sweep_that_is_stopped_side_by_side_saves_its_runs(tiny, capfd):
     """The signal goes to the sweep alone, as a scheduler's may; the third run does not begin."""
     options = [*tiny["train"], "ppo.total_frames=800000", "log.checkpoint_every=100000"]
     command = ["train", "-m", "seed=0,1,2", *options, "hydra/launcher=joblib", "hydra.launcher.n_jobs=2"]
-    process = subprocess.Popen(
-        [sys.executable, "-m", "forcegrasp.cli.main", *command, "hydra.sweep.dir=sweep"],
-        env={**os.environ, "OMP_NUM_THREADS": "1"},
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
     runs = [RunDir("sweep/ib_s0_0"), RunDir("sweep/ib_s1_1")]
-    deadline = time.monotonic() + 120
-    while not all(run.metrics_path.exists() for run in runs) and time.monotonic() < deadline:
-        time.sleep(0.05)
-    process.terminate()
-    out, err = process.communicate(timeout=120)
-    assert process.returncode == 130, err
+
+    ended, deadline = threading.Event(), time.monotonic() + 120
+
+    def stop() -> None:
+        while not all(run.metrics_path.exists() for run in runs) and time.monotonic() < deadline:
+            if ended.wait(0.05):
+                return
+        os.kill(os.getpid(), signal.SIGTERM)
+
+    begun = threading.Thread(target=stop)
+    begun.start()
+    try:
+        assert main([*command, "hydra.sweep.dir=sweep"]) == 130
+    finally:
+        ended.set()
+        begun.join()
+        get_reusable_executor().shutdown()
+    out, err = capfd.readouterr()
     assert err == "forcegrasp: interrupted\n"
     for run in runs:
         assert f"stopped and saved; go on with: forcegrasp train resume={run.path.resolve()}" in out

@@ -47,7 +47,7 @@ def printed(report: dict, width: int = 80, detail: bool = False) -> str:
 def test_everything_fits_into_80_columns(facts):
     report = made_up({LONG: 115, "ib_virtual_robot_measured": 110, "force_pi": 100}, **facts)
     report["notes"] = simulator_notes(
-        "", [EvaluatedPolicy(LONG, *[None] * 3, "a.yaml", Path(f"runs/{LONG}/model.yaml"))]
+        "", [EvaluatedPolicy(LONG, *[None] * 4, "a.yaml", Path(f"runs/{LONG}/model.yaml"))]
     )
     text = printed(report)
     assert max(map(len, text.splitlines())) <= 80
@@ -117,9 +117,9 @@ def test_page_has_all_tables_and_pictures(tmp_path):
 
 
 def test_a_policy_of_a_model_says_on_which_simulator_it_is_judged():
-    kept = EvaluatedPolicy("mine", *[None] * 3, "better.yaml", Path("runs/mine/model.yaml"))
-    shipped = EvaluatedPolicy("ib_virtual_robot", *[None] * 3, "diag/model.yaml", None)
-    plain = EvaluatedPolicy("ib", *[None] * 3)
+    kept = EvaluatedPolicy("mine", *[None] * 4, "better.yaml", Path("runs/mine/model.yaml"))
+    shipped = EvaluatedPolicy("ib_virtual_robot", *[None] * 4, "diag/model.yaml", None)
+    plain = EvaluatedPolicy("ib", *[None] * 4)
     one, other = simulator_notes("", [kept, shipped, plain])
     assert one.startswith("mine was trained with the model better.yaml, but is judged here on the nominal gripper")
     assert one.endswith("model=runs/mine/model.yaml")

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import forcegrasp as fg
-from forcegrasp.api.results import CompareResult
+from forcegrasp.api import CompareResult
 from forcegrasp.cli.main import main
 from forcegrasp.identify.predict import predict
 from forcegrasp.identify.problem import Problem

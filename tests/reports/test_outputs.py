@@ -26,6 +26,7 @@ from forcegrasp.reports import diagnosis as diagnosis_report
 from forcegrasp.reports import figures
 from forcegrasp.reports import fit as fit_report
 from forcegrasp.reports.html import Picture, Table
+from tests.made_up import result_of
 
 VERDICTS = ("effect", "one_of", "explained", "unknown", "not_fitted")
 
@@ -334,7 +335,7 @@ def test_reports_are_harmless_and_load_nothing(made_up, tmp_path, capsys):
     name = made_up.loaded.measured.name
     for number, sections in enumerate(all_reports(made_up)):
         out = tmp_path / str(number)
-        write_results(out, "x", {"set": name}, name, name, sections, made_up.loaded)
+        write_results(out, result_of(name, name, sections, made_up.loaded, {"set": name}))
         html = (out / "report.html").read_text()
         # the view's data and its script, which is the only one that a browser runs, by its hash
         assert re.findall(r"<script[^>]*>", html) == ['<script type="application/json">', "<script>"]

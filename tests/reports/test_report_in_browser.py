@@ -18,6 +18,7 @@ from forcegrasp.reports import comparison as comparison_report
 from forcegrasp.reports import diagnosis as diagnosis_report
 from forcegrasp.reports.diagnosis_box import answer_box
 from forcegrasp.reports.next_step import after_comparison, after_diagnosis
+from tests.made_up import result_of
 
 DRIVER, BROWSER = shutil.which("chromedriver"), shutil.which("chromium") or shutil.which("google-chrome")
 pytestmark = pytest.mark.skipif(
@@ -122,7 +123,7 @@ def write(verb: str, made_up: Any, folder: Path) -> Path:
         advice = made_up.advice if verb == "one_of" else None
         box = answer_box(diagnosis, advice, after_diagnosis(diagnosis, advice, name, name, name), name)
         sections = diagnosis_report.sections(diagnosis, advice, made_up.tried)
-    write_results(folder, "x", {}, f"Report of {name}", box, sections, made_up.loaded)
+    write_results(folder, result_of(f"Report of {name}", box, sections, made_up.loaded))
     return folder / "report.html"
 
 

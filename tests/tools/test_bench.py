@@ -9,6 +9,7 @@ import pytest
 
 from forcegrasp.config import PhysicsConfig, SensorConfig, TrainConfig
 from forcegrasp.env.gymnasium_view import GraspGymnasiumEnv
+from tools import json_lines
 from tools.bench import history, learning
 from tools.bench.__main__ import main
 from tools.bench.case import STEPS, Case, Learning, Measured
@@ -105,7 +106,7 @@ def test_a_history_of_ratios_tells_what_became_slower(tmp_path, monkeypatch, cap
     said = " ".join(capsys.readouterr().out.split())
     assert "collection, fast: 0.65 of the raw engine, 0.73 at cccccccccccc" in said
     assert (tmp_path / "history.png").exists()
-    assert history.read(kept)[0]["ratios"] == {"collection, fast": 0.8}
+    assert json_lines.read(kept)[0]["ratios"] == {"collection, fast": 0.8}
 
 
 def test_another_size_and_the_same_commit_are_not_held_against_a_run(tmp_path, monkeypatch):

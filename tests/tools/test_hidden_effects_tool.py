@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import sys
 from dataclasses import asdict
 
@@ -135,10 +136,10 @@ def test_results_are_stamped_and_those_of_other_code_are_renewed_on_demand(tmp_p
     monkeypatch.setattr(hidden_effects, "ProcessPoolExecutor", InThisProcess)
     monkeypatch.setattr(hidden_effects, "run_job", lambda job: row(job, "explained"))
     before = [row(jobs[0], "explained", **CODE), row(jobs[1], "explained", **now)]
-    (tmp_path / "results.jsonl").write_text("".join(f"{hidden_effects.json.dumps(r)}\n" for r in before))
+    (tmp_path / "results.jsonl").write_text("".join(f"{json.dumps(r)}\n" for r in before))
     hidden_effects.run("", 1, renew)
     added = (tmp_path / "results.jsonl").read_text().splitlines()[2:]
-    found = {r["name"]: r for r in map(hidden_effects.json.loads, added)}
+    found = {r["name"]: r for r in map(json.loads, added)}
     assert set(found) == set(names.values()) - {names[one] for one in done}
     assert all({key: r[key] for key in now} == now for r in found.values())
 

@@ -25,13 +25,14 @@ from rich.console import Console
 
 from tools.bench.case import Case, Measured
 from tools.bench.figures import draw
-from tools.bench.history import append, draw_history, entry, lost, read
+from tools.bench.history import draw_history, entry, lost
 from tools.bench.learning import LEARNED, TRAININGS
 from tools.bench.levels import LEVELS
 from tools.bench.peers import PEERS, missing
 from tools.bench.results import Results, cores, machine
 from tools.bench.tables import tables
 from tools.bench.turns import ROOT, learn, measure
+from tools.json_lines import append, read
 
 GOAL = 100.0
 TIERS = ("fast", "reference")

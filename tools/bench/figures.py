@@ -11,7 +11,7 @@ from matplotlib.ticker import FixedLocator, NullLocator, StrMethodFormatter
 
 from tools.bench.case import Measured
 from tools.bench.peers import rival
-from tools.bench.results import Results
+from tools.bench.results import ENGINE, Results
 
 THOUSANDS = StrMethodFormatter("{x:,.0f}")
 #: Okabe and Ito's, as in the project's other pictures: of bars, of trainings, of the levels as they grow.
@@ -77,9 +77,8 @@ def _bars(axes: Axes, results: Results) -> None:
 def _remark(results: Results, found: Measured, is_peer: bool) -> str:
     case = found.case
     if not is_peer:
-        engine = results.rate("raw engine", case.tier)
-        above = case.name != "raw engine"
-        return f"  ({found.steps_per_second / engine:.0%} of the engine)" if engine and above else ""
+        share = results.share_of_engine(found)
+        return f"  ({share:.0%} of the engine)" if share and case.name != ENGINE else ""
     fast, same = results.rate(rival(case.name), "fast"), results.rate(rival(case.name), case.tier)
     if not fast or not same:
         return ""

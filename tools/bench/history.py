@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -10,36 +9,23 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from forcegrasp.runs.provenance import git_hash
-from tools.bench.results import Results
+from tools.bench.results import ENGINE, Results
 
 #: By this share a ratio may fall from one commit to the next: as much as two runs of the same code differ.
 MOST_LOST = 0.1
-_ENGINE = "raw engine"
 
 
 def entry(results: Results) -> dict[str, Any] | None:
     """Commit, machine, and each layer's frames/s ÷ those of the raw engine of the same run; None without any."""
-    ratios = {}
-    for found in results.levels:
-        engine = results.rate(_ENGINE, found.case.tier)
-        if engine and found.case.name != _ENGINE:
-            ratios[f"{found.case.name}, {found.case.tier}"] = round(found.steps_per_second / engine, 4)
+    ratios = {
+        f"{found.case.name}, {found.case.tier}": round(share, 4)
+        for found in results.levels
+        if (share := results.share_of_engine(found)) and found.case.name != ENGINE
+    }
     if not ratios:
         return None
     grasps = results.levels[0].case.grasps
     return {"commit": git_hash() or "none", "machine": results.machine, "grasps": grasps, "ratios": ratios}
-
-
-def append(path: Path, one: dict[str, Any]) -> None:
-    """Adds an entry at the end of a history, one line of JSON each; the file is made where there is none."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with path.open("a", encoding="utf-8") as file:
-        file.write(json.dumps(one) + "\n")
-
-
-def read(path: Path) -> list[dict[str, Any]]:
-    """All entries of a history, oldest first; none where there is no file."""
-    return [json.loads(line) for line in path.read_text("utf-8").splitlines()] if path.exists() else []
 
 
 def lost(history: list[dict[str, Any]]) -> list[str]:

@@ -13,6 +13,8 @@ from typing import Any
 
 from tools.bench.case import Case, Learning, Measured
 
+#: The level that others are held against.
+ENGINE = "raw engine"
 PACKAGES = ("mujoco", "torch", "torchrl", "gymnasium", "stable-baselines3")
 
 
@@ -40,6 +42,11 @@ class Results:
         """Steps per second of a level or peer; None if it was not measured."""
         found = (m.steps_per_second for m in [*self.levels, *self.peers] if (m.case.name, m.case.tier) == (name, tier))
         return next(found, None)
+
+    def share_of_engine(self, found: Measured) -> float | None:
+        """Frames per second of a level ÷ those of the raw engine in the same run; None without it."""
+        engine = self.rate(ENGINE, found.case.tier)
+        return found.steps_per_second / engine if engine else None
 
     def write(self, path: Path) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)

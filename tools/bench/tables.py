@@ -44,9 +44,8 @@ def _levels(results: Results) -> Table:
     title = f"What each layer costs, {results.levels[0].case.grasps} grasps at once"
     table = _table(title, "level", "physics", "frames/s", "of the engine", "MB")
     for found in results.levels:
-        share = _ratio(found.steps_per_second, results.rate("raw engine", found.case.tier))
-        row = (found.case.name, found.case.tier, f"{found.steps_per_second:,.0f}", share, _memory(found))
-        table.add_row(*row)
+        share = _ratio(results.share_of_engine(found), 1)
+        table.add_row(found.case.name, found.case.tier, f"{found.steps_per_second:,.0f}", share, _memory(found))
     return table
 
 

@@ -14,7 +14,9 @@ from tools.reliability.trial import Promise, Trial
 ROOT = Path(__file__).resolve().parents[2]
 SUITES = {
     "every option and every parameter of an effect changes something; unknown ones are refused": [
-        "tests/config/test_options_of_policies.py",
+        "tests/config/test_options_of_train.py",
+        "tests/config/test_options_of_evaluate.py",
+        "tests/config/test_options_of_render.py",
         "tests/config/test_options_of_measuring.py",
         "tests/config/test_options_of_small_verbs.py",
         "tests/config/test_validate.py",

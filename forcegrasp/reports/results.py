@@ -1,4 +1,4 @@
-"""What the functions of :mod:`forcegrasp.api` return: the answer, figures, arrays, and what a report is made of."""
+"""What compare, fit, diagnose and add find: the answer, figures, arrays, and what a report is made of."""
 
 from __future__ import annotations
 
@@ -7,29 +7,39 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from forcegrasp.cli import measuring
 from forcegrasp.diagnosis.add_effect import Added
 from forcegrasp.diagnosis.advice import Advice
 from forcegrasp.diagnosis.result import Diagnosis
 from forcegrasp.effects import Effect
+from forcegrasp.effects.law import write_law
 from forcegrasp.final_force.analysis import TableAnalysis
 from forcegrasp.identify.base_fit import BaseFit
 from forcegrasp.identify.comparison import Comparison
 from forcegrasp.identify.cross_validation import rms
 from forcegrasp.identify.fitted_model import model_of
 from forcegrasp.identify.loading import Loaded
+from forcegrasp.identify.noise_floor import numerical_error
 from forcegrasp.identify.target import Target
 from forcegrasp.identify.verdict import Verdict
 from forcegrasp.measure import FinalForceTable, MeasurementSet
-from forcegrasp.models.model_file import Model
+from forcegrasp.models.model_file import Model, write_model
 from forcegrasp.reports import comparison as comparison_report
 from forcegrasp.reports import diagnosis as diagnosis_report
 from forcegrasp.reports import final_force as final_force_report
 from forcegrasp.reports import fit as fit_report
 from forcegrasp.reports import next_step
 from forcegrasp.reports.diagnosis_box import answer_box
-from forcegrasp.reports.html import Answer, Section
+from forcegrasp.reports.html import Answer, Command, Section
 from forcegrasp.short_repr import ShortRepr, counted, cut, some
+
+#: The base model that compare and diagnose fit where none is given, beside their report.
+BASE_MODEL = "base_model.yaml"
+#: The model with all effects that a diagnosis found, beside its report.
+FOUND_MODEL = "model.yaml"
+#: The commands of the grasp that a diagnosis proposes, beside its report.
+NEXT_GRASP = "next_grasp.csv"
+#: The law that a diagnosis proposes, beside its report.
+PROPOSED_LAW = "law.yaml"
 
 
 class Result(ShortRepr):
@@ -56,6 +66,10 @@ class Result(ShortRepr):
         """The sections of the report: what the answer rests on."""
         raise NotImplementedError
 
+    def commands(self, folder: Path) -> list[Command]:
+        """What to type next, likeliest first, once the report was written into a folder."""
+        return []
+
     def box(self, folder: Path) -> Answer | str:
         """The box above the report that is written into a folder: the answer, how sure it is, and what to do next."""
         return self.answer
@@ -63,6 +77,15 @@ class Result(ShortRepr):
     def models(self) -> dict[str, Model]:
         """The models that lie beside the report, by the names of their files."""
         return {}
+
+    def write_beside(self, folder: Path) -> None:
+        """Writes into a folder what lies beside its report.
+
+        Raises:
+          ConfigError: if it can't be written.
+        """
+        for name, model in self.models().items():
+            write_model(model, folder / name)
 
     @property
     def name(self) -> str:
@@ -108,14 +131,15 @@ class CompareResult(Result):
     def sections(self) -> list[Section]:
         return comparison_report.sections(self.comparison, list(self.notes))
 
+    def commands(self, folder: Path) -> list[Command]:
+        known = self.given_file or folder / BASE_MODEL
+        return next_step.after_comparison(self.comparison, self.data.measured.path, known)
+
     def box(self, folder: Path) -> Answer:
-        commands = next_step.after_comparison(
-            self.comparison, self.data.measured.path, self.given_file or folder / measuring.BASE_MODEL
-        )
-        return comparison_report.answer_box(self.comparison, self.notes, commands)
+        return comparison_report.answer_box(self.comparison, self.notes, self.commands(folder))
 
     def models(self) -> dict[str, Model]:
-        return {} if self.given_file else {measuring.BASE_MODEL: dataclasses.replace(self.model, warnings=self.notes)}
+        return {} if self.given_file else {BASE_MODEL: dataclasses.replace(self.model, warnings=self.notes)}
 
     def summary(self) -> str:
         worst = comparison_report.worst_cell(self.comparison.cells())
@@ -161,9 +185,11 @@ class FitResult(Result):
     def sections(self) -> list[Section]:
         return fit_report.fit_sections(self.base, self.target, self.model)
 
+    def commands(self, folder: Path) -> list[Command]:
+        return [next_step.after_fit(self.data.measured.path, self.path or folder / "model.yaml")]
+
     def box(self, folder: Path) -> Answer:
-        command = next_step.after_fit(self.data.measured.path, self.path or folder / "model.yaml")
-        return fit_report.model_box(self.answer, self.model, [command])
+        return fit_report.model_box(self.answer, self.model, self.commands(folder))
 
     def models(self) -> dict[str, Model]:
         return {"model.yaml": self.model}
@@ -218,7 +244,7 @@ class DiagnoseResult(Result):
 
     @cached_property
     def _base_model(self) -> Model:
-        return measuring.base_model(self.diagnosis.base, self.diagnosis.target, self.data)
+        return base_model(self.diagnosis.base, self.diagnosis.target, self.data)
 
     @property
     def answer(self) -> str:
@@ -238,14 +264,23 @@ class DiagnoseResult(Result):
     def sections(self) -> list[Section]:
         return diagnosis_report.sections(self.diagnosis, self.advice, self.tried)
 
+    def commands(self, folder: Path) -> list[Command]:
+        known, found = self.given_file or folder / BASE_MODEL, folder / FOUND_MODEL
+        return next_step.after_diagnosis(self.diagnosis, self.advice, self.data.measured.path, known, found)
+
     def box(self, folder: Path) -> Answer:
-        known, found = self.given_file or folder / measuring.BASE_MODEL, folder / measuring.FOUND_MODEL
-        commands = next_step.after_diagnosis(self.diagnosis, self.advice, self.data.measured.path, known, found)
-        return answer_box(self.diagnosis, self.advice, commands, self._note)
+        return answer_box(self.diagnosis, self.advice, self.commands(folder), self._note)
 
     def models(self) -> dict[str, Model]:
-        base = {} if self.given_file else {measuring.BASE_MODEL: self._base_model}
-        return base | ({measuring.FOUND_MODEL: self.model} if self.verdict.lacks_effects else {})
+        base = {} if self.given_file else {BASE_MODEL: self._base_model}
+        return base | ({FOUND_MODEL: self.model} if self.verdict.lacks_effects else {})
+
+    def write_beside(self, folder: Path) -> None:
+        super().write_beside(folder)
+        if self.advice is not None:
+            self.advice.next_grasp.write_commands(folder / NEXT_GRASP, self.data.gripper)
+        if self.diagnosis.law is not None:
+            write_law(self.diagnosis.law.law, folder / PROPOSED_LAW)
 
     def summary(self) -> str:
         found = f"{self.verdict} {some(self.effects)}".strip()
@@ -293,10 +328,12 @@ class AddResult(Result):
     def sections(self) -> list[Section]:
         return fit_report.add_sections(self.added, self.effect)
 
-    def box(self, folder: Path) -> Answer:
+    def commands(self, folder: Path) -> list[Command]:
         path = self.path or folder / "model.yaml"
-        command = next_step.after_adding(self.data.measured.path, path, self.model.gripper)
-        return fit_report.model_box(self.answer, self.model, [command])
+        return [next_step.after_adding(self.data.measured.path, path, self.model.gripper)]
+
+    def box(self, folder: Path) -> Answer:
+        return fit_report.model_box(self.answer, self.model, self.commands(folder))
 
     def models(self) -> dict[str, Model]:
         return {"model.yaml": self.model}
@@ -326,11 +363,13 @@ class TableResult(Result):
 
     @property
     def answer(self) -> str:
-        return measuring.table_answer(self.analysis)
+        lead = f"{self.verdict.replace('_', ' ').capitalize()}: {self.analysis.reason}."
+        return f"{lead} It could be any of {', '.join(self.effects)}." if self.effects else lead
 
     @property
     def title(self) -> str:
-        return measuring.table_title(self.data, self.file)
+        question = "Where the static law fails" if self.file == "compare" else "What the static law lacks"
+        return f"{question}: {self.name}"
 
     def to_dict(self) -> dict[str, Any]:
         as_json = final_force_report.compare_json if self.file == "compare" else final_force_report.diagnosis_json
@@ -345,3 +384,11 @@ class TableResult(Result):
 
 #: What a model can be taken from.
 ModelResult = CompareResult | FitResult | DiagnoseResult | AddResult
+
+
+def base_model(base: BaseFit, target: Target, loaded: Loaded[MeasurementSet]) -> Model:
+    """A fitted base model, which says if it is not to be believed."""
+    model = model_of(base.fit, target, loaded, numerical_error(base.fit, target))
+    if base.converged:
+        return model
+    return dataclasses.replace(model, warnings=(f"the fit did not converge: {base.reason}", *model.warnings))
