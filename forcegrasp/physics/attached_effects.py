@@ -97,6 +97,8 @@ class AttachedEffects:
 
     def interaction(self, force: np.ndarray) -> np.ndarray:
         """True forces between pads and object, newtons, ``(n, 2)``, from those of the contacts."""
+        if not self._interaction:
+            return force
         force = force.copy()
         for effect in self._interaction:
             force[effect.rows] = effect.interaction(force[effect.rows])

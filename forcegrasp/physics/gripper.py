@@ -142,7 +142,7 @@ class Gripper(ShortRepr):
         """Whether left and right can be swapped in all that is read and commanded."""
         return len(self.motors) == 2 and len(self.forces) in (0, 2)
 
-    @property
+    @functools.cached_property
     def is_direct(self) -> bool:
         """Whether each motor slides a finger of its own, so that positions of motors are positions of pads."""
         return (

@@ -36,11 +36,13 @@ class Plant(ModelFields):
     ) -> None:
         super().__init__(gripper, n, tier, threads, step_factor, other_collisions)
         self._qpos, self._ctrl, self._sensors = (self.batch.bind(name) for name in ("qpos", "ctrl", "sensordata"))
-        self._qvel = self.batch.bind("qvel")
+        self._qvel, self._applied = self.batch.bind("qvel"), self.batch.bind("qfrc_applied")
         self._load, self._enabled = np.zeros(n), np.ones(n, bool)
         self._at_start = np.ones(n, bool)  # which rows made no step since they were reset
         self._force_range: np.ndarray | None = None  # of the motors, before it was changed while they move
-        self._friction_active: np.ndarray | None = None  # which motors' friction was stiffened, ``(n, motors)``
+        # the friction that effects added last, and which motors' it stiffened, ``(n, motors)``
+        self._friction_written: np.ndarray | None = None
+        self._friction_active: np.ndarray | None = None
         self.effects = AttachedEffects(())
         self.force_scale = np.ones(n)  #: f_α, factor from the force sensors to the reading, ``(n,)``
         #: What effects contribute to a step, all together: see :class:`~forcegrasp.physics.protocols.Contribution`.
@@ -136,7 +138,7 @@ class Plant(ModelFields):
           velocity: of the motors, m/s or rad/s, ``(len(ids), motors)``; they stand still by default.
         """
         self.restore_fields(ids)
-        self._friction_active = None
+        self._friction_written = self._friction_active = None
         self.effects.change_model(self, ids)
         self.derive_fields(ids)
         keyframe = {"keyframe": 0} if self.model.nkey else {}
@@ -189,14 +191,15 @@ class Plant(ModelFields):
             self.batch.step(nstep=steps)
             self._read()
             return
-        fresh = np.broadcast_to(fresh, (self.n,))
+        fresh = fresh if isinstance(fresh, np.ndarray) else np.full(self.n, fresh)
+        stale = np.zeros(self.n, bool) if steps > 1 else fresh
         for _ in range(steps):
             self._send(self.effects.command(command, fresh))
             self._apply_actions()
             self.batch.step(nstep=1)
             self._at_start[:] = False
             self._read()
-            fresh = np.zeros(self.n, bool)
+            fresh = stale
 
     def disturb(self, load: np.ndarray, enabled: np.ndarray) -> None:
         """Says what acts on the motors from outside until the next call.
@@ -206,7 +209,7 @@ class Plant(ModelFields):
           enabled: whether the motors are switched on, ``(n,)``.
         """
         self._load = load
-        self.batch.bind("qfrc_applied")[:, self._motor_v] = load[:, None] * self._signs
+        self._applied[:, self._motor_v] = load[:, None] * self._signs
         self._enabled = np.array(enabled, bool)
         self._write_force_range()
 
@@ -268,15 +271,17 @@ class Plant(ModelFields):
         self._write_friction()
         self._write_damping()
         self._write_pad_shift()
-        push = self.batch.bind("qfrc_applied")
         on_motors = self._to_motors(self.finger_push_n) + self.motor_push + self._load[:, None]
-        push[:, self._motor_v] = on_motors * self._signs
+        self._applied[:, self._motor_v] = on_motors * self._signs
         if not self.gripper.is_servo:
-            push[:, self.object_dof] = self.object_push_n
+            self._applied[:, self.object_dof] = self.object_push_n
 
     def _write_friction(self) -> None:
         if not self.friction.any() and "dof_frictionloss" not in self._fields:
             return
+        if self._friction_written is not None and np.array_equal(self.friction, self._friction_written):
+            return
+        self._friction_written = self.friction.copy()
         base = self.base("dof_frictionloss")[:, self._motor_v]
         loss = self.field("dof_frictionloss")[:, self._motor_v] = base + self.friction
         active = loss > base

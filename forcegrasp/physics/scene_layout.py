@@ -128,8 +128,10 @@ class SceneLayout:
         # contiguous, lest the order of the sum depend on n
         if not self._readings:
             return np.zeros((*sensors.shape[:-1], 2))
-        sums = [np.ascontiguousarray(sensors[..., part]).sum(axis=-1) for part in self._readings]
-        return np.stack(sums, axis=-1)
+        sums = np.empty((*sensors.shape[:-1], len(self._readings)))
+        for side, part in enumerate(self._readings):
+            np.ascontiguousarray(sensors[..., part]).sum(axis=-1, out=sums[..., side])
+        return sums
 
 
 @dataclass(frozen=True)
