@@ -77,6 +77,7 @@ def diagnose_set(
     for fault in suspects(loaded, said[0], said[2].fit):
         progress(f"fitting the set with {fault.name} put right")
         right = fitted(fault.put_right)
+        fault = fault.told_by(right[2].fit)
         if leaves_less(fault, (right[0], right[2].fit), (said[0], said[2].fit)):
             found = with_fault(search(*right), fault, (said[0], said[2].fit))
             certain = not found.left and fault.moved is None  # else an effect may do as well

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
+from forcegrasp.diagnosis.felt_sizes import doubtful_radii
 from forcegrasp.diagnosis.signatures import Background
 from forcegrasp.diagnosis.tolerance import WORTH, Moved, move_given
 from forcegrasp.identify.base_fit import rms_error
@@ -34,6 +35,16 @@ class Fault(ShortRepr):
     check: str  #: what to look at
     put_right: Loaded[MeasurementSet]
     moved: Moved | None = None  #: what was moved within the tolerance of what is given, so that it is no fault
+    fitted_m: dict[str, float] = field(default_factory=dict)  #: given radii that are fitted instead, by object, metres
+
+    def told_by(self, fit: Fit) -> Fault:
+        """The same with what a fit of the set put right makes of what is fitted."""
+        values = dict(zip((entry.name for entry in fit.problem.entries), fit.values, strict=True))
+        told = [
+            f"the radius of {name} is {1e3 * values[f'radius_m of {name}']:.1f} mm, the set says {1e3 * said:.1f} mm"
+            for name, said in self.fitted_m.items()
+        ]
+        return dataclasses.replace(self, words="; ".join(told)) if told else self
 
     def summary(self) -> str:
         return cut(f"{self.name}: {self.words}", 100)
@@ -66,6 +77,11 @@ def suspects(loaded: Loaded[MeasurementSet], target: Target, fit: Fit) -> list[F
         words = f"{listed(early)} are what was read one row later{late}"
         check = "which row each column was written to, and its clock"
         found.append(Fault("early_row", words, check, _changed(loaded, lambda _, g: _one_row_later(g, early))))
+    if wrong := doubtful_radii(target, fit, measured.radius_std_m):
+        words = f"fingers met {listed(list(wrong))} elsewhere than the set says"
+        right = _changed(loaded, lambda _, g: dataclasses.replace(g, radius_m=None) if g.object in wrong else g)
+        check = f"the radius of {listed(list(wrong))}, with a calliper: it may be another object's, or a diameter"
+        found.append(Fault("object_radius", words, check, right, fitted_m=wrong))
     if not found and (moved := within_tolerance(loaded, target, fit)) is not None:
         found.append(moved)
     return found

@@ -15,6 +15,17 @@ def guess(target: Target, problem: Problem) -> np.ndarray:
 
     A fit can't find them by itself: as long as model and measurement touch at different times, no slope tells where.
     """
+    radii, offsets = felt(target)
+    vector = problem.start()
+    for place, entry in enumerate(problem.entries):
+        estimate = {"radius_m": radii, "offset_m": offsets}.get(entry.parameter)
+        if entry.effect is None and estimate is not None and np.isfinite(estimate[entry.members]).any():
+            vector[place] = entry.coordinate(float(np.nanmedian(estimate[entry.members])))
+    return vector
+
+
+def felt(target: Target) -> tuple[np.ndarray, np.ndarray]:
+    """Radius and offset of each grasp's object where the fingers met it, metres, ``(G,)``; NaN where they did not."""
     radii, offsets = np.full((2, len(target.grasps)), np.nan)
     for index, grasp in enumerate(target.grasps):
         touching = contacts(grasp, target.sensor_sigma, target.gripper)
@@ -29,12 +40,7 @@ def guess(target: Target, problem: Problem) -> np.ndarray:
         else:  # the right finger stands on the positive side
             finger = int(np.argmax(touching[first]))
             offsets[index] = (pads[first, finger] - radii[index]) * (1 if finger else -1)
-    vector = problem.start()
-    for place, entry in enumerate(problem.entries):
-        estimate = {"radius_m": radii, "offset_m": offsets}.get(entry.parameter)
-        if entry.effect is None and estimate is not None and np.isfinite(estimate[entry.members]).any():
-            vector[place] = entry.coordinate(float(np.nanmedian(estimate[entry.members])))
-    return vector
+    return radii, offsets
 
 
 def pad_distances(gripper: Gripper, position: np.ndarray) -> np.ndarray:

@@ -9,6 +9,7 @@ import pytest
 
 from forcegrasp.diagnosis.diagnose_set import diagnose_set
 from forcegrasp.diagnosis.faults import suspects
+from forcegrasp.diagnosis.felt_sizes import doubtful_radii
 from forcegrasp.diagnosis.moved_set import go_on_with_moved
 from forcegrasp.diagnosis.odd_grasps import odd_grasps
 from forcegrasp.diagnosis.search import diagnose
@@ -51,6 +52,19 @@ def test_a_wrong_radius_is_found(sound):
     diagnosis, _ = diagnose_set(wrong, model, ["object_size"], 0, silent)
     assert (diagnosis.verdict, diagnosis.effects) == ("data", ("object_size",))
     assert diagnosis.fit.values[-1] == pytest.approx(-0.0005, abs=0.0001)
+
+
+def test_one_wrong_radius_is_told_and_fitted(sound):
+    loaded, _ = sound
+    wrong = changed(loaded, lambda g: dataclasses.replace(g, radius_m=g.radius_m + 0.002 * (g.object == "thing_1")))
+    diagnosis, _ = diagnose_set(wrong, None, ["backlash", "object_size"], 0, silent)
+    assert (diagnosis.verdict, diagnosis.effects) == ("data", ("object_radius",))
+    fitted = dict(zip((e.name for e in diagnosis.fit.problem.entries), diagnosis.fit.values, strict=True))
+    (true,) = {g.radius_m for g in loaded.measured.grasps if g.object == "thing_1"}
+    assert f"the radius of thing_1 is {1e3 * true:.1f} mm, the set says {1e3 * true + 2:.1f} mm" in answer(diagnosis)
+    assert fitted["radius_m of thing_1"] == pytest.approx(true, abs=1e-4)
+    right = fit_model(loaded, 0, silent)
+    assert not doubtful_radii(right[0], right[2].fit, loaded.measured.radius_std_m)
 
 
 def test_swapped_force_columns_are_told(sound):

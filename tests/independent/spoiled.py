@@ -34,6 +34,12 @@ def _calliper(sheet: Sheet, rng: np.random.Generator) -> Sheet:
     return replace(sheet, radius=sheet.radius + [off[label] for label in sheet.label])
 
 
+def _one_radius(sheet: Sheet, rng: np.random.Generator) -> Sheet:
+    """One object is 2 mm wider or narrower than is written."""
+    wrong, by = str(rng.choice(sorted(set(sheet.label)))), rng.choice([-2e-3, 2e-3])
+    return replace(sheet, radius=sheet.radius + np.where(np.array(sheet.label) == wrong, by, 0.0))
+
+
 def _swapped_labels(sheet: Sheet, rng: np.random.Generator) -> Sheet:
     """Two grasps of different objects have each other's label, and what is known of the object with it."""
     one = int(rng.integers(len(sheet.label)))
@@ -59,6 +65,7 @@ SPOILED: dict[str, Spoil] = {
     "calliper": _calliper,
     "radius_0.3mm": _larger(3e-4),
     "radius_2mm": _larger(2e-3),
+    "one_radius": _one_radius,
     "forces_swapped": lambda sheet, rng: replace(sheet, f=sheet.f[:, :, ::-1]),
     "labels_swapped": _swapped_labels,
     "clock_doubled": lambda sheet, rng: replace(sheet, period_s=2 * sheet.period_s),
