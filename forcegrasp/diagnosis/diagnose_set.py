@@ -77,9 +77,11 @@ def diagnose_set(
     for fault in suspects(loaded, said[0], said[2].fit):
         progress(f"fitting the set with {fault.name} put right")
         right = fitted(fault.put_right)
-        fault = fault.told_by(right[2].fit)
         if leaves_less(fault, (right[0], right[2].fit), (said[0], said[2].fit)):
-            found = with_fault(search(*right), fault, (said[0], said[2].fit))
+            further = search(*right)
+            if not fault.is_borne_out(further.fit):  # an effect had made it seem so
+                continue
+            found = with_fault(further, fault.told_by(further.fit), (said[0], said[2].fit))
             certain = not found.left and fault.moved is None  # else an effect may do as well
             likely = found if certain else more_likely(found, search(*said))
             return with_law(likely, right[1] if likely.target.grasps is right[0].grasps else said[1])

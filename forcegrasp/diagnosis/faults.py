@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from forcegrasp.diagnosis.felt_sizes import doubtful_radii
+from forcegrasp.diagnosis.felt_sizes import SEEN_M, doubtful_radii
 from forcegrasp.diagnosis.signatures import Background
 from forcegrasp.diagnosis.tolerance import WORTH, Moved, move_given
 from forcegrasp.identify.base_fit import rms_error
@@ -37,17 +37,28 @@ class Fault(ShortRepr):
     moved: Moved | None = None  #: what was moved within the tolerance of what is given, so that it is no fault
     fitted_m: dict[str, float] = field(default_factory=dict)  #: given radii that are fitted instead, by object, metres
 
+    def is_borne_out(self, fit: Fit) -> bool:
+        """Whether a fit of the set put right, with the effects that were found, still wants other radii than given."""
+        values = _radii(fit)
+        return all(abs(values[name] - said) > SEEN_M for name, said in self.fitted_m.items())
+
     def told_by(self, fit: Fit) -> Fault:
         """The same with what a fit of the set put right makes of what is fitted."""
-        values = dict(zip((entry.name for entry in fit.problem.entries), fit.values, strict=True))
+        values = _radii(fit)
         told = [
-            f"the radius of {name} is {1e3 * values[f'radius_m of {name}']:.1f} mm, the set says {1e3 * said:.1f} mm"
+            f"the radius of {name} is {1e3 * values[name]:.1f} mm, the set says {1e3 * said:.1f} mm"
             for name, said in self.fitted_m.items()
         ]
         return dataclasses.replace(self, words="; ".join(told)) if told else self
 
     def summary(self) -> str:
         return cut(f"{self.name}: {self.words}", 100)
+
+
+def _radii(fit: Fit) -> dict[str, float]:
+    """The radii that a fit fitted, metres, by object."""
+    named = zip((entry.name for entry in fit.problem.entries), fit.values.tolist(), strict=True)
+    return {name.removeprefix("radius_m of "): value for name, value in named if name.startswith("radius_m of ")}
 
 
 def suspects(loaded: Loaded[MeasurementSet], target: Target, fit: Fit) -> list[Fault]:

@@ -13,8 +13,10 @@ from forcegrasp.identify.target import Target
 # With fewer objects nobody tells which one is wrong.
 _LEAST_OBJECTS = 3
 # An object is doubted if it was met so many standard errors, and standard deviations of what is given, from where the
-# others say; nearer than this no contact is seen between two samples, metres.
-_FAR, _BEYOND_TOLERANCE, _SEEN_M = 4.0, 3.0, 3e-4
+# others say. One touch of it is not enough.
+_FAR, _BEYOND_TOLERANCE, _LEAST_TOUCHES = 4.0, 3.0, 2
+#: Nearer than this no contact is seen between two samples, metres.
+SEEN_M = 3e-4
 # Median of absolute deviations → standard deviation of normal ones.
 _NORMAL = 1.4826
 
@@ -39,12 +41,14 @@ def doubtful_radii(target: Target, fit: Fit, radius_std_m: float) -> dict[str, f
         return {}
     middle = {name: float(np.median(values)) for name, values in of_object.items()}
     usual = float(np.median(list(middle.values())))
-    scatter = _NORMAL * np.median(np.abs(np.concatenate([of_object[name] - middle[name] for name in of_object])))
-    least = max(_BEYOND_TOLERANCE * radius_std_m, _SEEN_M)
+    several = [values - np.median(values) for values in of_object.values() if len(values) >= _LEAST_TOUCHES]
+    scatter = _NORMAL * float(np.median(np.abs(np.concatenate(several)))) if several else np.inf
+    least = max(_BEYOND_TOLERANCE * radius_std_m, SEEN_M)
     found = {
         name: float(np.nanmedian(said[labels == name]))
         for name, values in of_object.items()
-        if abs(middle[name] - usual) > max(_FAR * scatter / np.sqrt(len(values)), least)
+        if len(values) >= _LEAST_TOUCHES
+        and abs(middle[name] - usual) > max(_FAR * scatter / np.sqrt(len(values)), least)
     }
     return found if 2 * len(found) < len(of_object) else {}
 
