@@ -78,15 +78,18 @@ def refit_as(setting: EffectSetting, fit: Fit, without: str, study: Study) -> Fi
 
 def refit_as_richer(container: type[Effect], fit: Fit, without: str, study: Study) -> Fit:
     """The same with an effect that contains the other, from the best of its sizes."""
-    known = next(one for one in fit.problem.case(fit.vector).effects if one.effect.name == without)
-    return _refit(richer(known, container), fit, without, study)
+    return _refit(_richer_than(without, container, fit), fit, without, study)
 
 
 def roughly_as_richer(container: type[Effect], fit: Fit, without: str, study: Study) -> Fit:
     """The same by the cheap model."""
-    known = next(one for one in fit.problem.case(fit.vector).effects if one.effect.name == without)
-    problem, start = _best_start(richer(known, container), fit, without, study)
+    problem, start = _best_start(_richer_than(without, container, fit), fit, without, study)
     return fit_once(study.target, problem, study.simulators, start, fit.correction, rounds=0)
+
+
+def _richer_than(name: str, container: type[Effect], fit: Fit) -> list[EffectSetting]:
+    known = next(one for one in fit.problem.case(fit.vector).effects if one.effect.name == name)
+    return richer(known, container)
 
 
 def refit_without(name: str, fit: Fit, study: Study) -> Fit:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -56,7 +55,7 @@ def _fit_with(setting: EffectSetting, study: Study, fit: Fit) -> Fit:
     if some is not study:
         few = _fit_from(part.vector, setting, some, part)
         before, setting = few.vector[: len(part.problem)], few.problem.case(few.vector).effects[-1]
-        start = fit.moved(dataclasses.replace(part, vector=before))
+        start = fit.moved(part.problem, before)
     return _fit_from(start, setting, study, fit)
 
 

@@ -214,7 +214,7 @@ class _Start:
         best = min(others, key=lambda fit: fit.cost, default=own)
         if best.cost > _NO_BETTER * own.cost:
             return exact
-        again = fit_exactly(target, exact.problem, simulators, exact.moved(best))
+        again = fit_exactly(target, exact.problem, simulators, exact.moved(best.problem, best.vector))
         return min([exact, again], key=lambda fit: fit.cost)
 
     def _judge(self, refit: Fit, p_family: float, signature: np.ndarray, replaces: str = "") -> Candidate:

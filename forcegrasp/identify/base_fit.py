@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -140,7 +139,7 @@ class _Subset:
         self.target, part = target.subset(keep), fitted.subset(keep)
         self.problem, self.known, self._correction = part.problem, part.vector, part.correction
         self._simulators = Simulators(self.problem)
-        self._fitted, self._part = fitted, part
+        self._fitted = fitted
 
     def fit(self, start: np.ndarray) -> _End:
         vector, residual = descend_roughly(self.target, self.problem, self._simulators, start, self._correction)
@@ -149,4 +148,4 @@ class _Subset:
 
     def enlarge(self, part: np.ndarray) -> np.ndarray:
         """Coordinates for the whole problem: what these grasps don't fix stays as it was."""
-        return self._fitted.moved(dataclasses.replace(self._part, vector=part))
+        return self._fitted.moved(self.problem, part)

@@ -96,10 +96,10 @@ class Fit(ShortRepr):
             weight=self.weight[keep],
         )
 
-    def moved(self, part: Fit) -> np.ndarray:
-        """Its coordinates, ``(p,)``, with those that a fit of some of its grasps has, as that has them."""
+    def moved(self, part: Problem, coordinates: np.ndarray) -> np.ndarray:
+        """Its coordinates, ``(p,)``, but those of a problem of some of its grasps as they are given."""
         vector = self.vector.copy()
-        vector[_places(self.problem, part.problem)] = part.vector
+        vector[_places(self.problem, part)] = coordinates
         return vector
 
     def covariance(self) -> np.ndarray:
