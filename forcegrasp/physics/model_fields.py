@@ -42,6 +42,7 @@ class ModelFields(SceneLayout):
         self, gripper: Gripper, n: int, tier: str, threads: int, step_factor: float, other_collisions: bool
     ) -> None:
         guard.silence_log()
+        guard.stop_clock()
         self.n, self._tier = n, tier
         model = gripper.compile(tier)
         model.opt.timestep *= step_factor

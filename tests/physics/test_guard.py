@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -81,3 +82,22 @@ def test_a_single_grasp_is_guarded_too(tmp_path, monkeypatch):
     simulator = GraspSimulator(1, "fast", threads=1)
     with pytest.raises(PhysicsError, match="grasp 0 diverged at control step 0"):
         simulator.step(np.array([[0.0, np.nan]]))
+
+
+def test_no_step_is_timed_unless_somebody_set_a_clock():
+    model = mujoco.MjModel.from_xml_string("<mujoco/>")
+
+    def duration() -> float:
+        data = mujoco.MjData(model)
+        mujoco.mj_step(model, data, 1000)
+        return data.timer[mujoco.mjtTimer.mjTIMER_STEP].duration
+
+    mujoco.set_mjcb_time(lambda: 1.0)
+    guard.stop_clock()
+    try:
+        assert mujoco.get_mjcb_time() is not None
+    finally:
+        mujoco.set_mjcb_time(None)
+    assert duration() > 0
+    guard.stop_clock()
+    assert duration() == 0
