@@ -22,6 +22,8 @@ from forcegrasp.short_repr import ShortRepr, cut
 
 # A row's shift is worth a fit if it takes this share off the squares that a fit leaves beyond the noise.
 _WORTH = 0.5
+# What a linear step makes of a change of zero is believed if it differs by no more than this share.
+_OTHERWISE = 0.2
 # A set of which a fit leaves less than so many times the noise is not doubted.
 _NOTHING = 1.03
 
@@ -77,6 +79,7 @@ def suspects(loaded: Loaded[MeasurementSet], target: Target, fit: Fit) -> list[F
         right = _changed(loaded, lambda _, g: _slower(g, 1 / factor))
         found.append(Fault("time_scale", words, "the clock and unit of t_s", right))
     if (tare := find_tare(measured)) is not None:
+        tare = _sharper(tare, target, fit)
         first = measured.grasps[tare.first].name
         changed = [f"{n} by {x:+.3g} N" for n, x in zip(measured.columns.force, tare.change_n, strict=True) if x]
         words = f"the zero changes at grasp {first}: {listed(changed)}"
@@ -125,6 +128,25 @@ def _changed(
 def _slower(grasp: MeasuredGrasp, factor: float) -> MeasuredGrasp:
     start = grasp.time_s[0]
     return dataclasses.replace(grasp, time_s=start + factor * (grasp.time_s - start))
+
+
+def _sharper(tare: Tare, target: Target, fit: Fit) -> Tare:
+    """The same change as all readings have it, by a linear step from a fit; as it was where these say otherwise.
+
+    Readings before contact, which show that a zero has changed, are few.
+    """
+    changed = np.flatnonzero(tare.change_n)
+    columns = np.zeros((*target.signals.shape, len(changed)))
+    for column, channel in enumerate(changed):
+        columns[tare.first :, :, target.axis.kinds["force"].start + channel, column] = 1.0
+    columns = fit.weight[..., None] * np.where(target.mask[..., None, None], columns / target.sigma[:, None], 0.0)
+    slopes = np.column_stack([fit.slopes, columns.reshape(-1, len(changed))])
+    step = np.linalg.lstsq(slopes, (fit.weight * fit.residual).ravel(), rcond=None)[0][-len(changed) :]
+    change = tare.change_n.copy()
+    change[changed] = np.where(
+        np.abs(step - change[changed]) < _OTHERWISE * np.abs(change[changed]), step, change[changed]
+    )
+    return dataclasses.replace(tare, change_n=change)
 
 
 def _levelled(grasp: MeasuredGrasp, tare: Tare) -> MeasuredGrasp:

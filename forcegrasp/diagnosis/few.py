@@ -9,6 +9,7 @@ import numpy as np
 from forcegrasp.diagnosis.study import Few, Study
 from forcegrasp.identify.fit import Fit, Simulators
 from forcegrasp.identify.target import Target
+from forcegrasp.replay.replay import Replay
 
 # Share of each object's grasps that are few; but no fewer than so many in all.
 _SHARE, _LEAST = 1 / 3, 6
@@ -24,8 +25,10 @@ def with_few(study: Study, fit: Fit) -> Study:
     keep = few_grasps(study.target, fit)
     if len(keep) == len(study.target.grasps):
         return study
-    exact = study.simulators.cheap is study.simulators.exact
-    return dataclasses.replace(study, few=Few(keep, Simulators(fit.subset(keep).problem, exact)))
+    exact, problem = study.simulators.cheap is study.simulators.exact, fit.subset(keep).problem
+    simulators = Simulators(problem, exact)
+    rough = simulators.cheap if exact else Replay(problem.gripper, problem.grasps, "fast")
+    return dataclasses.replace(study, few=Few(keep, simulators, rough))
 
 
 def few_grasps(target: Target, fit: Fit) -> np.ndarray:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from forcegrasp.identify.cross_validation import rms_of_grasps
-from forcegrasp.identify.fit import Fit, Simulators, fit_once
+from forcegrasp.identify.fit import Fit, Simulators, descend_roughly
 from forcegrasp.identify.predict import predict
 from forcegrasp.identify.problem import Problem
 from forcegrasp.identify.target import Target
@@ -64,7 +64,10 @@ def odd_grasps(target: Target, fit: Fit) -> tuple[OddGrasp, ...]:
         rest = np.setdiff1d(np.arange(len(errors)), suspects)
         if {labels[i] for i in rest} != set(objects):  # of some object nothing else is known
             return ()
-        problem, vector = _fit_of(target, fit, rest, known=(problem, vector))
+        part, few = fit.subset(rest), target.subset(rest)
+        start = _coordinates(part.problem, (problem, vector))
+        problem = part.problem
+        vector, _ = descend_roughly(few, problem, Simulators(problem), start, part.correction)
         errors = _errors_as(target, np.arange(len(errors)), target.grasps, problem, vector)
         usual = max(1.0, float(np.median(errors[rest])))
     alone = [target.grasps[i] for i in suspects]
@@ -85,16 +88,6 @@ def odd_grasps(target: Target, fit: Fit) -> tuple[OddGrasp, ...]:
         fits = error <= _FITS * usual
         found.append(OddGrasp(alone[k].name, alone[k].object, float(as_said[k]), like if fits else "", error))
     return tuple(found)
-
-
-def _fit_of(
-    target: Target, fit: Fit, rest: np.ndarray, known: tuple[Problem, np.ndarray]
-) -> tuple[Problem, np.ndarray]:
-    """The problem of these grasps alone, and a fit's coordinates, from what is known."""
-    few = target.subset(rest)
-    problem = Problem(target.gripper, few.grasps, fit.problem.effects)
-    start = _coordinates(problem, known)
-    return problem, fit_once(few, problem, Simulators(problem), start).vector
 
 
 def _coordinates(problem: Problem, known: tuple[Problem, np.ndarray]) -> np.ndarray:

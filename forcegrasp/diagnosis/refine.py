@@ -14,9 +14,9 @@ from forcegrasp.identify.fit import Fit, fit_once
 from forcegrasp.identify.problem import Problem
 from forcegrasp.short_repr import ShortRepr
 
-# At its best size an effect promises nearly what a fit will gain: one that promises less than this share of the best
-# gain has lost.
-_LOST = 0.4
+# At its best size an effect promises nearly what a fit will gain, and fitted to few grasps what it gains on all: one
+# with less than this share of the best gain has lost.
+_LOST, _LOST_IF_FITTED = 0.4, 0.7
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -30,6 +30,8 @@ class Refined(ShortRepr):
 def refine(scores: Sequence[Score], study: Study, fit: Fit, background: Background) -> list[Refined]:
     """Fits with each effect that may still be the best one; those that promise most come first.
 
+    Few grasps lead most of the way, and most effects have lost there.
+
     Args:
       scores: the best signature of each effect or variant.
       study: the measurements.
@@ -38,25 +40,28 @@ def refine(scores: Sequence[Score], study: Study, fit: Fit, background: Backgrou
     """
     pairs = list(zip(best_sizes(scores, study, fit, background), scores, strict=True))
     pairs.sort(key=lambda pair: -pair[0].gain)
-    best = pairs[0][0].gain if pairs else 0.0
-    pairs = [(sized, score) for sized, score in pairs if sized.gain >= min(best, _LOST * best)]
-    refined = []
-    for number, (sized, score) in enumerate(pairs, 1):
+    pairs = [pairs[i] for i in _in_the_race([sized.gain for sized, _ in pairs], _LOST)]
+    some, part = study.on_few(fit)
+    fits: list[Fit] = []
+    for number, (sized, _) in enumerate(pairs, 1):
         setting = sized.setting
         study.progress(f"refitting with {setting.effect.name} {setting.variant} ({number} of {len(pairs)})")
-        refined.append(Refined(score, _fit_with(setting, study, fit)))
+        fits.append(_fit_from(part.vector, setting, some, part))
+    if some is study:
+        return [Refined(score, one) for (_, score), one in zip(pairs, fits, strict=True)]
+    refined = []
+    for i in _in_the_race([part.cost - one.cost for one in fits], _LOST_IF_FITTED):
+        few, setting = fits[i], fits[i].problem.case(fits[i].vector).effects[-1]
+        start = fit.moved(part.problem, few.vector[: len(part.problem)])
+        study.progress(f"refitting with {setting.effect.name} {setting.variant} on all grasps")
+        refined.append(Refined(pairs[i][1], _fit_from(start, setting, study, fit)))
     return refined
 
 
-def _fit_with(setting: EffectSetting, study: Study, fit: Fit) -> Fit:
-    """Few grasps lead most of the way."""
-    some, part = study.on_few(fit)
-    start = fit.vector
-    if some is not study:
-        few = _fit_from(part.vector, setting, some, part)
-        before, setting = few.vector[: len(part.problem)], few.problem.case(few.vector).effects[-1]
-        start = fit.moved(part.problem, before)
-    return _fit_from(start, setting, study, fit)
+def _in_the_race(gains: Sequence[float], least: float) -> list[int]:
+    """Indices of the gains that are no less than this share of the best."""
+    best = max(gains, default=0.0)
+    return [i for i, gain in enumerate(gains) if gain >= min(best, least * best)]
 
 
 def _fit_from(start: np.ndarray, setting: EffectSetting, study: Study, fit: Fit) -> Fit:

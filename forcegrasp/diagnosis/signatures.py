@@ -159,7 +159,7 @@ def _changes(tried: Sequence[EffectSetting], study: Study, fit: Fit) -> np.ndarr
     """What each effect changes of the signals ÷ noise, ``(N, tried)``, in one simulation."""
     start = fit.problem.case(fit.vector)
     cases = [start, *(Case(start.base, (*start.effects, one)) for one in tried)]
-    signals = predict(study.simulators.cheap, cases)
+    signals = predict(study.rough or study.simulators.cheap, cases)
     target = study.target
     return np.where(target.mask[..., None], (signals[1:] - signals[0]) / target.sigma, 0.0).reshape(len(tried), -1).T
 

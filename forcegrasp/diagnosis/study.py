@@ -11,6 +11,7 @@ from forcegrasp.identify.cross_validation import heldout_residual, log_likelihoo
 from forcegrasp.identify.fit import Fit, Simulators
 from forcegrasp.identify.progress import Progress, silent
 from forcegrasp.identify.target import Target
+from forcegrasp.replay.replay import Replay
 
 # Fewer held-out recordings say nothing of how much they scatter.
 _RECORDINGS = 3
@@ -22,6 +23,7 @@ class Few:
 
     keep: np.ndarray  #: their indices
     simulators: Simulators  #: of them
+    rough: Replay  #: of them, for what only ranks
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,6 +36,7 @@ class Study:
     numerical: Sequence[np.ndarray] = ()  #: the model's own numerical errors, which no effect gets credit for
     progress: Progress = silent
     few: Few | None = None  #: grasps that stand for all where a rough answer will do; none are chosen by default
+    rough: Replay | None = None  #: simulates what only ranks; the cheap one by default
     # fits and what they leave of held-out grasps: several parts of a search ask for the same, and some is simulated
     _known: list[tuple[Fit, np.ndarray]] = field(default_factory=list, init=False, repr=False)
 
@@ -51,7 +54,8 @@ class Study:
             return self, fit
         keep, target = self.few.keep, self.target.subset(self.few.keep)
         numerical = tuple(one[keep][:, : target.mask.shape[1]] for one in self.numerical)
-        return Study(target, self.few.simulators, (), numerical, self.progress), fit.subset(keep)
+        few = Study(target, self.few.simulators, (), numerical, self.progress, rough=self.few.rough)
+        return few, fit.subset(keep)
 
     def gains(self, before: np.ndarray, after: np.ndarray) -> np.ndarray:
         """By how much each grasp's held-out log-likelihood rises, ``(G,)``; NaN of those that were not held out.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 from dataclasses import dataclass
 
@@ -22,6 +23,12 @@ _SLOPES_LAST, _FEW = 3, 30
 STEP, LARGE_STEP = 0.02, 0.06
 # Relative change of the cost at which a fit ends, one that only ranks, and the most evaluations until then.
 _TOLERANCE, _ROUGH, _EVALUATIONS = 1e-4, 1e-3, 15
+# A step that makes the cost rise by this share of what one reading costs ends a fit, or one as small as this, in
+# coordinates: that contacts are rough is all it says.
+_FLAT, _SMALLEST_STEP = 0.1, STEP / 20
+# Where a fit ended it goes on if slopes measured there promise to lower the cost by this share of one reading's; but
+# not so many times the noise off, where the model is wrong by more than that.
+_WORTH, _NEAR = 0.5, 2.0
 
 
 class Simulators:
@@ -144,7 +151,7 @@ def fit_once(
         correction = 0.0 if one_model else _difference(problem, simulators, vector)
     total = 0
     for _ in range(max(1, rounds) if free.any() else 0):
-        vector, count = _descend(local, vector, correction, free, _TOLERANCE if rounds else _ROUGH)
+        vector, count = _descend(local, vector, correction, free, rough=rounds == 0)
         total += count
         if one_model or rounds == 0:
             break
@@ -166,7 +173,7 @@ def descend_roughly(
     """
     local = _Local(target, problem, simulators.cheap, simulators.cheap, None, simulators.step)
     vector = np.clip(start, problem.low + 1e-9, problem.high - 1e-9)
-    vector, _ = _descend(local, vector, correction, np.ones(len(problem), bool), _ROUGH)
+    vector, _ = _descend(local, vector, correction, np.ones(len(problem), bool), rough=True)
     return vector, target.residual(local.value(vector) + correction)
 
 
@@ -186,36 +193,83 @@ def fit_exactly(
     start = np.clip(start, problem.low + 1e-9, problem.high - 1e-9)
     if slopes is not None:
         local.begin(start, slopes)
-    vector, total = _descend(local, start, 0.0, free, _TOLERANCE)
+    vector, total = _descend(local, start, 0.0, free, rough=False)
     exact = local.value(vector)
     cheap = exact if simulators.exact is simulators.cheap else predict(simulators.cheap, [problem.case(vector)])[0]
     return _finish(local, vector, exact, exact - cheap, free, total)
 
 
 def _descend(
-    local: _Local, start: np.ndarray, shift: np.ndarray | float, free: np.ndarray, tolerance: float
+    local: _Local, start: np.ndarray, shift: np.ndarray | float, free: np.ndarray, rough: bool
 ) -> tuple[np.ndarray, int]:
-    """Goes to the next optimum in the free coordinates; also returns the number of evaluations."""
+    """Goes to the next optimum in the free coordinates; also returns the number of evaluations.
 
+    Slopes that only followed the values may lead nowhere; those measured where they end tell, and lead on.
+    """
+    vector, count = _descend_once(local, start, shift, free, rough, _EVALUATIONS)
+    while not rough and count < _EVALUATIONS and _may_fall(local, vector, shift, free):
+        vector, more = _descend_once(local, vector, shift, free, rough, _EVALUATIONS - count)
+        count += more
+    return vector, count
+
+
+def _may_fall(local: _Local, vector: np.ndarray, shift: np.ndarray | float, free: np.ndarray) -> bool:
+    """Whether slopes that are measured where a descent ended promise more than the ones that it ended with."""
+    if local.has_measured(vector):
+        return False
+    problem, weight = local.problem, local.target.weight
+    residual = (weight * local.target.residual(local.value(vector) + shift)).ravel()
+    if residual @ residual > _NEAR**2 * local.target.readings:
+        return False
+    inside = free & (vector > problem.low + 1e-6) & (vector < problem.high - 1e-6)
+    slopes = (weight[..., None] * local.slopes(vector, anew=True)).reshape(-1, len(problem))[:, inside]
+    gain = residual @ slopes @ np.linalg.lstsq(slopes, residual, rcond=1e-6)[0]
+    return bool(gain * local.target.readings > _WORTH * (residual @ residual))
+
+
+def _descend_once(
+    local: _Local, start: np.ndarray, shift: np.ndarray | float, free: np.ndarray, rough: bool, evaluations: int
+) -> tuple[np.ndarray, int]:
     def whole(part: np.ndarray) -> np.ndarray:
         vector = start.copy()
         vector[free] = part
         return vector
 
     problem, weight = local.problem, local.target.weight
-    solution = least_squares(
-        lambda part: -(weight * local.target.residual(local.value(whole(part)) + shift)).ravel(),
-        start[free],
-        # scipy is not annotated: its type is guessed from its default, a string
-        jac=lambda part: (weight[..., None] * local.slopes(whole(part))).reshape(-1, len(problem))[:, free],  # pyright: ignore[reportArgumentType]
-        bounds=(problem.low[free], problem.high[free]),
-        x_scale="jac",
-        ftol=tolerance,
-        xtol=1e-6,
-        gtol=1e-10,
-        max_nfev=_EVALUATIONS,
-    )
-    return whole(solution.x), solution.nfev
+    tolerance, flat = (_ROUGH, _ROUGH) if rough else (_TOLERANCE, _FLAT / max(local.target.readings, 1))
+    best, count = (start, np.inf, np.empty(0)), 0
+
+    def residual(part: np.ndarray) -> np.ndarray:
+        nonlocal best, count
+        vector = whole(part)
+        signals = local.value(vector)
+        residual = (weight * local.target.residual(signals + shift)).ravel()
+        cost, count = float(residual @ residual), count + 1
+        if cost < best[1]:
+            best = vector, cost, signals
+        elif cost < (1 + flat) * best[1] or np.abs(vector - best[0]).max() < _SMALLEST_STEP:
+            raise _SettledError
+        return -residual
+
+    with contextlib.suppress(_SettledError):
+        least_squares(
+            residual,
+            start[free],
+            # scipy is not annotated: its type is guessed from its default, a string
+            jac=lambda part: (weight[..., None] * local.slopes(whole(part))).reshape(-1, len(problem))[:, free],  # pyright: ignore[reportArgumentType]
+            bounds=(problem.low[free], problem.high[free]),
+            x_scale="jac",
+            ftol=tolerance,
+            xtol=1e-6,
+            gtol=1e-10,
+            max_nfev=evaluations,
+        )
+    local.recall(best[0], best[2])
+    return best[0], count
+
+
+class _SettledError(Exception):
+    """A step that slopes promised a gain for made as good as no difference."""
 
 
 def _finish(local: _Local, vector: np.ndarray, predicted: np.ndarray, correction, free: np.ndarray, total: int) -> Fit:
@@ -261,6 +315,14 @@ class _Local:
         if self._value is None or not np.array_equal(self._value[0], x):
             self._value = (x.copy(), predict(self._values, [self.problem.case(x)])[0])
         return self._value[1]
+
+    def recall(self, x: np.ndarray, signals: np.ndarray) -> None:
+        """Takes signals that were predicted at a point before."""
+        self._value = (x.copy(), signals)
+
+    def has_measured(self, x: np.ndarray) -> bool:
+        """Whether the slopes at hand were measured at this point."""
+        return self._slope is not None and self._age == 0 and np.array_equal(self._slope[0], x)
 
     def begin(self, x: np.ndarray, slopes: np.ndarray) -> None:
         """Takes slopes for those at a point."""
