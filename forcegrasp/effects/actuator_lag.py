@@ -19,6 +19,7 @@ class ActuatorLag(Effect):
     look_alikes = ("command_delay", "rate_limit")
     separates = "fast steps: a lagged response has no corner"
     parameters = (Parameter("time_constant_s", "time constant τ", "s", 0.0, 0.5, 0.05, trials=(0.01, 0.04, 0.12)),)
+    known_beforehand = ("",)
 
     def init(self, which: np.ndarray) -> State:
         return {"held": self.resting_command[which]}

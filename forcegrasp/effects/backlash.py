@@ -29,6 +29,7 @@ class Backlash(Effect):
         ),
     )
     variants = ("play", "loose", "command")
+    known_beforehand = ("command",)
     variant_needs = {"play": "pads", "loose": "pads", "command": "position loop"}  # noqa: RUF012 never changed
 
     def init(self, which: np.ndarray) -> State:

@@ -85,6 +85,8 @@ class Effect:
     #: the name of the only one.
     per: ClassVar[str] = ""
     alone: ClassVar[str] = ""
+    #: Variants that change commands by what is commanded alone, whatever happens, so that it can be known beforehand.
+    known_beforehand: ClassVar[tuple[str, ...]] = ()
     after_noise: ClassVar[bool] = False  #: acts on readings with their noise, as rounding does
     of_set: ClassVar[bool] = False  #: not of the gripper: what the measurement set says is wrong
     needs_object: ClassVar[bool] = False  #: shows only where fingers press on something
@@ -204,6 +206,11 @@ class Effect:
     def rank(self) -> tuple[int, int]:
         """Where it stands in the order in which effects act."""
         return STAGES.index(self.stage), self.order
+
+    @property
+    def is_known_beforehand(self) -> bool:
+        """Whether all that it does to a grasp follows from the commands."""
+        return self.variant in self.known_beforehand
 
     @classmethod
     @functools.cache

@@ -36,6 +36,7 @@ class CommandDeadband(Effect):
         ),
     )
     variants = ("position", "held")
+    known_beforehand = ("held",)
 
     def init(self, which: np.ndarray) -> State:
         return {"held": self.position[which]}

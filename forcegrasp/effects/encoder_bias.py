@@ -26,6 +26,7 @@ class EncoderBias(Effect):
         Parameter("right_m", "offset of the right encoder", "m", -0.01, 0.01, -0.0002, follows="position"),
     )
     variants = ("reading", "loop")
+    known_beforehand = ("loop",)
     variant_needs = {"loop": "position loop"}  # noqa: RUF012 never changed
     order = 9
     per, alone = "motor", "offset"

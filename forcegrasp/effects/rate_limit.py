@@ -34,6 +34,7 @@ class RateLimit(Effect):
         ),
     )
     order = 2
+    known_beforehand = ("",)
 
     def init(self, which: np.ndarray) -> State:
         return {"held": self.position[which]}

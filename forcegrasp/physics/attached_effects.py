@@ -26,8 +26,10 @@ class AttachedEffects:
             for hook in ("command", "motor_range", "act", "interaction")
         )
         self.readings = ReadingEffects(effects)
-        #: Whether any acts in every step, and not only on the model when a grasp starts.
-        self.act_in_steps = any(effect.hooks() - {"change_model"} for effect in effects)
+        #: Whether any acts on what happens in a step, and not only on the model or by what is commanded.
+        self.act_in_steps = any(
+            effect.hooks() - {"change_model"} and not effect.is_known_beforehand for effect in effects
+        )
 
     def __len__(self) -> int:
         return len(self._effects)
@@ -65,6 +67,13 @@ class AttachedEffects:
         for effect in self._command:
             command[effect.rows] = effect.command(command[effect.rows], fresh[effect.rows])
         return command
+
+    def commands(self, commands: np.ndarray, fresh: np.ndarray) -> np.ndarray:
+        """The same for the commands of many steps ``(n, steps, motors)``, where nothing else acts in them."""
+        if not self._command:
+            return commands
+        steps = range(commands.shape[1])
+        return np.stack([self.command(commands[:, step], fresh[:, step]) for step in steps], axis=1)
 
     @property
     def limit_motors(self) -> bool:

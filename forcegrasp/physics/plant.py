@@ -213,13 +213,14 @@ class Plant(ModelFields):
         self._enabled = np.array(enabled, bool)
         self._write_force_range()
 
-    def play(self, commands: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def play(self, commands: np.ndarray, fresh: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Holds each command for one physics step, as :meth:`advance` does, in one call of the engine.
 
         Afterwards only a reset makes sense: what is read is not brought up to date.
 
         Args:
           commands: commanded positions, m or rad, ``(n, steps, motors)``.
+          fresh: which of them are new ones, ``(n, steps)``.
 
         Returns:
           Positions ``(n, steps, motors)``, force readings ``(n, steps, channels)`` and object positions ``(n, steps)``
@@ -231,6 +232,7 @@ class Plant(ModelFields):
         if self.acts_in_steps:
             raise RuntimeError("effects act in every step: advance step by step")
         control = np.repeat(self._ctrl[:, None], commands.shape[1], axis=1)
+        commands = self.effects.commands(commands, fresh)
         control[..., self._drives] = commands * self._command_scale + self._command_zero
         record = self.batch.rollout(commands.shape[1], control, record=["qpos", "sensordata"])
         sensors, scale = record["sensordata"], self.force_scale[:, None, None]
@@ -239,7 +241,7 @@ class Plant(ModelFields):
 
     @property
     def acts_in_steps(self) -> bool:
-        """Whether an effect acts in every step, and not only on the model when a grasp starts."""
+        """Whether an effect acts on what happens in a step, and not only on the model or by what is commanded."""
         return self.effects.act_in_steps
 
     def warnings(self) -> np.ndarray:

@@ -169,7 +169,8 @@ class Replay:
         position[:, 0], force[:, 0], objects[:, 0] = plant.position, plant.transduced_force, plant.object_position
         if not plant.acts_in_steps and not self._disturbed:
             commands = self._command[:-1, grasp].swapaxes(0, 1)
-            position[:, 1:], force[:, 1:], objects[:, 1:] = plant.play(commands)
+            fresh = self._fresh[:-1, grasp].T
+            position[:, 1:], force[:, 1:], objects[:, 1:] = plant.play(commands, fresh)
         else:
             for step in range(self._steps - 1):
                 if self._encoders_known:

@@ -124,6 +124,21 @@ def test_effects_act_as_they_do_live(effect, variant):
     assert replayed(simulator, np.array([0]), on)[0].tobytes() == by_hand(one, (effect, variant, values)).tobytes()
 
 
+@pytest.mark.parametrize(("effect", "variant"), CASES)
+def test_what_follows_from_commands_needs_no_stop_at_each_step(effect, variant, monkeypatch):
+    def stopped(*_):
+        raise AssertionError
+
+    monkeypatch.setattr(Plant, "advance", stopped)
+    simulator = Replay(TIAGO, [grasp(REGULAR)], "fast")
+    one = EffectOn(effect, variant, effect.typical_values()[None], np.array([0]))
+    if variant in effect.known_beforehand:
+        assert replayed(simulator, np.array([0]), one).any()
+    elif effect.hooks() & {"command", "act", "motor_range", "interaction"} and not effect.reads_only(variant):
+        with pytest.raises(AssertionError):
+            replayed(simulator, np.array([0]), one)
+
+
 def test_several_effects_act_in_their_order():
     one = grasp(REGULAR)
     chosen = [get_effect(n) for n in ("quantisation", "force_bias", "force_lag", "backlash", "command_delay")]
