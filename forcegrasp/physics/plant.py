@@ -301,9 +301,8 @@ class Plant(ModelFields):
             return
         for side, pads in enumerate(self._pads):
             shift = self.pad_shift_m[:, side : side + 1] * self._outward(side)
-            for field, indices in pads.moved.items():
-                for index in indices:
-                    self.field(field)[:, index] = getattr(self.model, field)[index] + shift
+            for field, (indices, places) in pads.moved.items():
+                self.field(field)[:, indices] = places + shift[:, None]
 
     def _outward(self, side: int) -> np.ndarray:
         """Direction in which a side's pads open, in the frame of their body, ``(3,)`` or ``(n, 3)``."""

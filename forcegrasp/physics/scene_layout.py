@@ -139,17 +139,14 @@ class _Pads:
     """What moves with a side's pads, in the frame of their body."""
 
     body: int
-    moved: dict[str, np.ndarray]  #: field of positions → indices
+    moved: dict[str, tuple[np.ndarray, np.ndarray]]  #: field of positions → indices, and where the scene puts them
 
     @classmethod
     def find(cls, model: mujoco.MjModel, name: str) -> _Pads:
         body = int(model.body(name).id)
-        moved = {
-            "geom_pos": np.flatnonzero(model.geom_bodyid == body),
-            "site_pos": np.flatnonzero(model.site_bodyid == body),
-            "body_pos": np.flatnonzero(model.body_parentid == body),
-        }
-        return cls(body, moved)
+        owners = {"geom_pos": model.geom_bodyid, "site_pos": model.site_bodyid, "body_pos": model.body_parentid}
+        inside = {field: np.flatnonzero(of == body) for field, of in owners.items()}
+        return cls(body, {field: (own, getattr(model, field)[own]) for field, own in inside.items() if len(own)})
 
 
 def _reading(model: mujoco.MjModel, side: str, finger: Finger) -> slice:
