@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -37,16 +37,10 @@ class Study:
     progress: Progress = silent
     few: Few | None = None  #: grasps that stand for all where a rough answer will do; none are chosen by default
     rough: Replay | None = None  #: simulates what only ranks; the cheap one by default
-    # fits and what they leave of held-out grasps: several parts of a search ask for the same, and some is simulated
-    _known: list[tuple[Fit, np.ndarray]] = field(default_factory=list, init=False, repr=False)
 
     def heldout(self, fit: Fit) -> np.ndarray:
         """Residuals of held-out grasps, ``(G, S, C)``."""
-        known = next((held for one, held in self._known if one is fit), None)
-        if known is None:
-            known = heldout_residual(fit, self.target, self.folds)
-            self._known.append((fit, known))
-        return known
+        return heldout_residual(fit, self.target, self.folds)
 
     def on_few(self, fit: Fit) -> tuple[Study, Fit]:
         """The few grasps alone, none of them held out, and what a fit says of them; all where none are chosen."""

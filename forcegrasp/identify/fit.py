@@ -55,7 +55,7 @@ def cheap_tier(gripper: Gripper) -> str:
     return "reference" if gripper.fast == "none" else "fitting"
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Fit(ShortRepr):
     """Fitted parameters with all that an evidence needs. N residuals (G · S · C), p entries."""
 
