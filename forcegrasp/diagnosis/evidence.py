@@ -21,6 +21,9 @@ LEAST_RISE = 5.0
 _PARALLEL, _ALIKE = 0.995, 0.9
 # An effect with fewer parameters that gains this share of what the best one gains can't be ruled out.
 _NEARLY = 0.95
+# Nor can, of an effect and a mistake of the set that gain nearly the same, the one that leaves less than so many times
+# what the other leaves: what the model still lacks may decide between them.
+_AS_MUCH = 2.0
 # One that explains less than this share of what the best one explains is no rival of it.
 _HALF = 0.5
 #: Between an effect and a fault of the set a lead below this decides nothing: to take one for the other costs most.
@@ -61,8 +64,10 @@ def indistinguishable(winner: Candidate, other: Candidate) -> bool:
     nearly = simpler and other.heldout_gain > _NEARLY * winner.heldout_gain
     if other.share < min(LEAST_SHARE, _HALF * winner.share):  # it may be there besides, and not instead
         return False
-    least = LEAST_LEAD if winner.effect.of_set != other.effect.of_set else 0.0
-    return other.heldout_gain > 0 and (not _leads(winner, other, least) or alike or nearly)
+    differ = winner.effect.of_set != other.effect.of_set  # one is of the gripper, one of the set
+    much_left = other.heldout_gain > _ALIKE * winner.heldout_gain and 1 - other.share < _AS_MUCH * (1 - winner.share)
+    least = LEAST_LEAD if differ else 0.0
+    return other.heldout_gain > 0 and (not _leads(winner, other, least) or alike or nearly or (differ and much_left))
 
 
 def add_nothing(candidates: Sequence[Candidate]) -> set[str]:

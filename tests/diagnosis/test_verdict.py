@@ -72,15 +72,32 @@ def test_effects_of_parallel_signatures_are_alike_if_they_gain_alike(made_up, ga
     assert indistinguishable(winner, other) == equal
 
 
+def of_name(made_up, name: str, gain: float, share: float, signature: list[float]):
+    """A candidate of one effect, which each of four grasps speaks for alike."""
+    setting = EffectSetting.typical(get_effect(name))
+    return candidate(made_up, setting=setting, gains=np.full(4, gain), share=share, signature=np.array(signature))
+
+
 @pytest.mark.parametrize(("lead", "equal"), [(9.0, True), (11.0, False)])
 def test_between_a_fault_of_the_set_and_an_effect_a_small_lead_decides_nothing(made_up, lead, equal):
-    def one(name: str, gain: float, signature: list[float]):
-        setting = EffectSetting.typical(get_effect(name))
-        return candidate(made_up, setting=setting, gains=np.full(4, gain), signature=np.array(signature))
-
-    winner, other = one("backlash", 100 + lead / 4, [1.0, 0.0]), one("object_size", 100.0, [0.0, 1.0])
+    winner = of_name(made_up, "backlash", 100 + lead / 4, 0.99, [1.0, 0.0])
+    other = of_name(made_up, "object_size", 100.0, 0.97, [0.0, 1.0])
     assert indistinguishable(winner, other) == equal
-    assert not indistinguishable(winner, one("encoder_bias", 100.0, [0.0, 1.0]))
+    assert not indistinguishable(winner, of_name(made_up, "encoder_bias", 100.0, 0.97, [0.0, 1.0]))
+
+
+@pytest.mark.parametrize(
+    ("share", "gain", "others", "equal"),
+    [
+        (0.79, 920.0, 0.73, True),  # both leave much: what is not known yet may decide between them
+        (0.99, 920.0, 0.95, False),  # one leaves next to nothing, the other five times as much
+        (0.79, 850.0, 0.73, False),  # it gains too little
+    ],
+)
+def test_nor_does_a_larger_lead_where_both_leave_much(made_up, share, gain, others, equal):
+    winner = of_name(made_up, "backlash", 1000.0, share, [1.0, 0.0])
+    assert indistinguishable(winner, of_name(made_up, "object_size", gain, others, [0.0, 1.0])) == equal
+    assert not indistinguishable(winner, of_name(made_up, "stiction", gain, others, [0.0, 1.0]))
 
 
 def test_what_explains_too_little_yet_hides_nothing_that_explains_enough(made_up):
