@@ -136,5 +136,5 @@ def _left(study: Study, fit: Fit) -> tuple[str, Noise | None]:
     held = study.heldout(fit)
     noise = unexpected_noise(held, study.numerical, study.target, fit.predicted)
     # where a fit of all grasps leaves nothing no effect is missing: others say too little of a held-out one's object
-    fitted = not fit.problem.effects and not excess(fit.residual, study.numerical, study.target)
+    fitted = not excess(fit.residual, study.numerical, study.target)
     return ("" if noise or fitted else excess(held, study.numerical, study.target)), noise

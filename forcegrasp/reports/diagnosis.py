@@ -121,6 +121,16 @@ def answer(diagnosis: Diagnosis) -> str:
     return " ".join(filter(None, (of_model, of_set) if rival else (of_set, of_model)))
 
 
+def _missed_objects(d: Diagnosis) -> str:
+    """Why held-out error is left though nothing is missing; empty if none is."""
+    if d.left or d.noise is not None or d.error_after < AT_FLOOR * d.floor:
+        return ""
+    return (
+        f" A fit of all {d.target.part}s leaves {rms(d.fit.residual, d.target):.2f} ×: where few are left to fit an"
+        " object by, those held out are missed."
+    )
+
+
 def _of_model(diagnosis: Diagnosis) -> str:
     d, cell, noise = diagnosis, worst_cell(remaining(diagnosis).cells()), noise_words(diagnosis)
     found = listed([*([d.fault.name] if d.verdict is Verdict.DATA and d.fault else []), *d.preferred] or [""])
@@ -133,18 +143,14 @@ def _of_model(diagnosis: Diagnosis) -> str:
         fall = f"With {with_found} the error on held-out {d.target.part}s falls {change}"
         rest = f"What is left is largest in {place}." if d.left else noise
         told = " ".join(filter(None, (lacks(d), shares_sentence(d))))
-        return f"{told} {fall} the sensor noise; up to {d.floor:.2f} is noise. {rest}".rstrip()
+        return f"{told} {fall} the sensor noise; up to {d.floor:.2f} is noise. {rest}".rstrip() + _missed_objects(d)
     if d.verdict is Verdict.EXPLAINED:
         of_noise = f"the error on held-out {d.target.part}s is {d.error_after:.2f} × the sensor noise"
         if noise:
             return f"The model explains these data: they show no missing effect; {of_noise}. {noise}"
-        unsure = "" if d.error_after < AT_FLOOR * d.floor else (
-            f" A fit of all {d.target.part}s leaves {rms(d.fit.residual, d.target):.2f} ×: where few are left to fit an"
-            " object by, those held out are missed."
-        )  # fmt: skip
         return (
             f"The model explains these data: {of_noise}, and up to {d.floor:.2f} is noise and the simulation's own"
-            f" error. They show no missing effect.{unsure}"
+            f" error. They show no missing effect.{_missed_objects(d)}"
         )
     if d.verdict is Verdict.UNKNOWN:
         best = f"{found} would only take it down to {d.error_after:.2f} ×" if found else "no effect explains it"

@@ -138,6 +138,15 @@ def test_what_explains_far_less_is_no_rival(made_up, share, winners, equal):
     assert indistinguishable(winner, other) == equal
 
 
+@pytest.mark.parametrize(("share", "equal"), [(1.1, True), (1.3, False)])
+def test_what_fits_all_grasps_far_worse_is_no_rival(made_up, share, equal):
+    """Where few grasps tell of an object, what is left of one that was held out says little."""
+    winner = candidate(made_up, gains=np.array([400.0, 0.0, 0.0, 0.0]), signature=np.array([1.0, 0.0]))
+    worse = dataclasses.replace(winner.fit, residual=share * winner.fit.residual)
+    other = candidate(made_up, gains=np.full(4, 90.0), signature=np.array([0.0, 1.0]), fit=worse)
+    assert indistinguishable(winner, other) == equal
+
+
 def test_signatures_explain_together_what_lies_in_their_span():
     rng = np.random.default_rng(0)
     one, other, unknown = np.linalg.qr(rng.normal(size=(200, 3)))[0].T
