@@ -11,6 +11,7 @@ import pytest
 
 from forcegrasp.diagnosis import signatures
 from forcegrasp.diagnosis.few import few_grasps, with_few
+from forcegrasp.diagnosis.refine import _in_the_race
 from forcegrasp.diagnosis.screen import Screen
 from forcegrasp.diagnosis.signatures import Background
 from forcegrasp.diagnosis.study import Study
@@ -66,6 +67,21 @@ def six(made_up) -> SimpleNamespace:
 def test_of_few_grasps_all_are_taken(six):
     assert with_few(six.study, six.fit) is six.study
     assert six.study.on_few(six.fit) == (six.study, six.fit)
+
+
+def test_few_grasps_are_ranked_by_with_the_largest_steps(many):
+    some, _ = with_few(many.study, many.fit).on_few(many.fit)
+    assert (some.rough.tier, some.simulators.cheap.tier, many.study.rough) == ("fast", "fitting", None)
+    exactly = dataclasses.replace(many.study, simulators=Simulators(many.fit.problem, exact=True))
+    some, _ = with_few(exactly, many.fit).on_few(many.fit)
+    assert some.rough is some.simulators.exact
+
+
+@pytest.mark.parametrize(
+    ("gains", "kept"), [([100.0, 69.0, 71.0, -5.0], [0, 2]), ([50.0], [0]), ([-1.0, -2.0], [0]), ([], [])]
+)
+def test_what_gains_far_less_on_few_grasps_has_lost(gains, kept):
+    assert _in_the_race(gains, 0.7) == kept
 
 
 def test_few_grasps_stay_until_they_do_not_show_what_is_left(many):
