@@ -32,7 +32,7 @@ def silent(text: str) -> None:
 def sound(tmp_path_factory) -> tuple[Loaded, Model]:
     """Nine grasps of three objects, with nothing hidden, and the base model of them."""
     folder = tmp_path_factory.mktemp("sound") / "set"
-    record(folder, {}, 2, 9, samples=80)
+    record(folder, {}, 2, 9, samples=72)
     loaded = load(folder)
     target, _, base = fit_model(loaded, 0, silent)
     assert odd_grasps(target, base.fit) == ()
@@ -154,7 +154,7 @@ def late(sound, tmp_path_factory):
 
     @functools.cache
     def recorded(delay_s: float) -> Loaded:
-        record(folder / str(delay_s), {"command_delay": {"latency": delay_s}}, 2, 9, samples=80)
+        record(folder / str(delay_s), {"command_delay": {"latency": delay_s}}, 2, 9, samples=72)
         return load(folder / str(delay_s))
 
     return recorded
