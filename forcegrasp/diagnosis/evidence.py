@@ -24,10 +24,11 @@ _NEARLY = 0.95
 # Nor can, of an effect and a mistake of the set that gain nearly the same, the one that leaves less than so many times
 # what the other leaves: what the model still lacks may decide between them.
 _AS_MUCH = 2.0
-# Nor is one a rival whose fit of all grasps leaves so many times what the other's leaves; rough ones end far nearer.
-_FITS_WORSE = 1.5
 # One that explains less than this share of what the best one explains is no rival of it.
 _HALF = 0.5
+# Nor is one whose fit of all grasps leaves so many times what the other's leaves: where few grasps hold an object,
+# held-out ones say little. Rough fits end far nearer.
+_FITS_WORSE = 1.5
 #: Between an effect and a fault of the set a lead below this decides nothing: to take one for the other costs most.
 LEAST_LEAD = 10.0
 
@@ -66,9 +67,7 @@ def indistinguishable(winner: Candidate, other: Candidate) -> bool:
     nearly = simpler and other.heldout_gain > _NEARLY * winner.heldout_gain
     if other.share < min(LEAST_SHARE, _HALF * winner.share):  # it may be there besides, and not instead
         return False
-    if (
-        other.fit.cost > _FITS_WORSE * winner.fit.cost
-    ):  # where few grasps hold others' objects, held-out ones say little
+    if other.fit.cost > _FITS_WORSE * winner.fit.cost:
         return False
     differ = winner.effect.of_set != other.effect.of_set  # one is of the gripper, one of the set
     much_left = other.heldout_gain > _ALIKE * winner.heldout_gain and 1 - other.share < _AS_MUCH * (1 - winner.share)

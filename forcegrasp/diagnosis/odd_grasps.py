@@ -8,8 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from forcegrasp.identify.base_fit import Subset
 from forcegrasp.identify.cross_validation import rms_of_grasps
-from forcegrasp.identify.fit import Fit, Simulators, descend_roughly
+from forcegrasp.identify.fit import Fit
 from forcegrasp.identify.predict import predict
 from forcegrasp.identify.problem import Problem
 from forcegrasp.identify.target import Target
@@ -64,10 +65,8 @@ def odd_grasps(target: Target, fit: Fit) -> tuple[OddGrasp, ...]:
         rest = np.setdiff1d(np.arange(len(errors)), suspects)
         if {labels[i] for i in rest} != set(objects):  # of some object nothing else is known
             return ()
-        part, few = fit.subset(rest), target.subset(rest)
-        start = _coordinates(part.problem, (problem, vector))
-        problem = part.problem
-        vector, _ = descend_roughly(few, problem, Simulators(problem), start, part.correction)
+        others = Subset(target, rest, fit)
+        problem, vector = others.problem, others.fit(_coordinates(others.problem, (problem, vector))).vector
         errors = _errors_as(target, np.arange(len(errors)), target.grasps, problem, vector)
         usual = max(1.0, float(np.median(errors[rest])))
     alone = [target.grasps[i] for i in suspects]

@@ -48,7 +48,7 @@ def fit_base(
     first = fit_once(target, problem, simulators, guess(target, problem))
     progress(f"base model, start 1 of {STARTS}: {rms_error(first, target):.2f} × noise")
     few = _few_grasps(target)
-    small = _Subset(target, few, first)
+    small = Subset(target, few, first)
     ends = [small.fit(small.known)]
     while len(ends) < STARTS or (len(ends) < MOST_STARTS and not _ends_agree(ends, small.target)):
         ends.append(small.fit(_random_start(small.problem, guess(small.target, small.problem), rng)))
@@ -80,12 +80,12 @@ def fit_base(
     return further
 
 
-def cost_tolerance(best: Fit | _End, target: Target) -> float:
+def cost_tolerance(best: Fit | End, target: Target) -> float:
     """Difference of two costs that mean the same place."""
     return max(_SAME_SHARE * best.cost, _SAME_COST * target.readings)
 
 
-def _ends_agree(ends: Sequence[_End], target: Target) -> bool:
+def _ends_agree(ends: Sequence[End], target: Target) -> bool:
     """Whether two fits at least ended in the best place."""
     best = min(ends, key=lambda end: end.cost)
     tolerance = max(cost_tolerance(best, target), _SAME_BEYOND * (best.cost - target.cost_of_noise))
@@ -124,7 +124,7 @@ def _few_grasps(target: Target) -> np.ndarray:
 
 
 @dataclass(frozen=True)
-class _End:
+class End:
     """Where a start ended."""
 
     vector: np.ndarray  #: coordinates
@@ -132,7 +132,7 @@ class _End:
     error: float  #: rms residual ÷ noise
 
 
-class _Subset:
+class Subset:
     """The same problem on some of its grasps, with the cheap model corrected as in a fit of all of them."""
 
     def __init__(self, target: Target, keep: np.ndarray, fitted: Fit) -> None:
@@ -141,10 +141,10 @@ class _Subset:
         self._simulators = Simulators(self.problem)
         self._fitted = fitted
 
-    def fit(self, start: np.ndarray) -> _End:
+    def fit(self, start: np.ndarray) -> End:
         vector, residual = descend_roughly(self.target, self.problem, self._simulators, start, self._correction)
         cost = float(np.sum((self.target.weight * residual) ** 2))
-        return _End(vector, cost, rms(residual, self.target))
+        return End(vector, cost, rms(residual, self.target))
 
     def enlarge(self, part: np.ndarray) -> np.ndarray:
         """Coordinates for the whole problem: what these grasps don't fix stays as it was."""

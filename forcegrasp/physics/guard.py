@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import functools
 from pathlib import Path
 
 import mujoco
@@ -33,11 +34,20 @@ def stop_clock() -> None:
     """
     if mujoco.get_mjcb_time() is not None:
         return
-    for library in Path(mujoco.__file__).parent.iterdir():
-        if library.name.startswith(("libmujoco.", "mujoco.")) and {".so", ".dylib", ".dll"} & set(library.suffixes):
-            clock = ctypes.c_void_p.in_dll(ctypes.CDLL(str(library)), "mjcb_time")
-            if clock.value is not None:
-                clock.value = None
+    for clock in _clocks():
+        if clock.value is not None:
+            clock.value = None
+
+
+@functools.cache
+def _clocks() -> tuple[ctypes.c_void_p, ...]:
+    """Where MuJoCo's library keeps its clock; nowhere if the library is not beside the package."""
+    libraries = (
+        library
+        for library in Path(mujoco.__file__).parent.iterdir()
+        if library.name.startswith(("libmujoco.", "mujoco.")) and {".so", ".dylib", ".dll"} & set(library.suffixes)
+    )
+    return tuple(ctypes.c_void_p.in_dll(ctypes.CDLL(str(library)), "mjcb_time") for library in libraries)
 
 
 def check(warnings: np.ndarray, parameters: GraspParameters, steps: np.ndarray) -> None:

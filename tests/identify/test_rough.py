@@ -30,7 +30,7 @@ def test_larger_steps_are_kept_where_they_lead_further(made_up, monkeypatch, lef
         "fit_once": lambda *a: fit,
         "fit_exactly": fit_exactly,
         "guess": lambda *a: None,
-        "_Subset": lambda *a: small,
+        "Subset": lambda *a: small,
         "_random_start": lambda *a: None,
         "check_gradient": lambda fit, target, errors=(): BaseFit(fit, errors, False, "rough"),
     }.items():
