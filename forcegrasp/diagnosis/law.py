@@ -14,11 +14,11 @@ from forcegrasp.diagnosis.result import Diagnosis
 from forcegrasp.diagnosis.screen import Screen
 from forcegrasp.diagnosis.step import look_further
 from forcegrasp.diagnosis.study import Study
-from forcegrasp.diagnosis.verdict import explained_share, explains_enough
+from forcegrasp.diagnosis.verdict import explains_enough
 from forcegrasp.effects.law import Formula, Law, Size, make_law
 from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.errors import PhysicsError
-from forcegrasp.identify.cross_validation import rms
+from forcegrasp.identify.cross_validation import evidence_folds
 from forcegrasp.identify.fit import Fit, Simulators
 from forcegrasp.identify.fitted_model import effects_of_fit
 from forcegrasp.identify.intervals import standard_errors
@@ -49,7 +49,7 @@ def find_law(
         return None
     fit, target = diagnosis.base.fit if unknown else diagnosis.fit, diagnosis.target
     numerical = numerical_error(fit, target)
-    study = Study(target, simulators, diagnosis.folds, beyond_fit(fit, numerical), progress)
+    study = Study(target, simulators, evidence_folds(target.grasps), beyond_fit(fit, numerical), progress)
     try:
         found = _search(study, fit, rng)
     except PhysicsError as error:
@@ -58,8 +58,8 @@ def find_law(
     if found is None:
         return None
     after, target, rivals = found
-    before, error = rms(study.heldout(fit), diagnosis.target), rms(study.heldout(after), diagnosis.target)
-    share = explained_share(before, error)
+    before, error = study.error(study.heldout(fit)), study.error(study.heldout(after))
+    share = study.explained(study.heldout(fit), study.heldout(after))
     if not explains_enough(share, error, diagnosis.floor, whole_recordings=len(target.recordings) > 1):
         return None
     law, merged = _as_one(fit, after, target)

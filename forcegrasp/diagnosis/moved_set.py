@@ -10,6 +10,7 @@ from forcegrasp.diagnosis.faults import within_tolerance
 from forcegrasp.diagnosis.needless import drop_all_needless
 from forcegrasp.diagnosis.result import Diagnosis, Step, kept_steps
 from forcegrasp.diagnosis.study import Study
+from forcegrasp.identify.cross_validation import evidence_folds
 from forcegrasp.identify.fit import Fit, Simulators, fit_exactly
 from forcegrasp.identify.loading import Loaded
 from forcegrasp.identify.noise_floor import beyond_fit
@@ -49,7 +50,7 @@ def go_on_with_moved(
     problem = Problem(loaded.gripper, grasps, case.effects)
     simulators = Simulators(problem)
     fit = fit_exactly(target, problem, simulators, found.fit.vector, found.fit.jacobian)
-    study = Study(target, simulators, found.folds, beyond_fit(fit, found.numerical), progress)
+    study = Study(target, simulators, evidence_folds(target.grasps), beyond_fit(fit, found.numerical), progress)
     gains = study.gains(found.heldout(), study.heldout(fit))
     if not is_beyond_chance(gains - fault.moved.price / len(gains), LEAST_LEAD):
         return None

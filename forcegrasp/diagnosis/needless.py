@@ -9,7 +9,6 @@ from forcegrasp.diagnosis.evidence import LEAST_RISE, is_beyond_chance
 from forcegrasp.diagnosis.families import refit_without, roughly_without
 from forcegrasp.diagnosis.result import Step
 from forcegrasp.diagnosis.study import Study
-from forcegrasp.identify.cross_validation import rms
 from forcegrasp.identify.fit import Fit
 
 # Few grasps decide if they ask so many times as clearly for an effect as is enough.
@@ -30,7 +29,7 @@ def drop_needless(study: Study, step: Step, fit: Fit, given: int) -> tuple[Step,
         return step, fit
     name, less = found
     study.progress(f"{name} is needless with {step.effects[0]}")
-    error = rms(study.heldout(less), study.target)
+    error = study.error(study.heldout(less))
     last = dataclasses.replace(
         step.candidates[0],
         setting=less.problem.case(less.vector).effects[-1],

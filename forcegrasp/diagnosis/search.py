@@ -20,7 +20,7 @@ from forcegrasp.diagnosis.study import Study
 from forcegrasp.diagnosis.verdict import conclude, explained_share
 from forcegrasp.effects import Effect
 from forcegrasp.identify.base_fit import BaseFit
-from forcegrasp.identify.cross_validation import make_folds, rms
+from forcegrasp.identify.cross_validation import evidence_folds, make_folds
 from forcegrasp.identify.fit import Fit, Simulators
 from forcegrasp.identify.noise_floor import beyond_fit, excess, numerical_error, numerical_floor
 from forcegrasp.identify.progress import Progress, silent
@@ -54,10 +54,10 @@ def diagnose(
     """
     first, before = (base.fit, ()) if start is None else start
     fit = first
-    folds = tuple(make_folds(target.grasps))
     of_base = numerical_error(fit, target)
-    study = Study(target, simulators, folds, beyond_fit(fit, of_base), progress)
-    error_before = rms(target.before_rounding(study.heldout(base.fit)), target)
+    study = Study(target, simulators, evidence_folds(target.grasps), beyond_fit(fit, of_base), progress)
+    folds = tuple(make_folds(target.grasps))
+    error_before = study.error(target.before_rounding(study.heldout(base.fit)))
     odd = odd_grasps(target, fit)
     if any(grasp.like for grasp in odd):  # nothing can be learnt of the gripper until labels are right
         labels = ("object_labels",)
@@ -68,7 +68,7 @@ def diagnose(
     steps: list[Step] = list(before)
     if (rounding := target.rounding) is not None and start is None:
         progress(f"found {rounding.effect.name}: readings are multiples of one step")
-        steps.append(Step((rounding.effect.name,), (), (), error_before, rms(study.heldout(fit), target)))
+        steps.append(Step((rounding.effect.name,), (), (), error_before, study.error(study.heldout(fit))))
     screen = Screen(effects, study)
     believed: tuple[list[Step], Fit, Study] | None = None  # what is, if the rest explains too little in the end
     for _ in range(MOST_EFFECTS):
@@ -99,7 +99,7 @@ def diagnose(
     if believed is not None and not _convincing(believed[2], believed[1], study, fit):
         steps, fit, study = believed
         target = study.target
-    error_after, (left, noise) = rms(study.heldout(fit), target), _left(study, fit)
+    error_after, (left, noise) = study.error(study.heldout(fit)), _left(study, fit)
     steps = settle_ties(steps)
     found = kept_steps(steps)
     # a missing effect makes the error rough, and the base fit stop short: then only what leaves nothing is an answer
@@ -108,7 +108,7 @@ def diagnose(
     only_of_set = all(s.candidates and s.candidates[0].effect.of_set for s in found)
     verdict = conclude(
         [s.verdict for s in found if s.verdict],
-        error_before,
+        study.explained(target.before_rounding(study.heldout(base.fit)), study.heldout(fit)),
         error_after,
         floor,
         bool(left),
@@ -127,7 +127,7 @@ def diagnose(
 
 def _convincing(before: Study, fewer: Fit, study: Study, fit: Fit) -> bool:
     """Whether effects that explain little each leave nothing together, or little of what was left before them."""
-    error, left = rms(before.heldout(fewer), before.target), rms(study.heldout(fit), study.target)
+    error, left = before.error(before.heldout(fewer)), study.error(study.heldout(fit))
     return not _left(study, fit)[0] or explained_share(error, left) >= LEAST_SHARE_TOGETHER
 
 

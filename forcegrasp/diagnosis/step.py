@@ -25,7 +25,6 @@ from forcegrasp.diagnosis.result import Candidate, Step
 from forcegrasp.diagnosis.screen import MAX_GAIN_FACTOR, Screen
 from forcegrasp.diagnosis.signatures import Background, Score
 from forcegrasp.diagnosis.study import Study
-from forcegrasp.diagnosis.verdict import explained_share
 from forcegrasp.effects import Effect
 from forcegrasp.identify.base_fit import rms_error
 from forcegrasp.identify.cross_validation import rms
@@ -97,7 +96,7 @@ class _Start:
         self._study, self._fit = study, fit
         self.background = Background(fit, study.numerical)
         self.held = study.heldout(fit)  #: residuals of held-out grasps, ``(G, S, C)``
-        self.error = rms(self.held, study.target)
+        self.error = study.error(self.held)
         self.noise = unexpected_noise(self.held, study.numerical, study.target, fit.predicted)
         left = excess(self.held, study.numerical, study.target)
         self.least_gain = LEAST_GAIN if left else LEAST_GAIN_AT_FLOOR
@@ -225,7 +224,6 @@ class _Start:
         sums = np.array([one.sum() for one in recordings]) if recordings else None
         harms = any(is_beyond_chance(-one, LEAST_RISE) for one in recordings)
         fall = max((1 - rms(after, target, w) / rms(held, target, w) for _, w in cells(target)), default=0.0)
-        error = rms(after, target)
-        share = explained_share(self.error, error)
+        error, share = self._study.error(after), self._study.explained(held, after)
         setting = refit.problem.case(refit.vector).effects[-1]
         return Candidate(setting, refit, p_family, gains, error, share, fall, signature, replaces, sums, harms)

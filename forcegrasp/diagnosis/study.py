@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from forcegrasp.identify.cross_validation import heldout_residual, log_likelihood
+from forcegrasp.diagnosis.verdict import explained_share
+from forcegrasp.identify.cross_validation import heldout_residual, log_likelihood, rms, rms_of_recordings, to_check_with
 from forcegrasp.identify.fit import Fit, Simulators
 from forcegrasp.identify.progress import Progress, silent
 from forcegrasp.identify.target import Target
@@ -15,6 +16,8 @@ from forcegrasp.replay.replay import Replay
 
 # Fewer held-out recordings say nothing of how much they scatter.
 _RECORDINGS = 3
+# Below so many times the noise a recording has nothing to explain.
+_SHOWS = 1.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +54,14 @@ class Study:
         few = Study(target, self.few.simulators, (), numerical, self.progress, rough=self.few.rough)
         return few, fit.subset(keep)
 
+    def error(self, residual: np.ndarray) -> float:
+        """Root mean square of residuals ÷ noise ``(G, S, C)`` of held-out grasps, of those marked to check with if any
+        are."""
+        check = to_check_with(self.target.grasps)
+        if len(check):
+            residual = np.where(np.isin(np.arange(len(residual)), check)[:, None, None], residual, np.nan)
+        return rms(residual, self.target)
+
     def gains(self, before: np.ndarray, after: np.ndarray) -> np.ndarray:
         """By how much each grasp's held-out log-likelihood rises, ``(G,)``; NaN of those that were not held out.
 
@@ -62,6 +73,22 @@ class Study:
         gains = log_likelihood(weight * after) - log_likelihood(weight * before)
         gains[~np.isfinite(before).any(axis=(1, 2))] = np.nan
         return gains
+
+    def explained(self, before: np.ndarray, after: np.ndarray) -> float:
+        """Share of the mean square beyond the noise by which residuals of held-out grasps fall.
+
+        Of three recordings or more it is the share in most of them, if that is larger: where one motion shows what is
+        not known, it must not hide what explains the others.
+
+        Args:
+          before: under one fit, ``(G, S, C)``.
+          after: the same under another.
+        """
+        all_together = explained_share(rms(before, self.target), rms(after, self.target))
+        left = rms_of_recordings(after, self.target)
+        errors = {name: error for name, error in rms_of_recordings(before, self.target).items() if error > _SHOWS}
+        each = [explained_share(error, left[name]) for name, error in errors.items()]
+        return max(all_together, float(np.median(each))) if len(each) >= _RECORDINGS else all_together
 
     def of_recordings(self, gains: np.ndarray) -> list[np.ndarray]:
         """The gains ``(G,)`` of the windows of each recording that was held out; none if they are fewer than three."""

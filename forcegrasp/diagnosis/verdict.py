@@ -39,7 +39,7 @@ def explains_enough(share: float, after: float, floor: float, whole_recordings: 
 
 def conclude(
     found: Sequence[Verdict],
-    before: float,
+    share: float,
     after: float,
     floor: float,
     left: bool,
@@ -50,8 +50,8 @@ def conclude(
 
     Args:
       found: verdicts of the steps that found something.
-      before: held-out error ÷ noise without their effects.
-      after: the same with them.
+      share: of the mean square beyond the noise that their effects explain.
+      after: held-out error ÷ noise that they leave.
       floor: what noise and the simulation's own error leave.
       left: whether something is left that is neither.
       only_of_set: whether all that was found is of the set, and not of the gripper.
@@ -59,7 +59,7 @@ def conclude(
     """
     if not found:
         return Verdict.UNKNOWN if left else Verdict.EXPLAINED
-    if left and not explains_enough(explained_share(before, after), after, floor, whole_recordings):
+    if left and not explains_enough(share, after, floor, whole_recordings):
         return Verdict.UNKNOWN
     if Verdict.ONE_OF in found:
         return Verdict.ONE_OF

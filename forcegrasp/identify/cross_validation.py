@@ -34,8 +34,7 @@ def make_folds(grasps: Sequence[MeasuredGrasp]) -> list[np.ndarray]:
 
     If the set marks grasps with ``split: check``, they are the one fold.
     """
-    check = np.array([i for i, g in enumerate(grasps) if g.split == "check"], dtype=int)
-    if len(check):
+    if len(check := to_check_with(grasps)):
         return [check]
     sessions = list(dict.fromkeys(g.session for g in grasps))
     if not any(g.object for g in grasps) and len(sessions) > 1:
@@ -47,6 +46,26 @@ def make_folds(grasps: Sequence[MeasuredGrasp]) -> list[np.ndarray]:
     order = sorted(range(len(grasps)), key=lambda i: (grasps[i].object, grasps[i].session, i))
     folds = min(FOLDS, len(grasps))
     return [np.array(sorted(order[k::folds]), dtype=int) for k in range(folds)]
+
+
+def to_check_with(grasps: Sequence[MeasuredGrasp]) -> np.ndarray:
+    """Indices of the grasps that the set marks with ``split: check``: on these, if there are any, errors are told."""
+    return np.array([i for i, g in enumerate(grasps) if g.split == "check"], dtype=int)
+
+
+def evidence_folds(grasps: Sequence[MeasuredGrasp]) -> list[np.ndarray]:
+    """Indices of the grasps that each fold holds out where effects are judged: of all, whatever the set marks.
+
+    What is marked to check with is held out together, and the others by turns: an effect that these show is there, also
+    where what is held out shows something else as well. Of a servo's single recording to fit nothing else is held out.
+    """
+    check = to_check_with(grasps)
+    rest = np.setdiff1d(np.arange(len(grasps)), check)
+    others = [grasps[i] for i in rest]
+    one_recording = not any(g.object for g in others) and len({g.session for g in others}) < 2
+    if not len(check) or one_recording:
+        return make_folds(grasps)
+    return [check, *(rest[fold] for fold in make_folds(others))]
 
 
 def heldout_residual(fit: Fit, target: Target, folds: Sequence[np.ndarray]) -> np.ndarray:
@@ -138,6 +157,19 @@ def rms(residual: np.ndarray, target: Target, where: np.ndarray | None = None) -
         return float("nan")
     counts, means = np.array(squares).T
     return float(np.exp(0.5 * np.average(np.log(np.maximum(means, 1e-12)), weights=counts)))
+
+
+def rms_of_recordings(residual: np.ndarray, target: Target) -> dict[str, float]:
+    """Root mean square residual ÷ noise of each of a servo's recordings, of those that were held out.
+
+    Args:
+      residual: in units of the noise, ``(G, S, C)``; grasps of no fold are NaN.
+      target: the measurements.
+    """
+    recordings = target.recordings.items()
+    squares = {name: residual[members][target.mask[members]] ** 2 for name, members in recordings}
+    held = {name: one[np.isfinite(one)] for name, one in squares.items()}
+    return {name: float(np.sqrt(one.mean())) for name, one in held.items() if len(one)}
 
 
 def rms_of_grasps(residual: np.ndarray, target: Target) -> np.ndarray:

@@ -37,6 +37,7 @@ from forcegrasp.reports.diagnosis_words import (
     noise_words,
     odd_words,
     preference,
+    recordings_sentence,
     row_sentence,
     shares_sentence,
 )
@@ -211,6 +212,8 @@ def lines(diagnosis: Diagnosis, advice: Advice | None) -> list[str]:
         text.append(row)
     if diagnosis.verdict is Verdict.UNKNOWN or diagnosis.verdict.names_effects:
         text.append(left_sentence(diagnosis))
+    if each := recordings_sentence(diagnosis):
+        text.append(each)
     if diagnosis.law is not None:
         text.append(law_words(diagnosis.law))
     if advice is not None:

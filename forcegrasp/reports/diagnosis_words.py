@@ -8,6 +8,7 @@ from forcegrasp.diagnosis.faults import Fault
 from forcegrasp.diagnosis.result import Diagnosis, Step, kept_steps
 from forcegrasp.diagnosis.verdict import EXPLAINED_FAR, MUCH
 from forcegrasp.effects.for_gripper import effect_of
+from forcegrasp.identify.cross_validation import heldout_residual, rms_of_recordings
 from forcegrasp.identify.intervals import listed
 from forcegrasp.identify.verdict import Verdict
 from forcegrasp.reports.comparison import covariate_words, words
@@ -167,6 +168,18 @@ def left_sentence(diagnosis: Diagnosis) -> str:
         f"what is left is largest in {place}{goes}; a better model could explain {rest['explainable']:.0%} of the"
         " remaining mean square error at most"
     )
+
+
+def recordings_sentence(diagnosis: Diagnosis) -> str:
+    """The error of each of a servo's recordings that was held out, with the base model and the final one; the worst
+    first. Empty where there is one at most."""
+    d = diagnosis
+    before = rms_of_recordings(heldout_residual(d.base.fit, d.target, d.folds), d.target)
+    if len(before) < 2:
+        return ""
+    after = rms_of_recordings(d.heldout(), d.target)
+    worst = sorted(after, key=lambda name: -after[name])
+    return f"held out, × noise: {', '.join(f'{name} {before[name]:.1f} → {after[name]:.1f}' for name in worst)}"
 
 
 def noise_words(diagnosis: Diagnosis) -> str:

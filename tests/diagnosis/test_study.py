@@ -6,9 +6,12 @@ import dataclasses
 from types import SimpleNamespace
 
 import numpy as np
+import pytest
 
 from forcegrasp.diagnosis.evidence import indistinguishable, is_significant
 from forcegrasp.diagnosis.study import Study
+from forcegrasp.diagnosis.verdict import explained_share
+from forcegrasp.identify.cross_validation import evidence_folds, make_folds
 
 
 def study(recordings: dict[str, np.ndarray], weight: np.ndarray) -> Study:
@@ -30,6 +33,41 @@ def test_windows_of_a_recording_are_told_together_where_three_are_held_out():
     del four["c"]  # two are too few to scatter
     assert study(four, weight).of_recordings(gains) == []
     assert study({}, weight).of_recordings(gains) == []
+
+
+def marked(splits: dict[str, str], recordings: dict[str, np.ndarray]) -> Study:
+    """A study of windows with two readings each, whose recordings are marked so."""
+    count = sum(map(len, recordings.values()))
+    grasps = [SimpleNamespace(split=splits.get(n, ""), object="", session=n) for n, m in recordings.items() for _ in m]
+    target = SimpleNamespace(recordings=recordings, grasps=grasps, mask=np.ones((count, 2), bool))
+    return Study(target, None, ())  # pyright: ignore[reportArgumentType]
+
+
+def test_a_motion_that_shows_something_else_hides_no_effect_of_the_others():
+    recordings = {"a": np.array([0, 1]), "b": np.array([2]), "fast": np.array([3]), "still": np.array([4])}
+    before, after = residuals([5, 5, 5, 100, 1]), residuals([2, 2, 3, 100, 1])
+    two = marked({}, recordings).explained(before, after)  # half of them: 21/24, 16/24 and 0; "still" shows nothing
+    assert two == pytest.approx(16 / 24)
+    del recordings["b"]  # of two that show anything no median is taken
+    before, after = before[[0, 1, 3, 4]], after[[0, 1, 3, 4]]
+    recordings["fast"], recordings["still"] = np.array([2]), np.array([3])
+    assert marked({}, recordings).explained(before, after) < 0.9 * 21 / 24
+    # one effect that shows in a single motion explains what it explains of all
+    assert marked({}, {k: np.array([i]) for i, k in enumerate("abc")}).explained(
+        residuals([50, 2, 2]), residuals([1, 2, 2])
+    ) == pytest.approx(explained_share(200 ** (1 / 3), 4 ** (1 / 3)))
+
+
+def test_errors_are_told_of_what_is_marked_and_evidence_is_from_all():
+    recordings = {name: np.array([i]) for i, name in enumerate("abcd")}
+    study, left = marked({"b": "check"}, recordings), residuals([9, 3, 9, 9])
+    assert study.error(left) == pytest.approx(3.0)
+    assert marked({}, recordings).error(left) == pytest.approx((9**3 * 3) ** (1 / 4))
+    grasps = study.target.grasps
+    assert [fold.tolist() for fold in evidence_folds(grasps)] == [[1], [0], [2], [3]]
+    assert [fold.tolist() for fold in make_folds(grasps)] == [[1]]
+    of_one = marked({"b": "check", "c": "check", "d": "check"}, recordings).target.grasps
+    assert [fold.tolist() for fold in evidence_folds(of_one)] == [[1, 2, 3]]  # one recording is left to fit
 
 
 def test_recordings_decide_between_effects_and_none_may_be_harmed(made_up):

@@ -123,9 +123,8 @@ def test_what_explains_little_is_believed_together(monkeypatch, before, after, l
     """Three quarters of the mean square beyond the noise, or all that is no noise."""
 
     def study(error: float):
-        return SimpleNamespace(heldout=lambda fit: np.array([error]), target=None)
+        return SimpleNamespace(heldout=lambda fit: error, error=lambda held: held)
 
-    monkeypatch.setattr(search, "rms", lambda held, target: float(held[0]))
     monkeypatch.setattr(search, "_left", lambda study, fit: (left, None))
     one, other = cast(Any, study(before)), cast(Any, study(after))
     assert search._convincing(one, cast(Any, None), other, cast(Any, None)) == believed
@@ -184,14 +183,15 @@ def test_a_rival_that_is_found_besides_is_none():
     ],
 )
 def test_the_verdict(found, before, after, left, verdict):
-    assert conclude([Verdict(step) for step in found], before, after, 1.0, left) == verdict
+    share = explained_share(before, after)
+    assert conclude([Verdict(step) for step in found], share, after, 1.0, left) == verdict
 
 
 def test_of_motions_held_out_as_wholes_half_of_the_error_is_enough():
     found = [Verdict.EFFECT]
-    assert conclude(found, 10.0, 5.0, 1.0, left=True) is Verdict.UNKNOWN
-    assert conclude(found, 10.0, 5.0, 1.0, left=True, whole_recordings=True) is Verdict.EFFECT
-    assert conclude(found, 10.0, 8.0, 1.0, left=True, whole_recordings=True) is Verdict.UNKNOWN
+    assert conclude(found, 0.75, 5.0, 1.0, left=True) is Verdict.UNKNOWN
+    assert conclude(found, 0.75, 5.0, 1.0, left=True, whole_recordings=True) is Verdict.EFFECT
+    assert conclude(found, 0.4, 8.0, 1.0, left=True, whole_recordings=True) is Verdict.UNKNOWN
 
 
 def test_shares_are_of_the_mean_square_beyond_the_noise():

@@ -23,6 +23,7 @@ from forcegrasp.physics.gripper import SKEW
 from forcegrasp.physics.plant import Plant
 from forcegrasp.replay.replay import Replay
 from forcegrasp.reports.comparison import compare_json, details, sections
+from forcegrasp.reports.diagnosis import lines
 from forcegrasp.reports.html import Picture
 
 
@@ -39,6 +40,8 @@ def test_the_friction_hidden_in_the_starter_set_is_found(example, tmp_path):
     assert diagnosis.error_after < 1.1 * diagnosis.floor < 0.5 * diagnosis.error_before
     (friction,) = [one.values[0] for one in diagnosis.fit.problem.case(diagnosis.fit.vector).effects]
     assert friction == pytest.approx(FRICTION_NM, rel=0.05)
+    (told,) = [line for line in lines(diagnosis, None) if line.startswith("held out, × noise: ")]
+    assert len(told.split(", ")) == 1 + len(diagnosis.target.recordings)
     assert {cell.phase for cell in loaded_cells(diagnosis)} <= {"moving", "reversing", "holding", "released"}
 
 
