@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
 
-from forcegrasp.diagnosis.result import Candidate
+from forcegrasp.diagnosis import families
+from forcegrasp.diagnosis.result import Candidate, Step
 
 #: Family-wise probability of a false alarm that is accepted at each step.
 ALARM = 0.01
@@ -73,6 +75,28 @@ def indistinguishable(winner: Candidate, other: Candidate) -> bool:
     much_left = other.heldout_gain > _ALIKE * winner.heldout_gain and 1 - other.share < _AS_MUCH * (1 - winner.share)
     least = LEAST_LEAD if differ else 0.0
     return other.heldout_gain > 0 and (not _leads(winner, other, least) or alike or nearly or (differ and much_left))
+
+
+def with_close_rivals(step: Step) -> Step:
+    """A step with those among its effects, too, that gain nearly as much as the first, or leave no more.
+
+    For where much is left: what the model still lacks may have decided between them. Effects that contain each other
+    are no rivals, they were told apart by what the richer one adds.
+    """
+    if not step.effects or not step.candidates or step.replaces:
+        return step
+    winner, known = step.candidates[0], len(step.effects)
+    close = [
+        c for c in step.candidates[known:]
+        if (c.heldout_gain > _ALIKE * winner.heldout_gain or c.error_after <= winner.error_after)
+        and c.fit.cost <= _FITS_WORSE * winner.fit.cost
+        and not families.contain(c.effect, winner.effect)
+    ]  # fmt: skip
+    others = [c for c in step.candidates[known:] if c not in close]
+    names = tuple(c.effect.name for c in close)
+    return dataclasses.replace(
+        step, effects=(*step.effects, *names), candidates=(*step.candidates[:known], *close, *others)
+    )
 
 
 def add_nothing(candidates: Sequence[Candidate]) -> set[str]:

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from forcegrasp.diagnosis import families
-from forcegrasp.diagnosis.evidence import LEAST_SHARE_TOGETHER
+from forcegrasp.diagnosis.evidence import LEAST_SHARE_TOGETHER, with_close_rivals
 from forcegrasp.diagnosis.few import with_few
 from forcegrasp.diagnosis.needless import drop_needless
 from forcegrasp.diagnosis.noise_check import Noise, unexpected_noise
@@ -17,7 +17,7 @@ from forcegrasp.diagnosis.result import Diagnosis, Step, kept_steps, settle_ties
 from forcegrasp.diagnosis.screen import Screen
 from forcegrasp.diagnosis.step import look_further
 from forcegrasp.diagnosis.study import Study
-from forcegrasp.diagnosis.verdict import conclude, explained_share
+from forcegrasp.diagnosis.verdict import MUCH, conclude, explained_share
 from forcegrasp.effects import Effect
 from forcegrasp.identify.base_fit import BaseFit
 from forcegrasp.identify.cross_validation import evidence_folds, make_folds
@@ -100,7 +100,8 @@ def diagnose(
         steps, fit, study = believed
         target = study.target
     error_after, (left, noise) = study.error(study.heldout(fit)), _left(study, fit)
-    steps = settle_ties(steps)
+    much_left = bool(left) and error_after > MUCH * floor
+    steps = settle_ties([with_close_rivals(step) for step in steps] if much_left else steps)
     found = kept_steps(steps)
     # a missing effect makes the error rough, and the base fit stop short: then only what leaves nothing is an answer
     if not base.converged and (left or not found):

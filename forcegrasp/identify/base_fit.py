@@ -35,6 +35,7 @@ class BaseFit(ShortRepr):
     errors: tuple[float, ...]  #: rms residual ÷ noise where each start ended
     converged: bool
     reason: str = ""  #: why it is not, in words
+    starts_agree: bool = True  #: whether two starts at least ended in the best place
 
 
 def fit_base(
@@ -60,7 +61,8 @@ def fit_base(
         first = fit_once(target, problem, simulators, small.enlarge(best.vector))
     if not _ends_agree(ends, small.target):
         spread = ", ".join(f"{error:.2f}" for error in errors)
-        return BaseFit(first, errors, False, f"the starts end in different places (errors of {spread} × noise)")
+        reason = f"the starts end in different places (errors of {spread} × noise)"
+        return BaseFit(first, errors, False, reason, starts_agree=False)
     checked = check_gradient(first, target, errors)
     if checked.converged:
         return checked

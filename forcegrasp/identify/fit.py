@@ -111,7 +111,11 @@ class Fit(ShortRepr):
 
     def covariance(self) -> np.ndarray:
         """Covariance of the coordinates, ``(p, p)``, if the noise is white; see :mod:`.intervals`."""
-        return np.linalg.pinv(self.slopes.T @ self.slopes, rcond=1e-12)
+        slopes = self.slopes
+        norms = np.linalg.norm(slopes, axis=0)
+        norms[norms == 0] = 1.0
+        alike = slopes / norms  # what data hardly fix has slopes so small that they would pass for none
+        return np.linalg.pinv(alike.T @ alike, rcond=1e-12) / np.outer(norms, norms)
 
 
 def _places(whole: Problem, part: Problem) -> list[int]:

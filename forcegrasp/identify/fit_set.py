@@ -54,7 +54,7 @@ def apply_model(
 
 def _weighed(target: Target, simulators: Simulators, base: BaseFit) -> tuple[Target, Simulators, BaseFit]:
     weighed, fit = reweigh(target, base.fit, simulators)
-    if fit is not base.fit and base.converged:
+    if fit is not base.fit and base.starts_agree:  # what one motion alone is missed by may not fall any further
         base = check_gradient(fit, weighed, base.errors)
         if not base.converged:  # slopes of what sticks and slips never vanish: does the error still fall?
             further = fit_exactly(weighed, fit.problem, simulators, fit.vector)

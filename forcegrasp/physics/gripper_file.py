@@ -125,7 +125,7 @@ def _gripper(path: Path, said: Description) -> Gripper:
         parameters={name: p.named(name) for name, p in said.parameters.items()},
         training=NO_TRAINING,
         position_scale=scale.position or strokes[0] / TYPICAL_STROKE,
-        force_scale=scale.force,
+        force_scale=scale.force or 1.0,
     )
 
 

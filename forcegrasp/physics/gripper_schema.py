@@ -114,7 +114,7 @@ class ScaleEntry(Record):
     """Factors of the sizes at which effects are looked for."""
 
     position: PositiveFloat | None = Field(default=None, description="of positions")
-    force: PositiveFloat = Field(default=1.0, description="of forces")
+    force: PositiveFloat | None = Field(default=None, description="of forces")
 
 
 class TrainingEntry(Record):

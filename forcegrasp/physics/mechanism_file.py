@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ from forcegrasp.files.validate import refusal, validate
 from forcegrasp.physics.gripper import START_VELOCITY, Gripper
 from forcegrasp.physics.gripper_checks import check_write, compile_scene
 from forcegrasp.physics.gripper_parts import NO_TRAINING, STEP_SHARE, TYPICAL_STROKE, Motor
-from forcegrasp.physics.gripper_schema import MechanismDescription, ScaleEntry
+from forcegrasp.physics.gripper_schema import MechanismDescription, ScaleEntry, ServoEntry
 
 #: Where those are that come with the package, below its descriptions of grippers.
 MECHANISMS = "mechanisms"
@@ -43,11 +44,20 @@ def load_mechanism(path: Path, raw: dict[str, Any]) -> Gripper:
         parameters={name: p.named(name) for name, p in said.parameters.items()},
         training=NO_TRAINING,
         position_scale=scale.position or span / TYPICAL_STROKE,
-        force_scale=scale.force,
+        force_scale=scale.force or _largest_effort(path.parent / said.model, said.motors),
         command=said.command,
         unsigned=said.effort == "unsigned",
     )
     return _in_scene(mechanism)
+
+
+def _largest_effort(scene: Path, motors: Sequence[ServoEntry]) -> float:
+    """The largest effort that the scene lets a motor give, N or N·m, as TIAGo's give 1 N; 1 where none has a limit."""
+    model = compile_scene(scene)
+    names = {model.actuator(i).name: i for i in range(model.nu)}
+    own = [names[motor.actuator] for motor in motors if motor.actuator in names]
+    limited = [i for i in own if model.actuator_forcelimited[i] and model.actuator_forcerange[i, 1] > 0]
+    return float(model.actuator_forcerange[limited, 1].max()) if limited else 1.0
 
 
 def _in_scene(mechanism: Gripper) -> Gripper:

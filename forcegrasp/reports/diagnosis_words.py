@@ -152,7 +152,7 @@ def _but(diagnosis: Diagnosis) -> str:
         return ""
     return (
         f"Not all is found: {d.error_after:.2f} × the sensor noise is left on held-out {d.target.part}s where"
-        f" {d.floor:.2f} would be noise ({d.explained:.0%} of the mean square beyond it is explained). "
+        f" {d.floor:.2f} would be noise ({percent(d.explained)} of the mean square beyond it is explained). "
     )
 
 

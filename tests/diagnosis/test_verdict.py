@@ -10,7 +10,13 @@ import numpy as np
 import pytest
 
 from forcegrasp.diagnosis import search
-from forcegrasp.diagnosis.evidence import LEAST_SHARE_OF_MANY, indistinguishable, is_significant, place
+from forcegrasp.diagnosis.evidence import (
+    LEAST_SHARE_OF_MANY,
+    indistinguishable,
+    is_significant,
+    place,
+    with_close_rivals,
+)
 from forcegrasp.diagnosis.result import Diagnosis, Step, settle_ties
 from forcegrasp.diagnosis.signatures import share_together
 from forcegrasp.diagnosis.verdict import conclude, explained_share
@@ -128,6 +134,24 @@ def test_what_explains_little_is_believed_together(monkeypatch, before, after, l
     monkeypatch.setattr(search, "_left", lambda study, fit: (left, None))
     one, other = cast(Any, study(before)), cast(Any, study(after))
     assert search._convincing(one, cast(Any, None), other, cast(Any, None)) == believed
+
+
+def test_where_much_is_left_what_gains_nearly_as_much_is_a_rival(made_up):
+    def gaining(name: str, gain: float, cost: float = 1.0, error: float = 2.1):
+        setting, residual = EffectSetting.typical(get_effect(name)), np.full((1, 1, 1), cost**0.5)
+        fit = dataclasses.replace(candidate(made_up).fit, residual=residual, weight=np.ones((1, 1, 1)))
+        return candidate(made_up, setting=setting, gains=np.full(4, gain / 4), fit=fit, error_after=error)
+
+    others = [gaining("stiction", 89), gaining("rate_limit", 95), gaining("presliding", 99, 2.0)]
+    others.append(gaining("command_delay", 20, error=1.9))  # leaves less, though it gains less
+    step = Step(("backlash",), (gaining("backlash", 100, error=2.0), *others), (), 5.0, 2.0)
+    named = with_close_rivals(step)
+    assert named.effects == ("backlash", "rate_limit", "command_delay")
+    assert [c.effect.name for c in named.candidates] == [*named.effects, "stiction", "presliding"]
+    nested = Step(("coulomb_friction",), (gaining("coulomb_friction", 100), gaining("stiction", 101)), (), 5.0, 2.0)
+    assert with_close_rivals(nested) == nested
+    nothing = Step((), step.candidates, (), 5.0, 5.0)
+    assert with_close_rivals(nothing) == nothing
 
 
 @pytest.mark.parametrize(("share", "winners", "equal"), [(0.2, 0.6, False), (0.26, 0.6, True), (0.2, 0.3, True)])

@@ -368,6 +368,14 @@ def test_three_that_go_together_are_one_group():
     )
 
 
+def test_what_hardly_changes_anything_is_confounded_with_nothing():
+    slopes = np.zeros((G, S, 4, 4))
+    slopes[0, 0] = np.diag([300.0, 300.0, 3e-6, 0.0])
+    fit = fit_at(slopes, noise())
+    assert np.diag(fit.covariance()) == pytest.approx([300.0**-2, 300.0**-2, 3e-6**-2, 0.0])
+    assert warnings(fit, np.full(4, 0.01)) == []
+
+
 @pytest.mark.parametrize(
     ("value", "bounds", "bound"),
     [

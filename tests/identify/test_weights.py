@@ -7,9 +7,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from forcegrasp.identify.base_fit import rms_error
+from forcegrasp.identify.base_fit import BaseFit, rms_error
 from forcegrasp.identify.cross_validation import rms
 from forcegrasp.identify.fit import Simulators, fit_exactly
+from forcegrasp.identify.fit_set import _weighed
 from forcegrasp.identify.loading import load
 from forcegrasp.identify.problem import Problem
 from forcegrasp.identify.target import make_target
@@ -45,6 +46,16 @@ def test_each_recording_counts_by_what_is_left_of_it(missed):
     assert after[easier] < before[easier]  # which the other one had decided
     assert fit.cost == pytest.approx(target.readings, rel=0.3)
     assert fit.gradient < 5
+
+
+@pytest.mark.parametrize("agree", [True, False])
+def test_a_fit_is_judged_by_its_weights_where_starts_agree(missed, agree):
+    """Slopes of the motion that is missed by most had said that the error still falls."""
+    unweighted = BaseFit(missed.fit, (), False, "why", starts_agree=agree)
+    target, _, base = _weighed(missed.target, missed.simulators, unweighted)
+    assert target is not missed.target
+    assert base.converged == agree
+    assert bool(base.reason) == (not agree)
 
 
 def test_one_recording_is_left_as_it_is(missed):
