@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Sequence
 
 from forcegrasp.diagnosis.evidence import LEAST_RISE, is_beyond_chance
-from forcegrasp.diagnosis.families import refit_without, roughly_without
+from forcegrasp.diagnosis.families import falls_back, refit_as, refit_without, roughly_without, simpler, stalled
 from forcegrasp.diagnosis.result import Step
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.identify.fit import Fit
@@ -29,6 +29,7 @@ def drop_needless(study: Study, step: Step, fit: Fit, given: int) -> tuple[Step,
         return step, fit
     name, less = found
     study.progress(f"{name} is needless with {step.effects[0]}")
+    less = _as_simple_as_it_is(study, less)
     error = study.error(study.heldout(less))
     last = dataclasses.replace(
         step.candidates[0],
@@ -37,7 +38,21 @@ def drop_needless(study: Study, step: Step, fit: Fit, given: int) -> tuple[Step,
         error_after=error,
         replaces=name,
     )
-    return dataclasses.replace(step, candidates=(last, *step.candidates[1:]), error_after=error), less
+    names = (last.effect.name, *(other for other in step.effects[1:] if other != last.effect.name))
+    others = [c for c in step.candidates[1:] if c.effect.name != last.effect.name]
+    return dataclasses.replace(step, effects=names, candidates=(last, *others), error_after=error), less
+
+
+def _as_simple_as_it_is(study: Study, fit: Fit) -> Fit:
+    """The fit with what its last effect contains in place of that, if it has become that without the other."""
+    last = fit.problem.case(fit.vector).effects[-1]
+    for nested in last.effect.contains:
+        if falls_back(fit, nested):
+            simple = refit_as(simpler(last, nested, fit.problem.gripper), fit, last.effect.name, study)
+            if not stalled(simple, fit):
+                study.progress(f"{last.effect.name} is no more than {nested.effect} now")
+                return simple
+    return fit
 
 
 def drop_all_needless(study: Study, steps: Sequence[Step], fit: Fit, given: int) -> tuple[list[Step], Fit]:

@@ -28,11 +28,11 @@ class BackEmf(Effect):
     parameters = (
         Parameter(
             "stall_n", "largest force at rest F_s", "N", 0.005, 50.0, 0.15, null=np.inf, logarithmic=True,
-            trials=(0.08, 0.3), follows="effort",
+            trials=(0.08, 0.3, 1.0), follows="effort",
         ),
         Parameter(
             "no_load_m_s", "speed at which no force is left v_0", "m/s", 0.001, 10.0, 0.03, null=0.03, logarithmic=True,
-            trials=(0.015, 0.06), follows="position",
+            trials=(0.015, 0.06, 0.2), follows="position",
         ),
     )  # fmt: skip
     contains = (Nested("force_limit", at={"no_load_m_s": np.inf}, same={"stall_n": "force_n"}),)

@@ -221,14 +221,23 @@ def _may_fall(local: _Local, vector: np.ndarray, shift: np.ndarray | float, free
     """Whether slopes that are measured where a descent ended promise more than the ones that it ended with."""
     if local.has_measured(vector):
         return False
-    problem, weight = local.problem, local.target.weight
-    residual = (weight * local.target.residual(local.value(vector) + shift)).ravel()
+    problem, residual = local.problem, _left(local, vector, shift)
     if residual @ residual > _NEAR**2 * local.target.readings:
         return False
     inside = free & (vector > problem.low + 1e-6) & (vector < problem.high - 1e-6)
-    slopes = (weight[..., None] * local.slopes(vector, anew=True)).reshape(-1, len(problem))[:, inside]
+    slopes = _slopes(local, vector, anew=True)[:, inside]
     gain = residual @ slopes @ np.linalg.lstsq(slopes, residual, rcond=1e-6)[0]
     return bool(gain * local.target.readings > _WORTH * (residual @ residual))
+
+
+def _left(local: _Local, vector: np.ndarray, shift: np.ndarray | float) -> np.ndarray:
+    """Residuals ÷ noise as they count, of predictions shifted by so much, ``(N,)``."""
+    return (local.target.weight * local.target.residual(local.value(vector) + shift)).ravel()
+
+
+def _slopes(local: _Local, vector: np.ndarray, anew: bool = False) -> np.ndarray:
+    """Slopes of the predictions ÷ noise as they count, ``(N, p)``."""
+    return (local.target.weight[..., None] * local.slopes(vector, anew=anew)).reshape(-1, len(vector))
 
 
 def _descend_once(
@@ -239,18 +248,17 @@ def _descend_once(
         vector[free] = part
         return vector
 
-    problem, weight = local.problem, local.target.weight
+    problem = local.problem
     tolerance, flat = (_ROUGH, _ROUGH) if rough else (_TOLERANCE, _FLAT / max(local.target.readings, 1))
     best, count = (start, np.inf, np.empty(0)), 0
 
     def residual(part: np.ndarray) -> np.ndarray:
         nonlocal best, count
         vector = whole(part)
-        signals = local.value(vector)
-        residual = (weight * local.target.residual(signals + shift)).ravel()
+        residual = _left(local, vector, shift)
         cost, count = float(residual @ residual), count + 1
         if cost < best[1]:
-            best = vector, cost, signals
+            best = vector, cost, local.value(vector)
         elif cost < (1 + flat) * best[1] or np.abs(vector - best[0]).max() < _SMALLEST_STEP:
             raise _SettledError
         return -residual
@@ -260,7 +268,7 @@ def _descend_once(
             residual,
             start[free],
             # scipy is not annotated: its type is guessed from its default, a string
-            jac=lambda part: (weight[..., None] * local.slopes(whole(part))).reshape(-1, len(problem))[:, free],  # pyright: ignore[reportArgumentType]
+            jac=lambda part: _slopes(local, whole(part))[:, free],  # pyright: ignore[reportArgumentType]
             bounds=(problem.low[free], problem.high[free]),
             x_scale="jac",
             ftol=tolerance,

@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 
-from forcegrasp.errors import ConfigError
+from forcegrasp.errors import ConfigError, PhysicsError
 from forcegrasp.identify.base_fit import BaseFit, check_gradient, cost_tolerance, fit_base
 from forcegrasp.identify.fit import Simulators, fit_exactly, fit_once
 from forcegrasp.identify.loading import Loaded
@@ -17,10 +17,15 @@ from forcegrasp.identify.weights import reweigh
 from forcegrasp.measure import MeasurementSet
 from forcegrasp.models.model_file import Model
 from forcegrasp.physics.sensors import is_rounding
+from forcegrasp.replay.replay import NOWHERE
 
 
 def fit_model(loaded: Loaded[MeasurementSet], seed: int, progress: Progress) -> tuple[Target, Simulators, BaseFit]:
-    """Fits the base model to a set, from several starts."""
+    """Fits the base model to a set, from several starts.
+
+    Raises:
+      PhysicsError: if it diverges wherever the fit went.
+    """
     target = make_target(loaded.measured, loaded.gripper)
     problem = Problem(loaded.gripper, target.grasps)
     simulators = Simulators(problem)
@@ -35,6 +40,7 @@ def apply_model(
 
     Raises:
       ConfigError: if the model is of another gripper.
+      PhysicsError: if it diverges.
     """
     if model.gripper.name != loaded.gripper.name:
         raise ConfigError(f"model: is of gripper {model.gripper.name}, the set is of {loaded.gripper.name}")
@@ -49,10 +55,14 @@ def apply_model(
         progress(f"the model does not say {names}: fitted")
     free = np.ones(len(problem), bool) if refit else unknown
     base = check_gradient(fit_once(target, problem, simulators, vector, free=free), target)
-    return _weighed(target, simulators, base) if refit else (target, simulators, base)
+    if refit:
+        return _weighed(target, simulators, base)
+    _refuse_diverged(base, simulators)
+    return target, simulators, base
 
 
 def _weighed(target: Target, simulators: Simulators, base: BaseFit) -> tuple[Target, Simulators, BaseFit]:
+    _refuse_diverged(base, simulators)
     weighed, fit = reweigh(target, base.fit, simulators)
     if fit is not base.fit and base.starts_agree:  # what one motion alone is missed by may not fall any further
         base = check_gradient(fit, weighed, base.errors)
@@ -61,6 +71,12 @@ def _weighed(target: Target, simulators: Simulators, base: BaseFit) -> tuple[Tar
             if fit.cost - further.cost <= cost_tolerance(further, weighed):
                 base = BaseFit(fit, base.errors, True)
     return weighed, simulators, dataclasses.replace(base, fit=fit)
+
+
+def _refuse_diverged(base: BaseFit, simulators: Simulators) -> None:
+    """Raises PhysicsError if the model itself diverges: there is nothing to compare."""
+    if np.abs(base.fit.predicted).max() > NOWHERE / 2:
+        raise PhysicsError(simulators.exact.diverged or simulators.cheap.diverged)
 
 
 def _coordinates(problem: Problem, model: Model) -> tuple[np.ndarray, np.ndarray]:

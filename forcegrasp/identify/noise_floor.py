@@ -28,7 +28,10 @@ def numerical_error(fit: Fit, target: Target) -> tuple[np.ndarray, ...]:
     Each ``(G, S, C)``. The fit must be one of the model itself, no rough one.
     """
     gripper, grasps, case = fit.problem.gripper, fit.problem.grasps, [fit.problem.case(fit.vector)]
-    others = (Replay(gripper, grasps, step_factor=0.5), Replay(gripper, grasps, other_collisions=True))
+    others = (
+        Replay(gripper, grasps, step_factor=0.5, strict=True),
+        Replay(gripper, grasps, other_collisions=True, strict=True),
+    )
     return tuple(
         np.where(target.mask[..., None], (predict(o, case)[0] - fit.predicted) / target.sigma, 0.0) for o in others
     )

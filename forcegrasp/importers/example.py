@@ -32,7 +32,7 @@ def example_set() -> MeasurementSet:
                 columns=columns_of(mechanism), start=(blank[0], np.zeros(1)),
             )
         )  # fmt: skip
-    replay, rows = Replay(mechanism, recordings, encoders_known=False), np.arange(len(recordings))
+    replay, rows = Replay(mechanism, recordings, encoders_known=False, strict=True), np.arange(len(recordings))
     friction = effect_of("coulomb_friction", mechanism)
     hidden = EffectOn(friction, "", np.full((len(rows), 1), FRICTION_NM), rows)
     base = {name: np.full(len(rows), p.nominal) for name, p in mechanism.parameters.items()}

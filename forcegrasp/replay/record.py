@@ -103,7 +103,7 @@ def record(
         for index, p in enumerate(planned)
     ]  # fmt: skip
     rows = np.arange(grasps)
-    replay = Replay(gripper, bare, encoders_known=False)
+    replay = Replay(gripper, bare, encoders_known=False, strict=True)
     on = [EffectOn(*one.kind, np.repeat(one.values[None], grasps, axis=0), rows) for one in effects]
     motion = replay.simulate(
         rows,

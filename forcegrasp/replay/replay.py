@@ -23,6 +23,8 @@ THREADS = 0
 _AT_REST = 1 / 45
 #: Rows × physics steps that are kept in memory at once.
 _CHUNK = 8_000_000
+#: Where a row is that diverged, m or rad, N or N·m: so far off that no search for parameters goes there.
+NOWHERE = 1e6
 # A physics step that is off by less than this share is what it should be; by more than the other, it is no longer that
 # of the gripper. Samples that scatter by this share of it have no period.
 _SAME_STEP, _OTHER_STEP, _JITTER = 1e-5, 0.1, 0.25
@@ -71,6 +73,8 @@ class Replay:
       step_factor: multiplies the physics step; ½ tells how exact the integration is.
       other_collisions: uses MuJoCo's other collision code; tells how exact the contacts are.
       encoders_known: the grasps hold measured positions, which the gripper's own driver may have acted on.
+      strict: whether rows must not diverge; by default they end :data:`NOWHERE`, lest one of many models that are tried
+        ends the search, and :attr:`diverged` tells of the last one.
     """
 
     def __init__(
@@ -81,7 +85,9 @@ class Replay:
         step_factor: float = 1.0,
         other_collisions: bool = False,
         encoders_known: bool = True,
+        strict: bool = False,
     ) -> None:
+        self._strict, self.diverged = strict, ""
         self.gripper, self.grasps, self.tier = gripper, tuple(grasps), tier
         timestep = float(gripper.compile(tier).opt.timestep)
         self._step_factor = step_factor * (1.0 if gripper.is_servo else _fitting_factor(self.grasps, timestep))
@@ -146,7 +152,7 @@ class Replay:
           effects: those that change what happens.
 
         Raises:
-          PhysicsError: if a row diverged.
+          PhysicsError: if a row diverged, and the replay is strict.
         """
         n, rows_at_once = len(grasp), max(1, _CHUNK // self._steps)
         if n > rows_at_once:
@@ -184,9 +190,11 @@ class Replay:
         if bad.any():
             row = int(np.flatnonzero(bad)[0])
             values = ", ".join(f"{name}={value[row]:.4g}" for name, value in base.items())
-            raise PhysicsError(
-                f"grasp {self.grasps[grasp[row]].name} diverged with {values}; narrow the gripper's bounds"
-            )
+            name = f"{'window' if self.gripper.is_servo else 'grasp'} {self.grasps[grasp[row]].name}"
+            self.diverged = f"{name} diverged with {values}; narrow the gripper's bounds"
+            if self._strict:
+                raise PhysicsError(self.diverged)
+            position[bad] = force[bad] = NOWHERE
         return Motion(grasp, position, force, objects)
 
     def read(

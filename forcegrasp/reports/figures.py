@@ -19,7 +19,7 @@ LEFT, RIGHT, WITHOUT, WITH, MEASURED = "#0072b2", "#d55e00", "#d55e00", "#0072b2
 SECOND = "#009e73"
 _COLOURS = (LEFT, RIGHT, SECOND, "#cc79a7", "#e69f00", "#56b4e9")
 #: Shown unit of a signal's unit, and its factor.
-SHOWN = {"m": ("mm", 1e3), "rad": ("mrad", 1e3), "N": ("N", 1.0)}
+SHOWN = {"m": ("mm", 1e3), "rad": ("mrad", 1e3), "N": ("N", 1.0), "N·m": ("N·m", 1.0)}
 NAMES = {
     "position_l": "position left", "position_r": "position right", "force_l": "force left", "force_r": "force right",
 }  # fmt: skip

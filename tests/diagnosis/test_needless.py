@@ -50,6 +50,14 @@ def test_a_look_alike_goes_once_what_was_hidden_is_there(rubbing):
     assert kept_steps([first, left]) == [left]
 
 
+def test_what_has_become_a_simpler_effect_is_named_so(rubbing):
+    study, step, fit = step_with(rubbing, "motor_offset", "presliding")
+    left, less = drop_needless(study, dataclasses.replace(step, effects=("presliding", "coulomb_friction")), fit, 0)
+    assert (left.replaces, left.effects) == ("motor_offset", ("coulomb_friction",))
+    assert left.candidates[0].effect.name == "coulomb_friction"
+    assert [one.effect.name for one in less.problem.effects] == ["coulomb_friction"]
+
+
 def test_what_is_needed_or_was_given_stays(rubbing):
     study, step, fit = step_with(rubbing, "coulomb_friction", "motor_offset")
     assert drop_needless(study, step, fit, 0) == (step, fit)

@@ -9,13 +9,17 @@ import numpy as np
 import pytest
 
 from forcegrasp.errors import MeasurementError
+from forcegrasp.identify.comparison import compare
 from forcegrasp.identify.fit import Simulators, fit_once
+from forcegrasp.identify.loading import Loaded
 from forcegrasp.identify.problem import Problem
 from forcegrasp.identify.target import make_target
 from forcegrasp.importers.recording import Recording
 from forcegrasp.importers.servo_set import as_set
 from forcegrasp.measure import check_servo
 from forcegrasp.physics import load_gripper
+from forcegrasp.reports.comparison import sections
+from forcegrasp.reports.html import Picture
 
 VOLTS = load_gripper(str(Path(__file__).parents[1] / "mechanisms" / "volts.yaml"))
 #: Of the motor that is recorded: k/R, k²/R, inertia of rotor and wheel, amperes of a newton metre.
@@ -55,6 +59,14 @@ def test_a_motors_constants_are_found_from_voltage_and_the_size_of_its_current()
     assert found["torque_per_volt"] == pytest.approx(GAIN, rel=0.03)
     assert found["back_emf"] == pytest.approx(BACK_EMF, rel=0.03)
     assert found["effort_scale"] == pytest.approx(SCALE, rel=0.03)
+
+
+def test_a_report_shows_efforts_in_newton_metres():
+    found, _, _ = compare(Loaded(as_set([recorded()], VOLTS, "", ""), VOLTS, []), None, 0, lambda text: None)
+    assert found.target.axis.units == ["rad", "N·m"]
+    pictures = [block for part in sections(found, []) for block in part.blocks if isinstance(block, Picture)]
+    labels = {axes.get_ylabel() for one in pictures for axes in one.figure.axes}
+    assert any("N·m" in label for label in labels)
 
 
 def test_a_command_or_an_effort_that_the_mechanism_does_not_take_is_told():
