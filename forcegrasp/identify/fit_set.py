@@ -13,7 +13,7 @@ from forcegrasp.identify.loading import Loaded
 from forcegrasp.identify.problem import Problem
 from forcegrasp.identify.progress import Progress
 from forcegrasp.identify.target import Target, make_target
-from forcegrasp.identify.weights import reweigh
+from forcegrasp.identify.weights import reweigh, weights
 from forcegrasp.measure import MeasurementSet
 from forcegrasp.models.model_file import Model
 from forcegrasp.physics.sensors import is_rounding
@@ -58,7 +58,10 @@ def apply_model(
     if refit:
         return _weighed(target, simulators, base)
     _refuse_diverged(base, simulators)
-    return target, simulators, base
+    # recordings held out are judged by parameters of the others: they count as in the fit that the model is of
+    weight = weights(target, base.fit.residual)
+    fit = dataclasses.replace(base.fit, weight=weight)
+    return dataclasses.replace(target, weight=weight), simulators, dataclasses.replace(base, fit=fit)
 
 
 def _weighed(target: Target, simulators: Simulators, base: BaseFit) -> tuple[Target, Simulators, BaseFit]:

@@ -20,14 +20,19 @@ def reweigh(target: Target, fit: Fit, simulators: Simulators) -> tuple[Target, F
     alone. So the size of the errors is estimated for each recording, together with the model, as for a likelihood of
     Gaussian errors of unknown size; it is never taken for smaller than the noise.
     """
-    recordings = target.recordings
-    for _ in range(_ROUNDS if len(recordings) > 1 else 0):
-        weight = np.ones(target.weight.shape)
-        for members in recordings.values():
-            inside = fit.residual[members][target.mask[members]]
-            weight[members] = 1 / max(1.0, float(np.sqrt(np.mean(inside**2)))) if inside.size else 1.0
+    for _ in range(_ROUNDS if len(target.recordings) > 1 else 0):
+        weight = weights(target, fit.residual)
         if np.all(np.abs(np.log(weight / target.weight)) < np.log(_SAME)):
             break
         target = dataclasses.replace(target, weight=weight)
         fit = fit_exactly(target, fit.problem, simulators, fit.vector, fit.jacobian)
     return target, fit
+
+
+def weights(target: Target, residual: np.ndarray) -> np.ndarray:
+    """By which each grasp's residuals count, ``(G, 1, 1)``; 1 where there is one recording, or none."""
+    weight, recordings = np.ones(target.weight.shape), target.recordings
+    for members in recordings.values() if len(recordings) > 1 else ():
+        inside = residual[members][target.mask[members]]
+        weight[members] = 1 / max(1.0, float(np.sqrt(np.mean(inside**2)))) if inside.size else 1.0
+    return weight

@@ -105,7 +105,8 @@ def after_comparison(comparison: Comparison, data: str | Path, model: str | Path
             for one in comparison.between.sets
         ]
     if at_floor(comparison.floor_ratio(), comparison.floor):
-        return [_use("the model", model, data, comparison.target.gripper)]
+        servo = comparison.target.gripper.is_servo  # what it leaves was shown just now
+        return [] if servo else [_use("the model", model, data, comparison.target.gripper)]
     return [after_fit(data, model)]
 
 

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from forcegrasp.identify.base_fit import BaseFit, rms_error
-from forcegrasp.identify.cross_validation import rms
+from forcegrasp.identify.cross_validation import heldout_residual, make_folds, rms
 from forcegrasp.identify.fit import Simulators, fit_exactly
-from forcegrasp.identify.fit_set import _weighed
+from forcegrasp.identify.fit_set import _weighed, apply_model
+from forcegrasp.identify.fitted_model import model_of
 from forcegrasp.identify.loading import load
 from forcegrasp.identify.problem import Problem
 from forcegrasp.identify.target import make_target
@@ -28,7 +29,7 @@ def missed(tmp_path_factory: pytest.TempPathFactory) -> SimpleNamespace:
     problem = Problem(loaded.gripper, target.grasps)
     simulators = Simulators(problem)
     fit = fit_exactly(target, problem, simulators, problem.start())
-    return SimpleNamespace(target=target, simulators=simulators, fit=fit)
+    return SimpleNamespace(folder=folder, target=target, simulators=simulators, fit=fit)
 
 
 def errors(fit, target) -> np.ndarray:
@@ -56,6 +57,17 @@ def test_a_fit_is_judged_by_its_weights_where_starts_agree(missed, agree):
     assert target is not missed.target
     assert base.converged == agree
     assert bool(base.reason) == (not agree)
+
+
+def test_a_model_that_is_given_is_judged_as_the_fit_that_it_is_of(missed):
+    """Held-out recordings are told apart by the others as these counted in the fit: else the fastest would decide."""
+    target, _, base = _weighed(missed.target, missed.simulators, BaseFit(missed.fit, (), True))
+    loaded = load(missed.folder)
+    again, _, given = apply_model(loaded, model_of(base.fit, target, loaded, []), lambda text: None, refit=False)
+    np.testing.assert_allclose(again.weight, target.weight, rtol=0.25)
+    assert given.fit.weight is again.weight
+    held = [rms(heldout_residual(f, t, make_folds(t.grasps)), t) for f, t in ((base.fit, target), (given.fit, again))]
+    assert held[1] == pytest.approx(held[0], rel=0.05)
 
 
 def test_one_recording_is_left_as_it_is(missed):
