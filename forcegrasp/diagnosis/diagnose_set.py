@@ -10,7 +10,7 @@ import numpy as np
 from forcegrasp.diagnosis.doubt import leaves_less, more_likely, with_fault
 from forcegrasp.diagnosis.faults import suspects
 from forcegrasp.diagnosis.law import find_law
-from forcegrasp.diagnosis.moved_set import go_on_with_moved
+from forcegrasp.diagnosis.moved_set import go_on_with_moved, within_tolerance_after_all
 from forcegrasp.diagnosis.result import Diagnosis, Step
 from forcegrasp.diagnosis.search import diagnose
 from forcegrasp.effects import Effect
@@ -65,7 +65,7 @@ def diagnose_set(
         target, simulators, base = said
         found = search(target, simulators, base)
         further = go_on_with_moved(found, loaded, lambda t, s, fit, steps: search(t, s, base, (fit, steps)), progress)
-        return further or (found, simulators)
+        return further or (within_tolerance_after_all(found, loaded), simulators)
 
     said = fitted(loaded)
 

@@ -6,10 +6,12 @@ import dataclasses
 from collections.abc import Callable, Sequence
 
 from forcegrasp.diagnosis.evidence import LEAST_LEAD, LEAST_SHARE, is_beyond_chance
-from forcegrasp.diagnosis.faults import within_tolerance
+from forcegrasp.diagnosis.faults import Fault, within_tolerance
 from forcegrasp.diagnosis.needless import drop_all_needless
 from forcegrasp.diagnosis.result import Diagnosis, Step, kept_steps
 from forcegrasp.diagnosis.study import Study
+from forcegrasp.diagnosis.tolerance import all_radii
+from forcegrasp.effects.object_size import ObjectSize
 from forcegrasp.identify.cross_validation import evidence_folds
 from forcegrasp.identify.fit import Fit, Simulators, fit_exactly
 from forcegrasp.identify.loading import Loaded
@@ -22,6 +24,28 @@ from forcegrasp.measure import MeasurementSet
 
 #: Searches on from a fit and the steps that found its effects.
 SearchOn = Callable[[Target, Simulators, Fit, Sequence[Step]], Diagnosis]
+
+
+def within_tolerance_after_all(found: Diagnosis, loaded: Loaded[MeasurementSet]) -> Diagnosis:
+    """The diagnosis without an error of all radii that is smaller than what they are given with: it is told as moved.
+
+    Args:
+      found: of the set as it is.
+      loaded: the set.
+    """
+    step = next((step for step in kept_steps(found.steps) if step.effects == (ObjectSize.name,)), None)
+    if step is None or found.left or found.fault is not None:
+        return found
+    case = found.fit.problem.case(found.fit.vector)
+    (move_m,) = next(one.values.tolist() for one in case.effects if one.effect.name == ObjectSize.name)
+    moved = all_radii(loaded.measured, found.target, move_m)
+    if moved is None:
+        return found
+    fault = Fault("object_tolerance", f"all radii by {1e3 * move_m:+.2g} mm", moved.check, loaded, moved)
+    steps = tuple(one for one in found.steps if one is not step)
+    others = tuple(name for name in found.effects if name != ObjectSize.name)
+    verdict = found.verdict if others else Verdict.EXPLAINED
+    return dataclasses.replace(found, verdict=verdict, effects=others, steps=steps, fault=fault)
 
 
 def go_on_with_moved(

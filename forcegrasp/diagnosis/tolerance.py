@@ -117,6 +117,14 @@ class Moved:
         return listed(told)
 
 
+def all_radii(measured: MeasurementSet, target: Target, move_m: float) -> Moved | None:
+    """All radii moved by so much, metres; None if that is more than the tolerance of what is given leaves open."""
+    numbers = tuple(number for number in _numbers(measured, target) if number.kind == "radius_m")
+    if not numbers or abs(move_m) > _NO_SURPRISE * measured.radius_std_m:
+        return None
+    return Moved(numbers, np.full(len(numbers), move_m / measured.radius_std_m))
+
+
 def move_given(measured: MeasurementSet, target: Target, fit: Fit, worth: float = WORTH) -> Moved | None:
     """What is given as the readings have it; None if that explains little, or takes more than the tolerance.
 

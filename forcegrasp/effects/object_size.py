@@ -24,7 +24,7 @@ class ObjectSize(Effect):
     parameters = (
         Parameter(
             "error_m", "e, added to the radii of the set", "m", -0.004, 0.004, 0.0003,
-            trials=(0.0003, -0.0003, 0.0015, -0.0015), follows="position",
+            trials=(0.0003, -0.0003, 0.0015, -0.0015),
         ),
     )  # fmt: skip
 

@@ -11,16 +11,22 @@ import pytest
 from forcegrasp.diagnosis.diagnose_set import diagnose_set
 from forcegrasp.diagnosis.faults import suspects
 from forcegrasp.diagnosis.felt_sizes import doubtful_radii
-from forcegrasp.diagnosis.moved_set import go_on_with_moved
+from forcegrasp.diagnosis.moved_set import go_on_with_moved, within_tolerance_after_all
 from forcegrasp.diagnosis.odd_grasps import odd_grasps
+from forcegrasp.diagnosis.result import Diagnosis
 from forcegrasp.diagnosis.search import diagnose
 from forcegrasp.diagnosis.tolerance import move_given
+from forcegrasp.effects import get_effect
+from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.identify.fit_set import apply_model, fit_model
 from forcegrasp.identify.fitted_model import model_of
 from forcegrasp.identify.loading import Loaded, load
+from forcegrasp.identify.problem import Problem
+from forcegrasp.identify.verdict import Verdict
 from forcegrasp.models.model_file import Model
 from forcegrasp.reports.diagnosis import answer, diagnosis_json
 from forcegrasp.reports.diagnosis_box import answer_box
+from forcegrasp.reports.diagnosis_words import fault_words
 from tests.independent.rig import record
 
 
@@ -53,6 +59,27 @@ def test_a_wrong_radius_is_found(sound):
     diagnosis, _ = diagnose_set(wrong, model, ["object_size"], 0, silent)
     assert (diagnosis.verdict, diagnosis.effects) == ("data", ("object_size",))
     assert diagnosis.fit.values[-1] == pytest.approx(-0.0005, abs=0.0001)
+
+
+@pytest.mark.parametrize(("move_m", "told"), [(8e-5, True), (1.2e-4, False)])
+def test_an_error_of_all_radii_within_their_tolerance_is_no_fault(sound, made_up, move_m, told):
+    loaded, model = sound
+    target, _, base = apply_model(loaded, model, silent, refit=True)
+    setting = EffectSetting(get_effect("object_size"), "", np.array([move_m]))
+    problem = Problem(loaded.gripper, target.grasps, [setting])
+    fit = dataclasses.replace(base.fit, problem=problem, vector=problem.start())
+    one = made_up.diagnosis("effect").steps[0]
+    size = dataclasses.replace(one, effects=("object_size",))
+    data = Diagnosis(Verdict.DATA, ("object_size",), (size,), base, fit, target, (), 1.2, 1.0)
+    both = dataclasses.replace(data, verdict=Verdict.EFFECT, effects=("backlash", "object_size"), steps=(one, size))
+    if not told:
+        assert within_tolerance_after_all(data, loaded) is data
+        return
+    alone, besides = (within_tolerance_after_all(one, loaded) for one in (data, both))
+    assert (alone.verdict, alone.effects, alone.steps) == ("explained", (), ())
+    assert (besides.verdict, besides.effects, besides.steps) == ("effect", ("backlash",), (one,))
+    assert "What the set gives was moved within its tolerance: all radii by +0.08 mm" in fault_words(besides)
+    assert within_tolerance_after_all(dataclasses.replace(data, left="much"), loaded).effects == ("object_size",)
 
 
 def test_one_wrong_radius_is_told_and_fitted(sound):
