@@ -30,6 +30,8 @@ from forcegrasp.identify.weights import reweigh
 
 #: Largest number of effects that are looked for.
 MOST_EFFECTS = 8
+# Where the base fit stopped short, parameters are a little off: so many times the floor is as good as nothing left.
+_AS_GOOD_AS_NOTHING = 1.1
 
 
 def diagnose(
@@ -103,8 +105,8 @@ def diagnose(
     much_left = bool(left) and error_after > MUCH * floor
     steps = settle_ties([with_close_rivals(step) for step in steps] if much_left else steps)
     found = kept_steps(steps)
-    # a missing effect makes the error rough, and the base fit stop short: then only what leaves little is an answer
-    if not base.converged and (much_left or not found):
+    # a missing effect makes the error rough, and the base fit stop short: then only what leaves nothing is an answer
+    if not base.converged and (not found or (left and error_after > _AS_GOOD_AS_NOTHING * floor)):
         return Diagnosis(Verdict.NOT_FITTED, (), (), base, base.fit, target, folds, error_before, error_before, odd=odd)
     only_of_set = all(s.candidates and s.candidates[0].effect.of_set for s in found)
     verdict = conclude(
