@@ -72,7 +72,7 @@ def diagnose_set(
     def with_law(diagnosis: Diagnosis, simulators: Simulators) -> tuple[Diagnosis, Simulators]:
         rng = np.random.default_rng(seed + 2)
         found = find_law(diagnosis, simulators, rng, progress) if law else None
-        return dataclasses.replace(diagnosis, law=found), simulators
+        return dataclasses.replace(diagnosis, law=found, law_sought=law), simulators
 
     for fault in suspects(loaded, said[0], said[2].fit):
         progress(f"fitting the set with {fault.name} put right")

@@ -137,6 +137,7 @@ class Diagnosis(ShortRepr):
     odd: tuple[OddGrasp, ...] = ()  #: grasps that a fit of all others misses by far
     noise: Noise | None = None  #: what the noise is, if the residuals show that it is not as assumed
     law: FoundLaw | None = None  #: that explains what no effect does, if one was looked for and found
+    law_sought: bool = False  #: whether one was looked for
     fault: Fault | None = None  #: of the set: put right in all of the above; or else the last of the rivals
 
     @property

@@ -216,6 +216,8 @@ def lines(diagnosis: Diagnosis, advice: Advice | None) -> list[str]:
         text.append(each)
     if diagnosis.law is not None:
         text.append(law_words(diagnosis.law))
+    elif diagnosis.law_sought and diagnosis.left:
+        text.append("a law was looked for: no formula of what the model knows explains half of what is left")
     if advice is not None:
         text.append(advice.sentence())
     return [*text, noise_sentence(diagnosis.target), *(f"warning: {warning}" for warning in final_warnings(diagnosis))]

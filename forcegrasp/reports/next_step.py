@@ -46,7 +46,7 @@ def after_diagnosis(
         return [Command("put the set right, and diagnose again", again)]
     if d.verdict is Verdict.UNKNOWN:
         look = Command("look at where the model fails", compared)
-        return [look, *([] if d.law else [_for_a_law(data)])]
+        return [look, *([] if d.law_sought else [_for_a_law(data)])]
     if d.verdict is Verdict.EXPLAINED:
         noise = [Command("give the noise as it is, and diagnose again", again)] if d.noise is not None else []
         return [*noise, _use("the model", known, data, gripper)]
@@ -62,7 +62,7 @@ def after_diagnosis(
         return [Command(_to_tell_apart(d, advice), joined), *([] if effect_of(first, gripper).of_set else [preferred])]
     if is_not_all(d):
         look = Command(f"look at what {with_all} leaves", _line("compare", f"data={data}", f"model={found}"))
-        return [look, *([] if d.law else [_for_a_law(data)]), added]
+        return [look, *([] if d.law_sought else [_for_a_law(data)]), added]
     return [_use(with_all, found, data, gripper), added]
 
 

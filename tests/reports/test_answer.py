@@ -56,6 +56,15 @@ def test_the_headline_says_how_much_each_effect_explains(made_up):
     assert [name for name, _ in box(diagnosis).shares] == ["force_bias 84%", "force_drift 14%", "left 2%"]
 
 
+@pytest.mark.parametrize("sought", [False, True])
+def test_a_law_that_was_sought_is_not_proposed_again(made_up, sought):
+    diagnosis = dataclasses.replace(made_up.diagnosis("unknown"), left="in all", law_sought=sought)
+    commands = after_diagnosis(diagnosis, None, "my set", "base_model.yaml", "model.yaml")
+    assert any("law=true" in command.line for command in commands) != sought
+    told = [line for line in diagnosis_report.lines(diagnosis, None) if line.startswith("a law was looked for")]
+    assert len(told) == sought
+
+
 def test_what_is_no_more_than_noise_is_not_given_a_place(made_up):
     assert shares_sentence(made_up.diagnosis("effect")).endswith("; no more than noise is left.")
     assert shares_sentence(made_up.diagnosis("explained")) == ""
