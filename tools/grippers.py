@@ -129,21 +129,22 @@ def hidden_in(gripper: str) -> list[str]:
     return ["backlash", "command_delay", *(["coulomb_friction"] if load_gripper(gripper).force == "motor" else [])]
 
 
-def jobs(grippers: list[str], sets: int, plain: int) -> Iterator[tuple[str, str, int]]:
+def jobs(grippers: list[str], sets: int, plain: int, first: int = 1) -> Iterator[tuple[str, str, int]]:
     """Gripper, what is hidden, and seed of each set: some of all first, so that a stopped campaign says of each."""
-    for seed in range(1, max(sets, plain) + 1):
+    for seed in range(first, first + max(sets, plain)):
         for gripper in grippers:
-            if seed <= plain:
+            if seed < first + plain:
                 yield gripper, NOTHING, seed
-            if seed <= sets:
+            if seed < first + sets:
                 yield from ((gripper, effect, seed) for effect in hidden_in(gripper))
 
 
-def diagnose(grippers: list[str], sets: int, plain: int, grasps: int, folder: Path) -> None:
+def diagnose(grippers: list[str], sets: int, plain: int, first: int, grasps: int, folder: Path) -> None:
     """Records sets with an effect hidden in them, and without, and diagnoses them."""
     results = Results(folder)
     all_jobs = [
-        (f"diagnose {g} {hidden} {seed} {grasps}", g, hidden, seed) for g, hidden, seed in jobs(grippers, sets, plain)
+        (f"diagnose {g} {hidden} {seed} {grasps}", g, hidden, seed)
+        for g, hidden, seed in jobs(grippers, sets, plain, first)
     ]
     todo = [job for job in all_jobs if job[0] not in results.rows]
     print(f"{len(todo)} sets of {grasps} grasps to diagnose, {len(all_jobs) - len(todo)} done; a minute or more each")
@@ -203,12 +204,13 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--trials", type=int, default=40, help="grasps per softness value of an evaluation")
     parser.add_argument("--sets", type=int, default=10, help="sets per hidden effect")
     parser.add_argument("--plain", type=int, default=5, help="sets with nothing hidden")
+    parser.add_argument("--first-seed", type=int, default=1, help="seed of the first set; others are another campaign")
     parser.add_argument("--grasps", type=int, default=20, help="grasps of a set")
     given = parser.parse_args(arguments)
     if given.stage == "train":
         train(given.grippers, given.frames, given.trials, given.out)
     elif given.stage == "diagnose":
-        diagnose(given.grippers, given.sets, given.plain, given.grasps, given.out)
+        diagnose(given.grippers, given.sets, given.plain, given.first_seed, given.grasps, given.out)
     else:
         from tools import grippers_page
 

@@ -38,9 +38,10 @@ def refine(scores: Sequence[Score], study: Study, fit: Fit, background: Backgrou
       fit: of the model without these effects.
       background: what gets no credit.
     """
-    pairs = list(zip(best_sizes(scores, study, fit, background), scores, strict=True))
-    pairs.sort(key=lambda pair: -pair[0].gain)
-    pairs = [pairs[i] for i in _in_the_race([sized.gain for sized, _ in pairs], _LOST)]
+    sized = best_sizes(scores, study, fit, background)
+    # one grasp in which something else happens at this size, which a fit would mend, must not rule an effect out
+    racing = {*_in_the_race([one.gain for one, _ in sized], _LOST), *_in_the_race([few for _, few in sized], _LOST)}
+    pairs = sorted(((sized[i][0], scores[i]) for i in racing), key=lambda pair: -pair[0].gain)
     some, part = study.on_few(fit)
     fits: list[Fit] = []
     for number, (sized, _) in enumerate(pairs, 1):
@@ -59,8 +60,8 @@ def refine(scores: Sequence[Score], study: Study, fit: Fit, background: Backgrou
 
 
 def _in_the_race(gains: Sequence[float], least: float) -> list[int]:
-    """Indices of the gains that are no less than this share of the best."""
-    best = max(gains, default=0.0)
+    """Indices of the gains that are no less than this share of the best; not of those that are not known."""
+    best = max((gain for gain in gains if np.isfinite(gain)), default=np.inf)
     return [i for i, gain in enumerate(gains) if gain >= min(best, least * best)]
 
 

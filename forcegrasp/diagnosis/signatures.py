@@ -117,24 +117,30 @@ def share_together(scores: Sequence[Score], fit: Fit, beyond: float) -> float:
     return float(residual @ signatures @ sizes) / max(beyond, 1e-9)
 
 
-def best_sizes(scores: Sequence[Score], study: Study, fit: Fit, background: Background) -> list[Score]:
+def best_sizes(scores: Sequence[Score], study: Study, fit: Fit, background: Background) -> list[tuple[Score, float]]:
     """The same effects with their first parameters at the sizes that minimise the residual, and what these gain.
 
     A signature is straight, and thresholds are not: several sizes around the one it promises are simulated on few
     grasps, those of all effects at once, and the best one of each on all.
+
+    Returns:
+      Each effect with what its best size gains on all grasps, and what on the few; NaN where no sizes were tried.
     """
     options = [_sizes(score.setting) for score in scores]
     some, part = study.on_few(fit)
     gains = iter(_gains([one for sizes in options for one in sizes], some, part, Background(part, some.numerical)))
     best: list[EffectSetting | None] = []
+    on_few: list[float] = []
     for sizes in options:
         gain = [next(gains) for _ in sizes]
         best.append(sizes[int(np.argmax(gain))] if sizes else None)
+        on_few.append(max(gain, default=np.nan))
     gains = iter(_gains([one for one in best if one is not None], study, fit, background))
-    return [
+    sized = [
         score if one is None else dataclasses.replace(score, setting=one, gain=next(gains))
         for score, one in zip(scores, best, strict=True)
     ]
+    return list(zip(sized, on_few, strict=True))
 
 
 def _gains(tried: Sequence[EffectSetting], study: Study, fit: Fit, background: Background) -> list[float]:

@@ -11,11 +11,12 @@ import numpy as np
 import pytest
 from rich.console import Console
 
+from forcegrasp.diagnosis import refine as refine_module
 from forcegrasp.diagnosis import signatures as score_module
 from forcegrasp.diagnosis.refine import refine
 from forcegrasp.diagnosis.result import Diagnosis
 from forcegrasp.diagnosis.search import diagnose
-from forcegrasp.diagnosis.signatures import Background, Signatures, best_sizes, trials
+from forcegrasp.diagnosis.signatures import Background, Score, Signatures, best_sizes, trials
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.effects import get_effect
 from forcegrasp.effects.setting import EffectSetting
@@ -305,7 +306,8 @@ def test_refining_finds_a_large_threshold(fitted, threshold):
     signatures.simulate(fit, tried)
     scores = [group[0] for group in signatures.scores(fit, threshold.background, tried)]
     assert {score.setting.variant for score in scores} == set(zone.variants)
-    sized = best_sizes(scores, study, fit, threshold.background)
+    sized, on_few = zip(*best_sizes(scores, study, fit, threshold.background), strict=True)
+    assert list(on_few) == pytest.approx([s.gain for s in sized])  # where no few are chosen, they are all
     assert [s.setting.kind for s in sized] == [s.setting.kind for s in scores]
     refined = refine(scores, study, fit, threshold.background)
     assert 1 <= len(refined) == len(threshold.told) <= len(scores)
@@ -316,6 +318,18 @@ def test_refining_finds_a_large_threshold(fitted, threshold):
     assert rms_error(refined, target) < 1.1 < rms_error(fit, target)
     promised = max(s.gain for s in sized)
     assert promised > 0.5 * (fit.cost - refined.cost)  # what `refine` goes by when it leaves effects out
+
+
+def test_what_few_grasps_promise_is_fitted_though_one_grasp_of_all_is_far_off(fitted, threshold, monkeypatch):
+    """At a size that is not fitted yet a finger may stick in one grasp: a fit mends that."""
+    one = next(iter(Signatures(threshold.study).missing(trials([threshold.zone]))))
+    scores = [Score(one, gain, np.ones(1)) for gain in (50.0, 40.0, 30.0)]
+    gains = [(-1000.0, 45.0), (100.0, np.nan), (20.0, 10.0)]
+    sized = [(dataclasses.replace(s, gain=all_), few) for s, (all_, few) in zip(scores, gains, strict=True)]
+    monkeypatch.setattr(refine_module, "best_sizes", lambda *_: sized)
+    monkeypatch.setattr(refine_module, "_fit_from", lambda *_: threshold.fit)
+    refined = refine(scores, threshold.study, threshold.fit, threshold.background)
+    assert [r.score.gain for r in refined] == [40.0, 50.0]
 
 
 def test_signatures_are_simulated_when_asked_for_and_kept(fitted, threshold, monkeypatch):
