@@ -269,7 +269,7 @@ def test_where_the_fingers_start():
 
 
 def test_divergence_names_the_grasp_and_its_parameters():
-    simulator = Replay(TIAGO, [grasp(REGULAR, "good"), grasp(REGULAR, "bad")], "fast")
+    simulator = Replay(TIAGO, [grasp(REGULAR, "good"), grasp(REGULAR, "bad")], "fast", strict=True)
     base = {name: np.full(2, value) for name, value in BASE.items()} | {"velocity_gain": np.array([-8.0, 1e9])}
     with pytest.raises(PhysicsError, match=r"grasp bad diverged with .*velocity_gain=1e\+09"):
         simulator.simulate(np.arange(2), base)
