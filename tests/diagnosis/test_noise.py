@@ -174,6 +174,11 @@ def too_slow(residual):
     return slow(residual, 0.99)
 
 
+def slow_and_too_large(residual):
+    """As a lag of a servo leaves it, which repeats no motion."""
+    return 3.2 * slow(residual)
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_slow_noise(seed):
     """It is new in every grasp, and nothing foretells it."""
@@ -212,6 +217,7 @@ def test_chance_gains_more_where_noise_is_slow():
         slow_and_the_same_in_every_grasp,
         slow_where_pressed,
         too_slow,
+        slow_and_too_large,
     ],
 )
 def test_an_effect_is_not_taken_for_noise(spoil, seed):
