@@ -28,8 +28,8 @@ _HEAVY = 1.2
 # Noise may lean on the reading before it by so much; slower, it can't be told from a model's error. Of noise that does
 # the state may explain this share of the mean square.
 _SLOWEST, _BY_STATE = 0.95, 0.05
-# Nor is it noise if it is so many times what was assumed: the state of a servo, which repeats no motion, foretells
-# little of what a lag or an elastic load leaves.
+# Nor is it noise if it is so many times what was assumed. Of a servo it never is: its state, which repeats no motion,
+# foretells little of what a lag or an elastic load leaves.
 _MOST_SLOW = 4.0
 # Random features, what a unit of their weights costs, and folds of grasps.
 _FEATURES, _RIDGE, _FOLDS = 100, 1.0, 4
@@ -90,7 +90,7 @@ def unexpected_noise(
         if _is_white(scores, beyond, groups):
             clean[..., k], affected[k] = scores, True
             continue
-        if ratio[k] > _MOST_SLOW:
+        if target.gripper.is_servo or ratio[k] > _MOST_SLOW:
             continue
         new, leaning = _innovations(scores)
         if 0 < leaning < _SLOWEST and _is_white(new, beyond, groups) and foretold(scores, state, target) < _BY_STATE:

@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 
 from forcegrasp.diagnosis.diagnose_set import chosen_effects, diagnose_set
+from forcegrasp.diagnosis.noise_check import unexpected_noise
 from forcegrasp.errors import ConfigError, MeasurementError
 from forcegrasp.identify import loading, windows
 from forcegrasp.identify.comparison import compare
 from forcegrasp.identify.cross_validation import make_folds
 from forcegrasp.identify.progress import silent
+from forcegrasp.identify.target import make_target
 from forcegrasp.importers.example import FRICTION_NM, example_set
 from forcegrasp.importers.recording import Recording
 from forcegrasp.importers.servo_set import as_set
@@ -43,6 +45,18 @@ def test_the_friction_hidden_in_the_starter_set_is_found(example, tmp_path):
     (told,) = [line for line in lines(diagnosis, None) if line.startswith("held out, × noise: ")]
     assert len(told.split(", ")) == 1 + len(diagnosis.target.recordings)
     assert {cell.phase for cell in loaded_cells(diagnosis)} <= {"moving", "reversing", "holding", "released"}
+
+
+def test_of_a_servo_no_slow_noise_is_known(example):
+    """It repeats no motion: what a lag leaves is foretold by nothing either."""
+    target = make_target(example, load_gripper("so101_jaw"))
+    white = 2 * np.random.default_rng(0).standard_normal(target.signals.shape)
+    slow = white.copy()
+    for sample in range(1, slow.shape[1]):
+        slow[:, sample] += 0.7 * slow[:, sample - 1]
+    nothing = [np.zeros(white.shape)] * 2
+    assert unexpected_noise(np.where(target.mask[..., None], white, 0.0), nothing, target, target.signals) is not None
+    assert unexpected_noise(np.where(target.mask[..., None], slow, 0.0), nothing, target, target.signals) is None
 
 
 def loaded_cells(diagnosis):
