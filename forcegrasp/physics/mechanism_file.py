@@ -14,7 +14,7 @@ from forcegrasp.files.validate import refusal, validate
 from forcegrasp.physics.gripper import START_VELOCITY, Gripper
 from forcegrasp.physics.gripper_checks import check_write, compile_scene
 from forcegrasp.physics.gripper_parts import NO_TRAINING, STEP_SHARE, TYPICAL_STROKE, Motor
-from forcegrasp.physics.gripper_schema import MechanismDescription, ScaleEntry, ServoEntry
+from forcegrasp.physics.gripper_schema import MechanismDescription, ScaleEntry
 
 #: Where those are that come with the package, below its descriptions of grippers.
 MECHANISMS = "mechanisms"
@@ -44,24 +44,22 @@ def load_mechanism(path: Path, raw: dict[str, Any]) -> Gripper:
         parameters={name: p.named(name) for name, p in said.parameters.items()},
         training=NO_TRAINING,
         position_scale=scale.position or span / TYPICAL_STROKE,
-        force_scale=scale.force or _largest_effort(path.parent / said.model, said.motors),
+        force_scale=scale.force or 0.0,  # the scene's to say
         command=said.command,
         unsigned=said.effort == "unsigned",
     )
     return _in_scene(mechanism)
 
 
-def _largest_effort(scene: Path, motors: Sequence[ServoEntry]) -> float:
+def _largest_effort(model: mujoco.MjModel, motors: Sequence[Motor]) -> float:
     """The largest effort that the scene lets a motor give, N or N·m, as TIAGo's give 1 N; 1 where none has a limit."""
-    model = compile_scene(scene)
-    names = {model.actuator(i).name: i for i in range(model.nu)}
-    own = [names[motor.actuator] for motor in motors if motor.actuator in names]
-    limited = [i for i in own if model.actuator_forcelimited[i] and model.actuator_forcerange[i, 1] > 0]
+    drives = [model.actuator(motor.actuator).id for motor in motors]
+    limited = [i for i in drives if model.actuator_forcelimited[i] and model.actuator_forcerange[i, 1] > 0]
     return float(model.actuator_forcerange[limited, 1].max()) if limited else 1.0
 
 
 def _in_scene(mechanism: Gripper) -> Gripper:
-    """Checks names and fields against the scene, and takes the unit of the motors from it."""
+    """Checks names and fields against the scene, and takes from it the motors' unit, and effort where none is said."""
     model = compile_scene(mechanism.model)
     names = {
         "joint": [model.joint(i).name for i in range(model.njnt)],
@@ -88,6 +86,6 @@ def _in_scene(mechanism: Gripper) -> Gripper:
     if len(turns) > 1:
         raise refusal(mechanism.path, "motors", "some of their joints turn and some slide; describe them apart")
     unit = "rad" if turns.pop() else "m"
-    return dataclasses.replace(
-        mechanism, motors=tuple(dataclasses.replace(motor, unit=unit) for motor in mechanism.motors)
-    )
+    motors = tuple(dataclasses.replace(motor, unit=unit) for motor in mechanism.motors)
+    force = mechanism.force_scale or _largest_effort(model, motors)
+    return dataclasses.replace(mechanism, motors=motors, force_scale=force)

@@ -174,10 +174,10 @@ def recordings_sentence(diagnosis: Diagnosis) -> str:
     """The error of each of a servo's recordings that was held out, with the base model and the final one; the worst
     first. Empty where there is one at most."""
     d = diagnosis
-    before = rms_of_recordings(heldout_residual(d.base.fit, d.target, d.folds), d.target)
-    if len(before) < 2:
+    after = rms_of_recordings(d.heldout(), d.target) if d.target.recordings else {}
+    if len(after) < 2:
         return ""
-    after = rms_of_recordings(d.heldout(), d.target)
+    before = rms_of_recordings(heldout_residual(d.base.fit, d.target, d.folds), d.target)
     worst = sorted(after, key=lambda name: -after[name])
     return f"held out, × noise: {', '.join(f'{name} {before[name]:.1f} → {after[name]:.1f}' for name in worst)}"
 
