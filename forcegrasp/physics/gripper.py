@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import functools
 import math
 from dataclasses import dataclass
@@ -211,7 +212,7 @@ class Gripper(ShortRepr):
         return self.opening.position_at(2 * np.asarray(radius_m, float))
 
     def compile(self, tier: str = "reference") -> mujoco.MjModel:
-        """Returns the scene's model, with sensors of the contact forces of fingers that have none.
+        """Returns a copy of the scene's model, with sensors of the contact forces of fingers that have none.
 
         Args:
           tier: ``"reference"`` is the scene as described; ``"fast"``, where the description has ``fast: sphere``, is
@@ -224,13 +225,22 @@ class Gripper(ShortRepr):
         if tier not in TIERS:
             raise ConfigError(f"physics.tier={tier}: must be reference or fast")
         silence_log()
-        try:
-            spec = self.spec()
-            if TIERS[tier] == 1 or self.fast == "none":
-                return spec.compile()
-            return compile_fast(spec, self.motors, self.object_geom, self.axis, TIERS[tier])
-        except (ValueError, RuntimeError) as error:
-            raise ConfigError(f"{self.model}: MuJoCo refuses it: {' '.join(str(error).split())}") from error
+        if tier not in self._compiled:
+            try:
+                spec = self.spec()
+                if TIERS[tier] == 1 or self.fast == "none":
+                    self._compiled[tier] = spec.compile()
+                else:
+                    largest = TIERS[tier]
+                    self._compiled[tier] = compile_fast(spec, self.motors, self.object_geom, self.axis, largest)
+            except (ValueError, RuntimeError) as error:
+                raise ConfigError(f"{self.model}: MuJoCo refuses it: {' '.join(str(error).split())}") from error
+        return copy.copy(self._compiled[tier])
+
+    @functools.cached_property
+    def _compiled(self) -> dict[str, mujoco.MjModel]:
+        """Models by tier, never changed: a fit makes plants by the hundred, and to copy is faster than to compile."""
+        return {}
 
     def spec(self) -> mujoco.MjSpec:
         """The scene, to be compiled; what is read and has no sensor in it gets one.

@@ -110,10 +110,7 @@ class ModelFields(SceneLayout):
 
     @functools.cached_property
     def _more_damping(self) -> np.ndarray:
-        """What the tier adds to the scene's damping, and so to any that is written, ``(degrees of freedom,)``.
-
-        Few grippers write it, and fits make plants by the hundred: the scene is compiled again only where it counts.
-        """
+        """What the tier adds to the scene's damping, and so to any that is written, ``(degrees of freedom,)``."""
         damping = self.model.dof_damping
         return np.zeros_like(damping) if self._tier == "reference" else damping - self.gripper.compile().dof_damping
 

@@ -431,3 +431,11 @@ def test_mjcf_shortcuts_are_undone_without_a_trace():
     plant.advance(np.zeros((1, 2)), 1000)
     assert plant.batch.get_model(0).geom("west").sameframe[0] == mujoco.mjtSameFrame.mjSAMEFRAME_BODYROT
     np.testing.assert_array_equal(plant.batch.bind("qpos")[0], data.qpos)
+
+
+def test_a_compiled_scene_may_be_changed_and_no_other_is():
+    gripper = load_gripper("tiago")
+    changed = gripper.compile()
+    changed.dof_damping[:] = 7
+    assert not (gripper.compile().dof_damping == 7).any()
+    assert gripper.compile("fast").opt.timestep > gripper.compile().opt.timestep
