@@ -19,7 +19,7 @@ from forcegrasp.files.validate import refusal, validate
 from forcegrasp.physics.gripper import Gripper, shipped_folder
 from forcegrasp.physics.gripper_checks import check_gripper, compile_scene
 from forcegrasp.physics.gripper_defaults import training_of_scene
-from forcegrasp.physics.gripper_parts import NO_TRAINING, STEP_SHARE, TYPICAL_STROKE, Finger, Motor
+from forcegrasp.physics.gripper_parts import NO_TRAINING, STEP_SHARE, TYPICAL_FORCE, TYPICAL_STROKE, Finger, Motor
 from forcegrasp.physics.gripper_schema import (
     FIRST_FORMAT,
     FORMAT,
@@ -92,7 +92,9 @@ def _load(path: Path) -> Gripper:
     gripper = _in_scene(_gripper(path, description))
     check_gripper(gripper, names)
     given = description.training.model_dump(exclude_none=True, exclude_unset=True) if description.training else {}
-    return dataclasses.replace(gripper, training=training_of_scene(gripper, given))
+    training = training_of_scene(gripper, given)
+    force = gripper.force_scale or TYPICAL_FORCE * training.max_force_n
+    return dataclasses.replace(gripper, training=training, force_scale=force)
 
 
 #: What messages call the parts of a description.
@@ -125,7 +127,7 @@ def _gripper(path: Path, said: Description) -> Gripper:
         parameters={name: p.named(name) for name, p in said.parameters.items()},
         training=NO_TRAINING,
         position_scale=scale.position or strokes[0] / TYPICAL_STROKE,
-        force_scale=scale.force or 1.0,
+        force_scale=scale.force or 0.0,  # follows from the scene
     )
 
 

@@ -14,6 +14,9 @@ SCOPES = ("gripper", "object", "recording", "grasp")
 Softness = TypeVar("Softness", float, np.ndarray)
 #: Stroke for which the sizes of effects in the catalogue are typical; metres, or as many radians.
 TYPICAL_STROKE = 0.05
+#: A grasp's forces, for which they are typical as well, as a multiple of what the largest command step gives: 3 for
+#: TIAGo's gripper, 1 to 2 for the other shipped ones.
+TYPICAL_FORCE = 2.0
 #: Largest command step where a description does not say, as a share of the stroke.
 STEP_SHARE = 1 / 15
 

@@ -215,7 +215,8 @@ class FirstDescription(_Description):
         sides = zip(SIDES, old.joints, old.force_sensors, strict=True)
         fingers = {side: FingerEntry(joint=joint, force_sensor=sensor) for side, joint, sensor in sides}
         kept = {key: getattr(self, key) for key in _Description.model_fields}
-        return Description(**kept, motors=motors, fingers=FingersEntry(**fingers), scale=ScaleEntry(position=1.0))
+        scale = ScaleEntry(position=1, force=1)
+        return Description(**kept, motors=motors, fingers=FingersEntry(**fingers), scale=scale)
 
 
 class ServoEntry(Record):

@@ -1,13 +1,15 @@
-"""Sizes of effects follow the largest effort of a servo, where its description does not say otherwise."""
+"""Sizes of effects follow the forces of a servo or a gripper, where its description does not say otherwise."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 import pytest
+import yaml
 
 from forcegrasp.effects.for_gripper import effect_of
 from forcegrasp.physics import load_gripper
+from forcegrasp.physics.gripper import shipped_folder
 
 SCENE = """<mujoco><worldbody><body><joint name="elbow" type="hinge"/><geom size="0.02" mass="0.1"/></body></worldbody>
 <actuator><position name="servo" joint="elbow" kp="20" {limit}/></actuator></mujoco>"""
@@ -31,3 +33,17 @@ def test_friction_is_looked_for_up_to_half_of_the_largest_effort(tmp_path: Path,
     arm = load_gripper(str(tmp_path / "arm.yaml"))
     assert arm.force_scale == largest
     assert effect_of("coulomb_friction", arm).parameters[0].high == pytest.approx(0.5 * largest)
+
+
+@pytest.mark.parametrize(("training", "force_n"), [("", 10.0), ("training: {max_force_n: 25}\n", 50.0)])
+def test_a_gripper_that_does_not_say_is_looked_at_by_what_it_presses_with(tmp_path: Path, training, force_n):
+    shipped = shipped_folder() / "franka_hand.yaml"
+    content = yaml.safe_load(shipped.read_text("utf-8"))
+    kept = {key: value for key, value in content.items() if key not in ("scale", "training")}
+    (tmp_path / "hand.yaml").write_text(yaml.safe_dump(kept, allow_unicode=True) + training, "utf-8")
+    (tmp_path / "franka_hand.xml").write_text(shipped.with_suffix(".xml").read_text("utf-8"), "utf-8")
+    hand = load_gripper(str(tmp_path / "hand.yaml"))
+    assert hand.force_scale == pytest.approx(force_n)
+    one_motor_moves_two_fingers = 2
+    high = effect_of("coulomb_friction", hand).parameters[0].high
+    assert high == pytest.approx(0.5 * force_n * one_motor_moves_two_fingers)
