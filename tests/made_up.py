@@ -46,7 +46,7 @@ def _grasp(index: int, rng: np.random.Generator) -> MeasuredGrasp:
     )  # fmt: skip
 
 
-def _fit(problem: Problem, target, residual: np.ndarray) -> Fit:
+def fit_of(problem: Problem, target, residual: np.ndarray) -> Fit:
     """A fit that leaves these residuals ÷ noise."""
     jacobian = np.random.default_rng(1).standard_normal((*residual.shape, len(problem)))
     jacobian[~target.mask] = 0
@@ -70,12 +70,12 @@ def made_up() -> SimpleNamespace:
     hold = target.phase == 3
     left[..., 2][hold] += 5.0
     left[3, :, 2][hold[3]] += 4.0
-    base = BaseFit(_fit(Problem(loaded.gripper, grasps), target, left), (2.0, 2.001, 2.3), True)
+    base = BaseFit(fit_of(Problem(loaded.gripper, grasps), target, left), (2.0, 2.001, 2.3), True)
     names = ("force_bias", "force_drift")
     effects = [get_effect(name) for name in names]
     candidates = []
     for effect, share in zip(effects, (0.0, 0.5), strict=True):
-        fit = _fit(
+        fit = fit_of(
             Problem(loaded.gripper, grasps, [EffectSetting.typical(effect)]), target, noise + share * (left - noise)
         )
         gains = np.full(8, 100.0 * (1 - share))

@@ -29,7 +29,9 @@ from forcegrasp.effects import Effect
 from forcegrasp.identify.base_fit import rms_error
 from forcegrasp.identify.cross_validation import rms
 from forcegrasp.identify.fit import Fit, fit_exactly, fit_once
+from forcegrasp.identify.led_astray import fit_past_few
 from forcegrasp.identify.noise_floor import cells, excess
+from forcegrasp.identify.target import Target
 
 #: An effect must lower the error of some signal in some phase by this share; by more where all is at the floor already.
 LEAST_GAIN, LEAST_GAIN_AT_FLOOR = 0.02, 0.1
@@ -82,6 +84,11 @@ def look_further(
     ordered = (*equal, *(c for c in ordered if c not in equal))
     names = tuple(c.effect.name for c in equal)
     return Step(names, ordered, look.scores, start.error, equal[0].error_after, of_many)
+
+
+def _leaves_more(fit: Fit, target: Target) -> bool:
+    """Whether a fit leaves more than noise, but not so much that it is hopeless."""
+    return _ALL_FITTED < rms_error(fit, target) < _FAR
 
 
 class _Start:
@@ -200,7 +207,9 @@ class _Start:
     def _to_the_end(self, rough: Fit) -> Fit:
         target, simulators = self._study.target, self._study.simulators
         exact = fit_exactly(target, rough.problem, simulators, rough.vector)
-        if not _ALL_FITTED < rms_error(exact, target) < _FAR:
+        if _leaves_more(exact, target):
+            exact = fit_past_few(exact, target, simulators)
+        if not _leaves_more(exact, target):
             return exact
         # it may have ended where an effect's size meets a step of the simulation, or in another valley
         # few grasps tell where; slopes of all but its last effect hardly change
