@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from forcegrasp.diagnosis.noise_check import Noise, unexpected_noise
+from forcegrasp.diagnosis.search import _left
 from forcegrasp.diagnosis.signatures import Score, null_gains
 from forcegrasp.effects import get_effect
 from forcegrasp.effects.setting import EffectSetting
@@ -294,3 +296,13 @@ def test_noise_as_said_is_not_mentioned(made_up):
     diagnosis = made_up.diagnosis("explained")
     assert "white in time" not in diagnosis_report.answer(diagnosis)
     assert diagnosis_report.diagnosis_json(diagnosis, None, made_up.tried, "s")["noise"] is None
+
+
+@pytest.mark.parametrize(("fitted", "told"), [(normal(0), None), (student(0), True), (0.5 * normal(0), False)])
+def test_only_what_a_fit_of_all_grasps_leaves_can_be_more_noise(fitted, told):
+    """A grasp that goes another way once it is held out scatters, and is no noise; less noise shows in both."""
+    held = 0.5 * normal(0) if told is False else student(0)
+    fit = SimpleNamespace(residual=fitted, predicted=GRASPS)
+    study = SimpleNamespace(target=make(), numerical=NOTHING, heldout=lambda _: held)
+    left, noise = _left(study, fit)
+    assert (left, noise and noise.stronger) == ("", told)
