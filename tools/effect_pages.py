@@ -84,6 +84,10 @@ _PLANS = {
         ((26.2, 0.008, 0.2), (26.3, 0.008, 0.2), (26.1, 0.008, 0.2), (26.5, 0.008, 0.2), (25.9, 0.008, 0.2),
          (26.7, 0.008, 0.2), (22.5, 0.015, 0.3), (22.8, 0.006, 0.3)),
     ),
+    "smooth_friction": Show(
+        "fast and slow moves in free air with long pauses after them, and a squeeze",
+        ((26.2, 0.02, 1.2), (27, 0.004, 1.2), (22.5, 0.015, 0.8)),
+    ),
     "direction_friction": Show(
         "fast ramps, opening and closing, in free air; a squeeze and a release",
         ((25.6, 0.02, 0.4), (27.4, 0.02, 0.4), (25.6, 0.02, 0.4), (22, 0.02, 0.3), (27, 0.02, 0.4)),

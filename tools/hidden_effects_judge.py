@@ -7,7 +7,14 @@ from collections.abc import Collection
 from forcegrasp.effects import catalogue
 
 #: What the messy rig has in every set, beside what is hidden: to name it, or a form of it, is right.
-OF_THE_MESS = ("encoder_bias", "force_gain_asymmetry", "coulomb_friction", "object_size", "force_bias")
+OF_THE_MESS = (
+    "encoder_bias",
+    "force_gain_asymmetry",
+    "smooth_friction",
+    "coulomb_friction",
+    "object_size",
+    "force_bias",
+)
 #: Groups where whoever names the kind of effect is right.
 BY_FAMILY = ("law", "contact")
 

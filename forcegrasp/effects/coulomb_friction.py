@@ -20,6 +20,7 @@ class CoulombFriction(Effect):
         "command_deadband",
         "motor_offset",
         "presliding",
+        "smooth_friction",
         "load_friction",
         "position_deadband",
     )

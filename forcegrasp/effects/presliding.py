@@ -24,7 +24,7 @@ class Presliding(Effect):
     symptom = "like dry friction, but rounded: after a reversal it grows over a small displacement, as a spring would"
     formula = "F = −F_c (z + τ dz/dt) / z_c, dz/dt = v − |v| z / z_c, τ = 4 ms"
     source = "Dahl (1968); Canudas de Wit et al. (1995), LuGre"
-    look_alikes = ("coulomb_friction", "stiction", "backlash", "elastic_transmission")
+    look_alikes = ("coulomb_friction", "smooth_friction", "stiction", "backlash", "elastic_transmission")
     separates = "small reversals: within z_c the joint moves a little for each push, where Coulomb's friction holds it"
     parameters = (
         Parameter("force_n", "friction F_c", "N", 0.0, 0.5, 0.03, trials=(0.02, 0.06), follows="effort"),

@@ -45,6 +45,7 @@ _SHIPPED = (
     "quantisation",
     "rate_limit",
     "readout_skew",
+    "smooth_friction",
     "stiction",
     "stiffening_contact",
     "swapped_forces",

@@ -250,6 +250,43 @@ def test_presliding_is_the_same_with_large_steps():
         assert np.abs(fast - reference).max() < 0.04 * np.abs(reference - base).max()
 
 
+@pytest.mark.parametrize("step", [3e-4, 2e-3])
+def test_smooth_friction_lets_the_finger_creep(step):
+    """Overdamped, it goes by kp e = F_c tanh(v / v_c) + c v, with the servo's error e and damping c = 10 N s/m."""
+    force, creep, seconds = 0.05, 5e-4, 1.2
+    plant = settle("smooth_friction", (force, creep), START_M + step, seconds=seconds)
+
+    def speed(_, left) -> list[float]:
+        return [-brentq(lambda v: force * np.tanh(v / creep) + 10 * v - GAIN * left[0], 0, 10.0)]
+
+    expected = solve_ivp(speed, (0, seconds), [step], rtol=1e-8, atol=1e-12).y[0, -1]
+    assert START_M + step - plant.position[0] == pytest.approx([expected] * 2, rel=0.08, abs=3e-6)
+
+
+@pytest.mark.parametrize("speed", [2e-4, 4e-3])
+def test_smooth_friction_grows_with_slow_motion_and_is_dry_for_fast(speed):
+    force, creep = 0.03, 1e-3
+    plant = settle("smooth_friction", (force, creep), 0.030)
+    for command in 0.030 + speed * np.arange(1, 1001) * plant.dt:
+        plant.advance(np.full((1, 2), command))
+    held = force * np.tanh(speed / creep) + 10 * speed
+    assert GAIN * (command - plant.position[0]) == pytest.approx([held] * 2, rel=0.04)
+
+
+def test_smooth_friction_that_falls_at_no_speed_is_dry():
+    stub = SimpleNamespace(velocity=np.array([[0.0, 1e-3], [0.0, 1e-3]]))
+    added = get_effect("smooth_friction")(np.array([[0.03, 0.0], [0.03, 1e-3]]), DT).attach(stub, np.arange(2)).act()
+    np.testing.assert_allclose(added.friction, [[0.03], [0.0]])
+    np.testing.assert_allclose(added.damping, [[0.0, 0.0], [30.0, 0.03 * np.tanh(1.0) / 1e-3]], rtol=1e-9)
+
+
+def test_smooth_friction_is_the_same_with_large_steps():
+    commands = path((0.0262, 0.02, 0.4), (0.0268, 0.01, 0.4), (0.0255, 0.01, 0.4))
+    use = [(get_effect("smooth_friction"), [0.05, 5e-4], "", [0])]
+    fast, reference = (rollout(1, use, tier, commands).position for tier in ("fast", "reference"))
+    assert np.abs(fast - reference).max() < 0.04 * np.abs(reference - rollout(1, commands=commands).position).max()
+
+
 @pytest.mark.parametrize("excess", [5.0, -5.0])
 def test_direction_friction_lags_in_one_direction(excess):
     """On a ramp the servo's spring holds damping (9 + 1 N s/m, and the excess) times speed."""

@@ -68,6 +68,7 @@ def test_what_needs_a_position_loop_or_pads_is_left_out():
         ("motor_offset", ["offset_nm"], ["N·m"]),
         ("stiction", ["breakaway_nm", "kinetic_share", "stribeck_rad_s"], ["N·m", "1", "rad/s"]),
         ("presliding", ["torque_nm", "displacement_rad"], ["N·m", "rad"]),
+        ("smooth_friction", ["torque_nm", "creep_rad_s"], ["N·m", "rad/s"]),
         ("direction_friction", ["excess_nms_rad"], ["N·m·s/rad"]),
         ("back_emf", ["stall_nm", "no_load_rad_s"], ["N·m", "rad/s"]),
         ("position_deadband", ["band_rad"], ["rad"]),

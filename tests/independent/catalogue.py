@@ -88,6 +88,7 @@ CATALOGUE: dict[str, Sizes] = {
     "stiction": _sizes("breakaway", 0.015, 0.045, 0.15, sliding=0.4),
     "load_friction": _sizes("coefficient", 0.05, 0.15, 0.4),
     "presliding": _sizes("level", 0.01, 0.03, 0.1),
+    "smooth_friction": _sizes("level", 0.015, 0.045, 0.15),
     "direction_friction": _sizes("excess", 2.0, 5.0, 15.0),
     "position_deadband": _sizes("band", 1e-4, 4e-4, 1.5e-3),
     "back_emf": _sizes("stall", 0.4, 0.2, 0.08),
@@ -130,8 +131,7 @@ VARIANT_OF = {
 
 #: Effects of the catalogue by another law: the right answer, and sizes.
 OTHERWISE: dict[str, tuple[str, Sizes]] = {
-    "smooth_friction": ("coulomb_friction", _sizes("level", 0.02, 0.05, 0.1)),
-    "smooth_stribeck": ("stiction", _sizes("breakaway", 0.03, 0.06, 0.15, sliding=0.4)),
+    "smooth_stribeck": ("smooth_friction", _sizes("breakaway", 0.03, 0.06, 0.15, sliding=0.4)),
     "tilt": ("motor_offset", _sizes("weight", 0.02, 0.05, 0.1)),
     "second_order_drive": ("actuator_lag", CATALOGUE["actuator_lag"]),
     "restless_delay": ("command_delay", CATALOGUE["command_delay"]),

@@ -48,7 +48,7 @@ def test_a_number_is_always_the_same_robot():
 
 def test_every_effect_of_a_robot_has_a_prior():
     robots = {n for n, e in catalogue().items() if not (e.of_set or e.servo_only)}
-    assert set(EFFECTS) == robots | {ObjectBody.name}
+    assert set(EFFECTS) == (robots - {"smooth_friction"}) | {ObjectBody.name}
     assert all(0 < p.chance <= 1 and 0 < p.low <= p.high and p.why for p in EFFECTS.values())
 
 
