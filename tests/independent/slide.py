@@ -24,8 +24,8 @@ SAMPLE_S, POSITION_STD_M = 0.01, 5e-5
 #: Effects that a servo can have, and what the catalogue calls those that have another name here.
 EFFECTS = (
     "command_delay", "command_deadband", "rate_limit", "coulomb_friction", "stiction", "load_friction", "presliding",
-    "smooth_friction", "direction_friction", "position_deadband", "back_emf", "motor_offset", "actuator_lag", "force_limit",
-    "swinging_load", "readout_skew", "encoder_bias",
+    "smooth_friction", "direction_friction", "position_deadband", "back_emf", "motor_offset", "actuator_lag",
+    "force_limit", "swinging_load", "readout_skew", "encoder_bias",
 )  # fmt: skip
 CALLED = {"swinging_load": "elastic_transmission"}
 _KG = FINGER_KG + ROTOR_KG
