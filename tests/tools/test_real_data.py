@@ -104,7 +104,8 @@ def test_a_fit_of_bam_recovers_a_motor():
 
 def study() -> Study:
     return Study(
-        "emps", "EMPS", "mass", "fitted on one", {"a.mat": "00"}, [], "one_of", "", ["coulomb_friction"], ["stiction"],
+        "emps", "EMPS", "mass", "fitted on one", {"emps/a.mat": "00"}, [], "one_of", "",
+        ["coulomb_friction"], ["stiction"],
         [Error("force", "N", 11.0, 5.0, 0.1, 4.8)], [Parameter("mass", 94.5, 91.0, 98.0, "kg", 95.1)],
         {"Yardstick": [["a", "b"], ["1", "2"]]}, ["late by 1 ms"], 12.0,
     )  # fmt: skip
@@ -117,7 +118,10 @@ def test_the_page_tells_what_a_study_found(tmp_path, monkeypatch):
     study().write(tmp_path / "emps")
     page = tmp_path / "page.md"
     marks = [f"<!-- made by tools/real_data: {n} -->\nold\n<!-- end of {n} -->" for n in ("emps", "checksums")]
-    page.write_text("kept\n" + "\n".join(marks))
+    jaw, gone = (f"| `{name}` | `{'0f' * 32}` |" for name in ("so101_jaw/a.csv", "emps/gone.mat"))
+    page.write_text(
+        "kept\n" + "\n".join(marks).replace("old\n<!-- end of checksums", f"{jaw}\n{gone}\n<!-- end of checksums")
+    )
     write_page(page, tmp_path, ["emps", "xl330"])
     text = page.read_text()
     assert text.startswith("kept\n")
@@ -125,7 +129,8 @@ def test_the_page_tells_what_a_study_found(tmp_path, monkeypatch):
     assert "| force | 11 N | 5 N | 4.8 N | 110 → 50 |" in text
     assert "| `mass` | 94.5 [91, 98] kg | 95.1 kg |" in text
     assert "`coulomb_friction` (or `stiction`: these data can't tell)" in text
-    assert "| `a.mat` | `00` |" in text
+    assert f"| `emps/a.mat` | `00` |\n{jaw}\n" in text  # of sets that were not studied now they stay
+    assert gone not in text
     assert drawn == [study()]
     page.write_text("nothing marked")
     with pytest.raises(SystemExit, match="lacks"):

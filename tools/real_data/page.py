@@ -21,7 +21,7 @@ def write_page(page: Path, out: Path, names: list[str]) -> None:
     text = page.read_text()
     for study in studies:
         text = _replaced(text, study.name, "\n".join(_lines(study)))
-    text = _replaced(text, "checksums", "\n".join(_checksums(studies)))
+    text = _replaced(text, "checksums", "\n".join(_checksums(studies, text)))
     page.write_text(text)
     draw_all(studies, out, page.parent / "figures")
 
@@ -63,8 +63,10 @@ def _lines(study: Study) -> list[str]:
     return lines
 
 
-def _checksums(studies: list[Study]) -> list[str]:
-    rows = [["file", "SHA-256"]]
-    for study in studies:
-        rows += [[f"`{name}`", f"`{digest}`"] for name, digest in study.files.items()]
-    return _table(rows)
+def _checksums(studies: list[Study], text: str) -> list[str]:
+    """Those of the studies' files, and what the page has of the files of others."""
+    files = {name: digest for study in studies for name, digest in study.files.items()}
+    folders = {name.split("/")[0] for name in files}
+    known = re.findall(r"^\| `(\S+)` \| `([0-9a-f]{64})` \|$", text, re.MULTILINE)
+    files |= {name: digest for name, digest in known if name.split("/")[0] not in folders}
+    return _table([["file", "SHA-256"], *([f"`{name}`", f"`{digest}`"] for name, digest in sorted(files.items()))])
