@@ -85,7 +85,7 @@ def test_an_error_of_all_radii_within_their_tolerance_is_no_fault(sound, made_up
 
 
 def test_one_wrong_radius_is_told_and_fitted(sound):
-    loaded, _ = sound
+    loaded, model = sound
     wrong = changed(loaded, lambda g: dataclasses.replace(g, radius_m=g.radius_m + 0.002 * (g.object == "thing_1")))
     diagnosis, _ = diagnose_set(wrong, None, ["backlash", "object_size"], 0, silent)
     assert (diagnosis.verdict, diagnosis.effects) == ("data", ("object_radius",))
@@ -93,8 +93,8 @@ def test_one_wrong_radius_is_told_and_fitted(sound):
     (true,) = {g.radius_m for g in loaded.measured.grasps if g.object == "thing_1"}
     assert f"the radius of thing_1 is {1e3 * true:.1f} mm, the set says {1e3 * true + 2:.1f} mm" in answer(diagnosis)
     assert fitted["radius_m of thing_1"] == pytest.approx(true, abs=1e-4)
-    right = fit_model(loaded, 0, silent)
-    assert not doubtful_radii(right[0], right[2].fit, loaded.measured.radius_std_m)
+    target, _, right = apply_model(loaded, model, silent, refit=True)
+    assert not doubtful_radii(target, right.fit, loaded.measured.radius_std_m)
 
 
 def test_swapped_force_columns_are_told(sound):
@@ -190,7 +190,7 @@ def late(sound, tmp_path_factory):
 
 
 def test_a_small_lag_is_taken_by_the_tolerance_and_told(sound, late):
-    diagnosis, _ = diagnose_set(late(0.003), sound[1], ["command_delay", "actuator_lag"], 0, silent)
+    diagnosis, _ = diagnose_set(late(0.003), sound[1], ["command_delay"], 0, silent)
     assert (diagnosis.verdict, diagnosis.effects) == ("explained", ())
     assert diagnosis.error_before > 1.3 > 1.1 > diagnosis.error_after
     assert "What the set gives was moved within its tolerance: time of reading by -3." in answer(diagnosis)
