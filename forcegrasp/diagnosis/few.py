@@ -25,7 +25,7 @@ def with_few(study: Study, fit: Fit) -> Study:
     keep = few_grasps(study.target, fit)
     if len(keep) == len(study.target.grasps):
         return study
-    exact, problem = study.simulators.cheap is study.simulators.exact, fit.subset(keep).problem
+    exact, problem = study.simulators.one_model, fit.subset(keep).problem
     simulators = Simulators(problem, exact)
     rough = simulators.cheap if exact else Replay(problem.gripper, problem.grasps, "fast")
     return dataclasses.replace(study, few=Few(keep, simulators, rough))

@@ -68,7 +68,7 @@ def fit_base(
         return checked
     # the cheap model's slopes may lead no further where the model itself still falls
     further = check_gradient(fit_exactly(target, problem, simulators, first.vector), target, errors)
-    if not further.converged and simulators.cheap is not simulators.exact:
+    if not further.converged and not simulators.one_model:
         exact = Simulators(problem, exact=True)
         further = check_gradient(fit_exactly(target, problem, exact, first.vector), target, errors)
     if further.converged:

@@ -49,6 +49,11 @@ class Simulators:
         self.cheap = self.exact if cheap == "reference" else Replay(gripper, grasps, cheap)
         self.step = STEP  #: of the finite differences, in coordinates
 
+    @property
+    def one_model(self) -> bool:
+        """Whether there is no cheap one: all that is simulated is the model itself."""
+        return self.cheap is self.exact
+
 
 def cheap_tier(gripper: Gripper) -> str:
     """Physics tier that is good enough for slopes."""
@@ -150,14 +155,13 @@ def fit_once(
     local = _Local(target, problem, simulators.cheap, simulators.cheap, known_slopes, simulators.step)
     vector = np.clip(start, problem.low + 1e-9, problem.high - 1e-9)
     free = np.ones(len(problem), bool) if free is None else free
-    one_model = simulators.exact is simulators.cheap
     if correction is None:
-        correction = 0.0 if one_model else _difference(problem, simulators, vector)
+        correction = 0.0 if simulators.one_model else _difference(problem, simulators, vector)
     total = 0
     for _ in range(max(1, rounds) if free.any() else 0):
         vector, count = _descend(local, vector, correction, free, rough=rounds == 0)
         total += count
-        if one_model or rounds == 0:
+        if simulators.one_model or rounds == 0:
             break
         renewed = _difference(problem, simulators, vector)
         change = np.sqrt(np.mean(((renewed - correction) / target.sigma)[target.mask] ** 2))
@@ -199,7 +203,7 @@ def fit_exactly(
         local.begin(start, slopes)
     vector, total = _descend(local, start, 0.0, free, rough=False)
     exact = local.value(vector)
-    cheap = exact if simulators.exact is simulators.cheap else predict(simulators.cheap, [problem.case(vector)])[0]
+    cheap = exact if simulators.one_model else predict(simulators.cheap, [problem.case(vector)])[0]
     return _finish(local, vector, exact, exact - cheap, free, total)
 
 

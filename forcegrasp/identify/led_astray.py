@@ -24,11 +24,11 @@ def fit_past_few(fit: Fit, target: Target, simulators: Simulators) -> Fit:
       simulators: of the problem's grasps.
     """
     others = _others(fit, target)
-    if len(others) in (0, len(target.grasps)):
+    if not len(others):
         return fit
     part = fit.subset(others)
-    exact = simulators.exact is simulators.cheap
-    alone = fit_exactly(target.subset(others), part.problem, Simulators(part.problem, exact), part.vector)
+    of_others = Simulators(part.problem, exact=simulators.one_model)
+    alone = fit_exactly(target.subset(others), part.problem, of_others, part.vector)
     start = fit.moved(part.problem, alone.vector)
     residual = target.residual(predict(simulators.exact, [fit.problem.case(start)])[0])
     if np.sum((fit.weight * residual) ** 2) >= fit.cost:
@@ -38,10 +38,10 @@ def fit_past_few(fit: Fit, target: Target, simulators: Simulators) -> Fit:
 
 
 def _others(fit: Fit, target: Target) -> np.ndarray:
-    """Indices of the grasps without the few that hold most of what is beyond the noise; all of them if none do."""
+    """Indices of the grasps without the few that hold most of what is beyond the noise; none if none do."""
     squares = np.sum((fit.weight * fit.residual) ** 2 - (fit.weight * target.mask[..., None]) ** 2, axis=(1, 2))
     worst = np.argsort(-squares)[: max(1, int(_FEW * len(squares)))]
     total = squares.sum()
     if total <= 0 or squares[worst].sum() < _MOST * total:
-        return np.arange(len(squares))
+        return np.empty(0, int)
     return np.setdiff1d(np.arange(len(squares)), worst)

@@ -35,8 +35,7 @@ def test_larger_steps_are_kept_where_they_lead_further(made_up, monkeypatch, lef
         "check_gradient": lambda fit, target, errors=(): BaseFit(fit, errors, False, "rough"),
     }.items():
         monkeypatch.setattr(base_fit, name, value)
-    same = SimpleNamespace()
-    simulators = SimpleNamespace(step=STEP, cheap=same, exact=same)
+    simulators = SimpleNamespace(step=STEP, one_model=True)
     base = fit_base(made_up.target, fit.problem, cast(Any, simulators), np.random.default_rng(0))
     assert steps == [STEP, LARGE_STEP]
     assert simulators.step == kept
