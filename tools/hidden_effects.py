@@ -149,7 +149,7 @@ def right_names(job: Job) -> set[str]:
     if job.group == "outside":
         return set()
     called = VARIANT_OF | CALLED | {name: answer for name, (answer, _) in OTHERWISE.items()}
-    also = {"object_friction"} if job.contact == "mujoco_rubbing" else set()
+    also = {"contact_friction"} if job.contact == "mujoco_rubbing" else set()
     return {called.get(name, name) for name in job.hidden} | also
 
 

@@ -79,6 +79,7 @@ STEPS = [
     Step("curves", ["forcegrasp", "curves", "sweep", "out=curves"], ("curves/curves.json",)),
     Step("evaluate", ["forcegrasp", "evaluate", "policies=[run,force_pi]", *SMALL, "out=e"], ("e/report.html",)),
     Step("evaluate shipped", ["python", "-c", SHIPPED], ("shipped/evaluation.json",)),
+    Step("robot", ["forcegrasp", "robot", "7"], ("robot_7.yaml",)),
     Step("render", ["forcegrasp", "render", "policy=run", "steps=8", "out=g.gif"], ("g.gif",), or_says="no OpenGL"),
     Step("export", ["forcegrasp", "export", "run", "out=exported"], ("exported/policy.onnx",)),
     Step("export force_pi", ["forcegrasp", "export", "force_pi", "gripper=franka_hand", "out=hand"], ("hand",)),

@@ -9,7 +9,7 @@ from forcegrasp.cli.verb import Verb
 #: Files of this folder, in the order of the help.
 _FILES = (
     *("record", "import", "compare", "fit", "diagnose", "add"),
-    *("train", "evaluate", "curves", "export", "render"),
+    *("train", "evaluate", "curves", "export", "render", "robot"),
     *("effects", "doctor", "completion"),
 )
 VERBS: dict[str, Verb] = {name: importlib.import_module(f"forcegrasp.cli.{name}").VERB for name in _FILES}

@@ -24,6 +24,7 @@ from forcegrasp.config.verbs import (
     FitConfig,
     RecordConfig,
     RenderConfig,
+    RobotConfig,
     TrainConfig,
     check_no_effects,
 )
@@ -48,6 +49,7 @@ __all__ = [
     "RecordConfig",
     "RenderConfig",
     "RewardConfig",
+    "RobotConfig",
     "SACConfig",
     "SensorConfig",
     "TrainConfig",

@@ -292,6 +292,15 @@ class RenderConfig:
         check_no_effects(self.model, self.physics, f"{path}model={self.model}")
 
 
+@dataclass
+class RobotConfig:
+    """`forcegrasp robot`."""
+
+    number: int = option(0, "which robot of plan=robots; also given without number=", low=0, high=2**31 - 1)
+    gripper: str = option(DEFAULT_GRIPPER, "whose robot: a gripper by name, or the path of a description")
+    out: str = option("", "file to write; robot_NUMBER.yaml if empty")
+
+
 def check_no_effects(model: object, physics: PhysicsConfig, name: str = "model") -> None:
     """Raises ConfigError if a fitted model is to be simulated by an engine that knows no effects."""
     if model and physics.engine == "warp":

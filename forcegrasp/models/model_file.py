@@ -24,6 +24,7 @@ from forcegrasp.files import plain_yaml
 from forcegrasp.files.neighbour import seen_from
 from forcegrasp.files.validate import Record, must, refusal, validate, wrong
 from forcegrasp.files.whole_file import write_whole
+from forcegrasp.models.object_body import ObjectBody
 from forcegrasp.physics.gripper import Gripper
 from forcegrasp.physics.gripper_file import load_gripper
 from forcegrasp.physics.gripper_parts import SCOPES, BaseParameter
@@ -56,7 +57,7 @@ class FoundEffect(ShortRepr):
     parameters: dict[str, Fitted]
 
     def summary(self) -> str:
-        sizes = [f"{name} {fitted.value:.4g} {fitted.unit}" for name, fitted in self.parameters.items()]
+        sizes = [f"{name} {v.value:.4g} {v.unit}".removesuffix(" 1") for name, v in self.parameters.items()]
         return f"{self.effect.name} {self.variant}".strip() + f": {some(sizes)}"
 
     @property
@@ -119,7 +120,7 @@ def write_model(model: Model, path: str | Path) -> None:
     if model.warnings:
         content["warnings"] = list(model.warnings)
     head = (
-        "# A model of a gripper, fitted to measurements. Values may be edited; low and high bound the 95 % interval.\n"
+        "# A model of a gripper. Values may be edited; low and high bound the 95 % interval.\n"
         "# Training draws from the interval: forcegrasp train model=THIS_FILE\n"
     )
     try:
@@ -221,7 +222,7 @@ class _File(Record):
 def _found(path: Path, name: str, entry: _Effect, gripper: Gripper) -> FoundEffect:
     where = f"effects.{name}"
     law = entry.law
-    effect = _renamed(path, "effects", lambda: make_law(name, law, gripper) if law else effect_of(name, gripper))
+    effect = _renamed(path, "effects", lambda: _effect(name, law, gripper))
     variant = entry.variant if "variant" in entry.model_fields_set else effect.variants[0]
     if variant not in effect.variants:
         known = " or ".join(filter(None, effect.variants)) or "left out"
@@ -229,6 +230,13 @@ def _found(path: Path, name: str, entry: _Effect, gripper: Gripper) -> FoundEffe
     known = {p.name: p for p in effect.parameters}
     before = {p.name: _Interval(value=p.if_missing) for p in effect.parameters if p.if_missing is not None}
     return FoundEffect(effect, variant, _fitted(path, where, before | entry.__pydantic_extra__, known, required=True))
+
+
+def _effect(name: str, law: Formula | None, gripper: Gripper) -> type[Effect]:
+    """An effect of the catalogue, a law, or what a robot's objects are."""
+    if name == ObjectBody.name:
+        return ObjectBody
+    return make_law(name, law, gripper) if law else effect_of(name, gripper)
 
 
 def _fitted(

@@ -11,7 +11,8 @@ from forcegrasp.physics.plant import Plant
 class ObjectBody(Effect):
     """An object of another mass, and other friction wherever something touches it, than the scene's.
 
-    It is drawn with a robot; no log of a grasp tells it apart from softness and friction, so no diagnosis looks for it.
+    It is drawn with a robot. A diagnosis looks for its friction alone, as ``contact_friction``: no log of a grasp tells
+    another mass from that.
     """
 
     name = "object_body"

@@ -10,6 +10,7 @@ import numpy as np
 from forcegrasp.effects.base import Effect, Parameter
 from forcegrasp.effects.for_gripper import effects_of
 from forcegrasp.effects.setting import EffectSetting
+from forcegrasp.models.model_file import Fitted, FoundEffect, Model
 from forcegrasp.models.object_body import ObjectBody
 from forcegrasp.models.robot_prior import EFFECTS, FRICTION, GAINS, MASS, NOISE, SHAPE, Prior
 from forcegrasp.physics.gripper import Gripper
@@ -87,13 +88,38 @@ def population(gripper: Gripper, count: int) -> Robots:
 
     Those of even numbers are for development; on those of odd numbers nobody tunes anything.
     """
-    drawn = [draw_robots(gripper, np.random.default_rng([POPULATION, k]), 1) for k in range(count)]
+    drawn = [_robot(gripper, k) for k in range(count)]
     effects = [
         EffectSetting(one.effect, one.variant, np.concatenate([robot.effects[i].values for robot in drawn]))
         for i, one in enumerate(drawn[0].effects)
     ]
     base = {name: np.concatenate([robot.base[name] for robot in drawn]) for name in drawn[0].base}
     return Robots(gripper, tuple(effects), base, np.concatenate([robot.noise for robot in drawn]))
+
+
+def robot_model(gripper: Gripper, number: int) -> Model:
+    """A robot of the :func:`population` as a model whose numbers are certain, to be recorded or trained for alone."""
+    robot = _robot(gripper, number)
+    effects = tuple(
+        FoundEffect(
+            e.effect,
+            e.variant,
+            {p.name: _certain(v, p.unit) for p, v in zip(e.effect.parameters, e.values[0], strict=True)},
+        )
+        for e in robot.effects
+        if _present(e)[0]
+    )
+    base = {name: _certain(values[0], gripper.parameters[name].unit) for name, values in robot.base.items()}
+    position, force = robot.noise[0] * (gripper.training.position_std, gripper.training.force_std_n)
+    return Model(gripper, base, effects=effects, noise=(float(position), float(force)))
+
+
+def _robot(gripper: Gripper, number: int) -> Robots:
+    return draw_robots(gripper, np.random.default_rng([POPULATION, number]), 1)
+
+
+def _certain(value: float, unit: str) -> Fitted:
+    return Fitted(float(value), float(value), float(value), unit)
 
 
 class DrawnRobots:

@@ -257,6 +257,18 @@ def test_swapped_forces_stand_in_each_others_column():
     assert half == pytest.approx(np.repeat((left + right)[:, None] / 2, 2, axis=1), abs=1e-12)
 
 
+def test_contact_friction_multiplies_that_of_the_scene():
+    factors = np.array([0.5, 1.0, 2.0, 4.0])
+    plant = make_plant(4, [(get_effect("contact_friction"), factors[:, None], "", [0, 1, 2, 3])], "reference")
+    start(plant, [0, 1, 2, 3], np.full(4, 0.002))  # towards the right finger, which touches first
+    mu = plant.field("geom_friction")[..., 0]
+    np.testing.assert_allclose(mu, np.outer(factors, mu[1]))
+    np.testing.assert_array_equal(plant.field("geom_friction")[..., 1:], plant.field("geom_friction")[[1] * 4, :, 1:])
+    plant.advance(np.full((4, 2), 0.0255), 500)
+    ways = 0.002 - plant.object_position
+    assert np.all(np.diff(ways) < -1e-5)
+
+
 def test_object_friction_holds_an_off_centre_object():
     def pushed(friction: float) -> tuple[float, float]:
         """How far the object went, and the force on it at the end."""

@@ -78,6 +78,10 @@ class Effect:
         """The servo itself."""
         return servo
 
+    def mu(self, friction: float) -> float:
+        """The object's friction, on the table and on the pads."""
+        return friction
+
     @property
     def drivetrain(self) -> bool:
         """Whether something gives way between motor and pad, so that :meth:`couple` is needed."""

@@ -17,11 +17,17 @@ class PenaltyPlant:
     """Drop-in for :class:`~.scene.MujocoPlant`, with a force ∝ depth^``power`` (MuJoCo's grows with about 3.5)."""
 
     def __init__(
-        self, rho: np.ndarray, radius: np.ndarray, offset: np.ndarray, servo: Servo | None, power: float = 2.5
+        self,
+        rho: np.ndarray,
+        radius: np.ndarray,
+        offset: np.ndarray,
+        servo: Servo | None,
+        power: float = 2.5,
+        friction: float = 1.0,
     ) -> None:
         self._servo, self._radius = servo, radius[:, None]
         self._power, self._sink = power, _SINK * rho[:, None]
-        self._drag = np.interp((rho - 0.003) / 0.007, _KAPPA, _DRAG)
+        self._drag = friction * np.interp((rho - 0.003) / 0.007, _KAPPA, _DRAG)
         self._mass = FINGER_KG + (ROTOR_KG if servo else 0.0)
         self.q, self.v = np.full((len(rho), 2), OPEN_M), np.zeros((len(rho), 2))
         self.o, self.ov = offset.astype(float), np.zeros(len(rho))

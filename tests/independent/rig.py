@@ -31,10 +31,11 @@ POSITION_STD_M, FORCE_STD_N = 2.7e-5, 0.013
 PLANTS: dict[str, Callable] = {
     "mujoco": MujocoPlant,
     "mujoco_multiccd": partial(MujocoPlant, multiccd=True),
-    "mujoco_rubbing": partial(MujocoPlant, friction=4.0),
+    "mujoco_rubbing": MujocoPlant,
     "penalty": PenaltyPlant,
     "hertz": partial(PenaltyPlant, power=1.5),
 }
+_FRICTION = {"mujoco_rubbing": 4.0}
 _COLUMNS = ["grasp", "t_s", "qdes_l_m", "qdes_r_m", "q_l_m", "q_r_m", "f_l_n", "f_r_n"]
 
 
@@ -179,7 +180,9 @@ class _Hand:
         self._drivetrain = drivetrains[0] if drivetrains else None
         self._radius, self._gain = setup.per_grasp("radius")[:, None], setup.per_grasp("f_alpha")[:, None]
         rho = setup.per_grasp("rho")
-        self.plant = PLANTS[contact](rho, self._radius[:, 0], setup.offset, None if self._drivetrain else servo)
+        friction = hooks.chain("mu")(_FRICTION.get(contact, 1.0))
+        motors = None if self._drivetrain else servo
+        self.plant = PLANTS[contact](rho, self._radius[:, 0], setup.offset, motors, friction=friction)
         nothing = np.zeros((n, 2))
         self._motor, self._press = hooks.total("motor", nothing), hooks.total("press", nothing)
         self._table = hooks.total("table", np.zeros(n))

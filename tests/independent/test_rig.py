@@ -137,6 +137,8 @@ def test_symptoms_of_contact_and_object() -> None:
     assert np.min(plain.f) >= 0
     pushed = abs(rig().o[1, EASE] - OFFSET)
     assert abs(rig("object_friction", level=0.05).o[1, EASE] - OFFSET) < pushed - 1e-4
+    slid = [abs(rig("contact_friction", share=share).o[1, EASE] - OFFSET) for share in (0.5, 2.0)]
+    assert slid[0] > pushed + 1e-4 > pushed - 1e-4 > slid[1]
 
 
 def test_symptoms_of_the_sensors() -> None:

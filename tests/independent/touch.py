@@ -53,6 +53,16 @@ class Adhesion(Effect):
 
 
 @dataclass
+class ContactFriction(Effect):
+    """Objects that slide more easily, or less, wherever they are touched."""
+
+    share: float = 1.0
+
+    def mu(self, friction):
+        return self.share * friction
+
+
+@dataclass
 class ObjectFriction(Effect):
     """Dry friction under the object, besides the floor's drag; acts at its middle, so it does not tip."""
 

@@ -12,15 +12,19 @@ from forcegrasp.effects import catalogue
 from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.env import build_env
 from forcegrasp.errors import ConfigError
+from forcegrasp.models.model_file import read_model, write_model
 from forcegrasp.models.object_body import ObjectBody
 from forcegrasp.models.robot_prior import EFFECTS
-from forcegrasp.models.robots import DrawnRobots, FixedRobots, Robots, draw_robots, population
+from forcegrasp.models.robots import DrawnRobots, FixedRobots, Robots, draw_robots, population, robot_model
+from forcegrasp.models.variation import ModelVariation
 from forcegrasp.physics import GraspSimulator, default_gripper, load_gripper, shipped_grippers
 
 ROWS = np.arange(6)
 
 
-def forces(robots: DrawnRobots | FixedRobots, n: int = 6, ids: np.ndarray = ROWS, steps: int = 40) -> np.ndarray:
+def forces(
+    robots: DrawnRobots | FixedRobots | ModelVariation, n: int = 6, ids: np.ndarray = ROWS, steps: int = 40
+) -> np.ndarray:
     """Readings of a grasp that closes for a while, ``(steps, n, channels)``."""
     simulator = GraspSimulator(n, "fast", 1, robots, default_gripper())
     simulator.reset(simulator.parameters[ids], ids, np.random.default_rng(5))
@@ -46,9 +50,24 @@ def test_a_number_is_always_the_same_robot():
     assert many[np.array([4])].base["position_gain"] == many.base["position_gain"][4]
 
 
+def test_a_robots_model_is_the_robot(tmp_path):
+    gripper, number = default_gripper(), 7
+    written = robot_model(gripper, number)
+    write_model(written, tmp_path / "robot.yaml")
+    read = read_model(tmp_path / "robot.yaml")
+    robots = population(gripper, number + 1)[np.array([number])]
+    known = [e for e in robots.effects if (e.values != e.effect.null_values()).any()]
+    for found, drawn in zip(read.effects, known, strict=True):
+        assert found.variant == drawn.variant
+        np.testing.assert_allclose(found.values, drawn.values[0], rtol=1e-6)
+    same = np.array([0])
+    one, other = (forces(v, 1, same) for v in (FixedRobots(robots), ModelVariation(read)))
+    np.testing.assert_allclose(one, other, atol=1e-6)
+
+
 def test_every_effect_of_a_robot_has_a_prior():
     robots = {n for n, e in catalogue().items() if not (e.of_set or e.servo_only)}
-    assert set(EFFECTS) == (robots - {"smooth_friction"}) | {ObjectBody.name}
+    assert set(EFFECTS) == (robots - {"smooth_friction", "contact_friction"}) | {ObjectBody.name}
     assert all(0 < p.chance <= 1 and 0 < p.low <= p.high and p.why for p in EFFECTS.values())
 
 
