@@ -7,7 +7,12 @@ from forcegrasp.errors import ConfigError
 
 NOTES = """
 Looks at Python and packages, at the physics (a grasp of each gripper that comes with the package), the renderer of
-videos, cores, memory, disk, and at variables of the environment. A line each:
+videos, cores, memory, disk, and at variables of the environment; or at a gripper alone:
+
+  gripper=GRIPPER   what its description says, by name or path, how it grasps in its scene, and whether its sensors
+                    feel that
+
+A line each:
 
   fine      as it should be
   note      good to know
@@ -20,12 +25,14 @@ Exit status: 0, or 1 if something must be mended.
 
 def run(arguments: list[str]) -> int:
     """Runs the verb; returns the exit status."""
-    if arguments:
-        raise ConfigError(f"doctor takes no options, not {' '.join(arguments)!r}; see forcegrasp doctor --help")
+    key, equals, name = (arguments or [""])[0].partition("=")
+    if len(arguments) > 1 or (arguments and not (key == "gripper" and equals and name)):
+        raise ConfigError(f"doctor takes gripper=NAME, not {' '.join(arguments)!r}; see forcegrasp doctor --help")
     from forcegrasp.doctor import examine
+    from forcegrasp.doctor.gripper import check_gripper
 
     levels = []
-    for finding in examine():
+    for finding in examine([lambda: check_gripper(name)]) if name else examine():
         print(finding.line(), flush=True)
         levels.append(finding.level)
     bad, odd = levels.count("mend"), levels.count("warning")
@@ -36,9 +43,9 @@ def run(arguments: list[str]) -> int:
 
 VERB = Verb(
     "doctor",
-    "check this installation and say what to do where something is wrong",
+    "check this installation, or a gripper, and say what to do where something is wrong",
     run=run,
     notes=NOTES,
-    usage="[--help]",
+    usage="[gripper=GRIPPER]",
     needs_mujoco=False,
 )

@@ -1,0 +1,156 @@
+"""Is a gripper's description what its author meant? What follows from it, and what a grasp in its scene shows."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from forcegrasp.doctor.finding import Finding, fine, mend, note, warning
+from forcegrasp.errors import ConfigError, PhysicsError
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from forcegrasp.physics import Gripper
+    from forcegrasp.physics.plant import Plant
+
+# Two simulations of the same scene that differ by more than so many times the noise hide smaller effects.
+_NOISE = 0.5
+# Share by which a reading may differ from what presses: the paper's sensors add tangential forces, 2 % here.
+_MISSED = 0.1
+_PAGE = "see docs/your-gripper.md"
+
+
+def check_gripper(name: str) -> Iterator[Finding]:
+    """What a description says, in the user's units, and how it grasps.
+
+    Args:
+      name: of a gripper that comes with the package, or the path of a description.
+    """
+    from forcegrasp.physics import load_gripper
+
+    try:
+        gripper = load_gripper(name)
+    except ConfigError as error:
+        yield mend("description", str(error), _PAGE)
+        return
+    yield fine("description", f"{gripper.name}, {gripper.path}")
+    yield from _motors(gripper)
+    columns = [channel.column for channel in (*gripper.positions, *gripper.commands, *gripper.forces)]
+    yield fine("columns", f"of a set's samples: {', '.join(columns)}")
+    if gripper.is_servo:
+        return
+    yield from _sizes(gripper)
+    try:
+        yield from _grasp(gripper)
+    except PhysicsError as error:
+        yield mend("grasp", f"can't be simulated ({error})", "look at masses, gains and the time step of the scene")
+
+
+def _motors(gripper: Gripper) -> Iterator[Finding]:
+    import numpy as np
+
+    unit, count = gripper.unit, len(gripper.motors)
+    told = f"{count}, {gripper.stroke:g} {unit} from closed to open; a command every {1e3 * gripper.period_s:g} ms"
+    if gripper.is_servo:
+        yield fine("motors", told)
+        return
+    steps = gripper.stroke / gripper.max_step
+    told += f", {gripper.max_step:g} {unit} at most, so that it closes in {steps * gripper.period_s:.2g} s"
+    yield fine("motors", told)
+    closed, opened = np.round(1e3 * gripper.opening.opening_at(np.array([0.0, gripper.stroke])), 1) + 0.0
+    yield fine("opening", f"{opened:.1f} mm between the pads when open, and {closed:.1f} mm when closed")
+
+
+def _sizes(gripper: Gripper) -> Iterator[Finding]:
+    training, (small, large) = gripper.training, gripper.training.radius_m
+    if not gripper.forces:
+        yield note("forces", "none are read: positions alone are compared, and no policy can be trained")
+    else:
+        told = f"up to {training.max_force_n:.3g} N from the largest command step; noise {training.force_std_n:.2g} N"
+        yield fine("forces", f"{told}, contact above {training.contact_threshold_n:.2g} N")
+    soft = "" if training.softness else "; all as soft as the scene's, as training.softness is not there"
+    yield fine("objects", f"radii of {1e3 * small:.3g} to {1e3 * large:.3g} mm are trained on{soft}")
+
+
+def _grasp(gripper: Gripper) -> Iterator[Finding]:
+    """Closes on an object in the middle and presses: who touches, and what sensors say of it."""
+    import numpy as np
+
+    from forcegrasp.physics.plant import Plant
+
+    plant = Plant(gripper, 1, threads=1)
+    place, force = _pressed(gripper, plant)
+    radius = 1e3 * gripper.parameters["radius_m"].nominal
+    pressed = _normal_forces(gripper, plant)
+    untouched = [side for (side, _), newtons in zip(gripper.sides, pressed, strict=True) if not newtons > 0]
+    if untouched:
+        told = f"the {' and the '.join(untouched)} side does not touch an object of {radius:.3g} mm radius"
+        yield mend("grasp", told, f"look where pads and object stand, and which way the joints close; {_PAGE}")
+        return
+    forces = " and ".join(f"{newtons:.3g}" for newtons in pressed)
+    yield fine("grasp", f"an object of {radius:.3g} mm radius is pressed with {forces} N by full steps for 5 s")
+    if gripper.force == "sensors":
+        yield from _sensors(gripper, pressed, force[-1])
+    noise = np.array([gripper.training.position_std] * place.shape[1] + [gripper.training.force_std_n] * force.shape[1])
+    other = np.concatenate(_pressed(gripper, Plant(gripper, 1, threads=1, other_collisions=True)), axis=1)
+    differs = np.sqrt(np.mean(((other - np.concatenate([place, force], axis=1)) / noise) ** 2))
+    if differs > _NOISE:
+        told = f"MuJoCo's two collision codes give grasps that are {differs:.2g} × the noise apart"
+        yield warning("contacts", told, f"round the pads, or let them touch in one point; {_PAGE}")
+    else:
+        yield fine("contacts", f"both of MuJoCo's collision codes give the same grasp, to {differs:.2g} × the noise")
+
+
+def _sensors(gripper: Gripper, pressed: np.ndarray, read: np.ndarray) -> Iterator[Finding]:
+    """Whether sensors feel what presses."""
+    with_sensor = [index for index, (_, finger) in enumerate(gripper.sides) if finger.force_sensor]
+    for index, newtons in zip(with_sensor, read, strict=True):
+        side = gripper.sides[index][0]
+        told = f"the {side} one reads {newtons:.3g} N where {pressed[index]:.3g} N press"
+        if abs(newtons - pressed[index]) > _MISSED * pressed[index]:
+            yield warning("sensors", told, f"look at its site or bodies, and its sign; {_PAGE}")
+        else:
+            yield fine("sensors", told)
+
+
+def _pressed(gripper: Gripper, plant: Plant) -> tuple[np.ndarray, np.ndarray]:
+    """Closes by full steps; positions ``(steps, motors)`` and what is read of forces ``(steps, channels)``."""
+    import numpy as np
+
+    from forcegrasp.physics.plant import write_base
+
+    rows, steps = np.arange(1), max(1, round(gripper.period_s / plant.dt))
+    middle = {"offset_m": np.zeros(1)}
+    plant.reset(rows, write_base(plant, rows, middle))
+    place, force = [], []
+    for _ in range(round(5 / gripper.period_s)):
+        command = np.clip(plant.measured_position - gripper.max_step, 0, gripper.stroke)
+        plant.advance(command, steps)
+        place.append(plant.measured_position[0].copy())
+        force.append(plant.measured_force[0].copy())
+    if plant.warnings().any():
+        raise PhysicsError("it diverged")
+    return np.array(place), np.array(force)
+
+
+def _normal_forces(gripper: Gripper, plant: Plant) -> np.ndarray:
+    """What each side presses with as the engine has it, whatever sensors say, newtons, ``(2,)``."""
+    import mujoco
+    import numpy as np
+
+    model, data = plant.batch.get_model(0), plant.batch.get_data(0)
+    mujoco.mj_forward(model, data)
+    bodies, found, of_contact = [model.body(finger.body).id for finger in gripper.fingers], np.zeros(2), np.zeros(6)
+    for index, contact in enumerate(data.contact):
+        geoms = set(contact.geom.tolist())
+        if not geoms & set(plant.object_geoms.tolist()):
+            continue
+        mujoco.mj_contactForce(model, data, index, of_contact)
+        for geom in geoms - set(plant.object_geoms.tolist()):
+            body = model.geom_bodyid[geom]
+            while body and body not in bodies:
+                body = model.body_parentid[body]
+            if body in bodies:
+                found[bodies.index(body)] += of_contact[0]
+    return found

@@ -1,0 +1,89 @@
+"""What the doctor says of a gripper: what follows from its description, and what is wrong with its scene."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from forcegrasp.cli.main import main
+from forcegrasp.doctor.gripper import check_gripper
+from forcegrasp.physics import shipped_grippers
+from forcegrasp.physics.plant import Plant
+
+SECOND = Path(__file__).parents[1] / "grippers"
+Changed = Callable[..., str]
+
+
+@pytest.fixture
+def changed(tmp_path) -> Changed:
+    """``changed(xml={old: new}, yaml={...})``: path of a gripper of two slides with other lines."""
+
+    def write(**changes: dict[str, str]) -> str:
+        for kind in ("xml", "yaml"):
+            text = (SECOND / f"second.{kind}").read_text("utf-8")
+            for old, new in changes.get(kind, {}).items():
+                assert old in text
+                text = text.replace(old, new)
+            (tmp_path / f"second.{kind}").write_text(text, "utf-8")
+        return str(tmp_path / "second.yaml")
+
+    return write
+
+
+def said(name: str) -> dict[str, list[str]]:
+    """Level → lines."""
+    found: dict[str, list[str]] = {}
+    for finding in check_gripper(name):
+        found.setdefault(finding.level, []).append(finding.line())
+    return found
+
+
+@pytest.mark.parametrize("name", [*shipped_grippers(), "so101_jaw", str(SECOND / "second.yaml")])
+def test_grippers_that_work_are_fine(name):
+    assert list(said(name)) == ["fine"]
+
+
+def test_what_follows_from_the_description_is_told_in_users_units():
+    lines = " ".join(said("robotiq_2f85")["fine"])
+    for told in ("85.0 mm between the pads when open", "0.8 rad", "q_rad, qdes_rad, f_l_n, f_r_n", "7.21 and 7.21 N"):
+        assert told in lines
+
+
+def test_a_description_that_is_refused_is_told_in_a_line(changed):
+    (line,) = said(changed(yaml={"geom: thing": "geom: thong"}))["mend"]
+    assert "thong" in line
+
+
+def test_a_side_that_does_not_touch(changed):
+    (line,) = said(changed(xml={'pos="0.354 0 0.1"': 'pos="0.354 0.5 0.1"'}))["mend"]
+    assert "the right side does not touch an object of 20 mm radius" in line
+
+
+def test_a_sensor_that_does_not_feel_what_presses(changed):
+    (line,) = said(changed(xml={'<site name="east"': '<site name="east" size="0.001 0.001 0.001"'}))["warning"]
+    assert "the right one reads 0 N where 0.833 N press" in line
+
+
+def test_contacts_that_depend_on_the_collision_code(changed):
+    round_object = {'type="box" size="0.02 0.03 0.03"': 'type="cylinder" size="0.02 0.03"'}
+    (line,) = said(changed(xml=round_object))["warning"]
+    assert "× the noise apart" in line
+
+
+def test_a_scene_that_diverges(changed, monkeypatch):
+    monkeypatch.setattr(Plant, "warnings", lambda plant: np.ones((plant.n, 1), int))
+    (line,) = said(changed())["mend"]
+    assert "can't be simulated" in line
+
+
+def test_a_gripper_is_asked_for_by_an_option(capsys):
+    assert main(["doctor", "gripper=franka_hand"]) == 0
+    out = capsys.readouterr().out
+    assert "80.0 mm between the pads" in out
+    assert "python" not in out.lower()
+    assert main(["doctor", "gripper=no_such_hand"]) == 1
+    for wrong in (["gripper="], ["gripper"], ["gripper=tiago", "gripper=tiago"]):
+        assert main(["doctor", *wrong]) == 2
