@@ -50,7 +50,7 @@ def loop(tmp_path_factory) -> SimpleNamespace:
     folder = tmp_path_factory.mktemp("loop")
     printed = {}
     printed["record"] = run(folder, "record", "out=my_set", "grasps=6", "objects=1", "effects=[force_bias]")
-    shorten(folder / "my_set", 3.6)
+    shorten(folder / "my_set", 2.8)
     with pytest.MonkeyPatch.context() as patch:
         fit_each_set_once(patch)
         printed["fit"] = run(folder, "fit", "data=my_set", "out=model.yaml")

@@ -34,7 +34,7 @@ MORE = {
     "train": ["ppo.total_frames=240", "ppo.grasps=8", "grasp.steps=30", "log.video_every=0", "log.figures_every=0"],
     "evaluate": ["trials=2", "kappas=1", "physics=fast", "grasp.steps=30"],
 }
-SECONDS = 3.0
+SECONDS = 2.4
 
 
 PAGE = "docs/compare-your-data.md"
