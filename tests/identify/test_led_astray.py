@@ -48,6 +48,15 @@ def test_where_one_grasp_holds_most_of_the_error_the_others_come_first(made_up, 
     assert fit.cost == (0.0 if len(fitted) == 2 else astray.cost)
 
 
+def test_where_one_object_holds_most_of_the_error_the_others_come_first(made_up, past_few):
+    objects = np.array([grasp.object for grasp in made_up.target.grasps])
+    own = objects == objects[-1]
+    assert 2 < own.sum() < len(own)
+    fit, asked = past_few(leaving(made_up, np.where(own, 20.0, 1.0)), 1.0)
+    assert asked == [len(own) - own.sum(), len(own)]
+    assert fit.cost == 0
+
+
 def test_where_all_grasps_hold_some_none_is_left_out(made_up, past_few):
     alike = leaving(made_up, np.full(8, 50.0))
     assert past_few(alike, 0.0) == (alike, [])
