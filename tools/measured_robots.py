@@ -134,22 +134,25 @@ def report(out: Path, page: Path = PAGE) -> None:
 def draw(rows: Sequence[Row], picture: Path) -> None:
     """Draws each robot's rewards above one another."""
     import matplotlib.pyplot as plt
+    import numpy as np
 
     from forcegrasp.evaluate.colours import policy_colours
 
     figure, axes = plt.subplots(figsize=(8, 3.6), layout="constrained")
     colours = policy_colours(_WHO)
     called = {RETRAINED: "retrained with what was found", PERFECT: "retrained with all that is hidden"}
-    places = range(len(rows))
-    axes.plot(places, [row["simulator"] for row in rows], "k--", lw=1, label="ib in the training simulator")
-    for name in _WHO:
+    places = np.arange(len(rows))
+    in_simulator = [row["simulator"] for row in rows]
+    axes.plot(places, in_simulator, "_k", ms=60, label="ib in the training simulator")
+    for beside, name in zip(np.linspace(-0.2, 0.2, len(_WHO)), _WHO, strict=True):
         marker = {RETRAINED: "o", PERFECT: "_"}.get(name, ".")
         rewards = [row[name] for row in rows]
-        axes.plot(places, rewards, marker, ms=9, mew=2, color=colours[name], label=called.get(name, name))
+        axes.plot(places + beside, rewards, marker, ms=9, mew=2, color=colours[name], label=called.get(name, name))
+    axes.set_xlim(-0.5, len(rows) - 0.5)
     axes.set_xticks(places, [str(row["robot"]) for row in rows])
     axes.set(xlabel="robot", ylabel="force reward of 150, measured forces")
     axes.grid(axis="y", alpha=0.3)
-    figure.legend(loc="outside upper center", ncols=3, frameon=False)
+    figure.legend(loc="outside upper center", ncols=3, frameon=False, markerscale=0.6)
     picture.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(picture, dpi=110)
     plt.close(figure)
