@@ -111,7 +111,8 @@ def test_typical_size_changes_what_it_should(plain, typical, name, variant):
     seen = typical[0, :, 1 + VARIANTS.index((name, variant))]
     assert np.isfinite(seen).all()
     change = np.abs(seen - plain).max(axis=0)
-    assert change[:4].max() > 1e-4, "nothing to be read of it"
+    slides_on_a_rail = name == "contact_friction"  # pads press it, and nothing rubs along it
+    assert (change[:4].max() > 1e-4) != slides_on_a_rail, "nothing to be read of it"
     if catalogue()[name].reads_only(variant):
         assert (change[4:] == 0).all(), "a sensor moved something"
 
