@@ -88,8 +88,6 @@ def judged(folder: Path) -> Row:
     home, away = home["policies"], away["policies"]
     hidden = {"contact_friction" if e.effect is ObjectBody else e.effect.name for e in robot.effects}
     named = {e.effect.name for e in found.effects}
-    rewards = {name: away[name][_REWARD]["mean"] for name in _WHO}
-    lost = home["ib"][_REWARD]["mean"] - rewards["ib"]
     return {
         "robot": int(folder.name.partition("_")[2]),
         "hidden": len(hidden),
@@ -98,25 +96,29 @@ def judged(folder: Path) -> Row:
         "before": diagnosis["error_before"] / diagnosis["floor"],
         "after": diagnosis["error_after"] / diagnosis["floor"],
         "simulator": home["ib"][_REWARD]["mean"],
-        **rewards,
-        "gained": (rewards[RETRAINED] - rewards["ib"]) / lost,
+        **{name: away[name][_REWARD]["mean"] for name in _WHO},
     }
 
 
 def table(rows: Sequence[Row]) -> list[str]:
     """Lines of the table: a row for each robot, and their mean."""
+    from tools.results import tables
+
+    def rewards(of: Row) -> list[str]:
+        """And the share of what ``ib`` loses that retraining gains back."""
+        gained = (of[RETRAINED] - of["ib"]) / (of["simulator"] - of["ib"])
+        return [*(f"{of[name]:.1f}" for name in ("simulator", *_WHO)), f"{100 * gained:.0f} %"]
+
     heads = ["robot", "effects found", "besides", "error ÷ floor", "`ib` in the simulator", *(f"`{n}`" for n in OTHERS)]
     heads += ["retrained with what was found", "with all that is hidden", "gained back"]
-    lines = [_line(heads), "|---" * len(heads) + "|"]
+    lines = []
     for row in rows:
         besides = ", ".join(f"`{name}`" for name in row["others"])
         errors = f"{row['before']:.1f} → {row['after']:.2f}"
-        rewards = [f"{row[name]:.1f}" for name in ("simulator", *_WHO)]
         found = f"{row['found']} of {row['hidden']}"
-        lines.append(_line([str(row["robot"]), found, besides, errors, *rewards, f"{100 * row['gained']:.0f} %"]))
+        lines.append([str(row["robot"]), found, besides, errors, *rewards(row)])
     means = {name: sum(row[name] for row in rows) / len(rows) for name in ("simulator", *_WHO)}
-    gained = (means[RETRAINED] - means["ib"]) / (means["simulator"] - means["ib"])
-    return [*lines, _line(["mean", "", "", "", *(f"{v:.1f}" for v in means.values()), f"{100 * gained:.0f} %"])]
+    return tables.table(heads, [*lines, ["mean", "", "", "", *rewards(means)]]).splitlines()
 
 
 def report(out: Path, page: Path = PAGE) -> None:
@@ -156,10 +158,6 @@ def draw(rows: Sequence[Row], picture: Path) -> None:
     picture.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(picture, dpi=110)
     plt.close(figure)
-
-
-def _line(cells: Sequence[str]) -> str:
-    return f"| {' | '.join(cells)} |".replace("|  |", "| |")
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -25,8 +25,8 @@ Exit status: 0, or 1 if something must be mended.
 
 def run(arguments: list[str]) -> int:
     """Runs the verb; returns the exit status."""
-    key, equals, name = (arguments or [""])[0].partition("=")
-    if len(arguments) > 1 or (arguments and not (key == "gripper" and equals and name)):
+    key, _, name = (arguments or [""])[0].partition("=")
+    if arguments and (len(arguments) > 1 or key != "gripper" or not name):
         raise ConfigError(f"doctor takes gripper=NAME, not {' '.join(arguments)!r}; see forcegrasp doctor --help")
     from forcegrasp.doctor import examine
     from forcegrasp.doctor.gripper import check_gripper

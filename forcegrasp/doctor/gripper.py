@@ -118,11 +118,8 @@ def _pressed(gripper: Gripper, plant: Plant) -> tuple[np.ndarray, np.ndarray]:
     """Closes by full steps; positions ``(steps, motors)`` and what is read of forces ``(steps, channels)``."""
     import numpy as np
 
-    from forcegrasp.physics.plant import write_base
-
-    rows, steps = np.arange(1), max(1, round(gripper.period_s / plant.dt))
-    middle = {"offset_m": np.zeros(1)}
-    plant.reset(rows, write_base(plant, rows, middle))
+    steps = max(1, round(gripper.period_s / plant.dt))
+    plant.reset(np.arange(1), offset_m=np.zeros(1))
     place, force = [], []
     for _ in range(round(5 / gripper.period_s)):
         command = np.clip(plant.measured_position - gripper.max_step, 0, gripper.stroke)

@@ -37,13 +37,14 @@ def fit_past_few(fit: Fit, target: Target, simulators: Simulators) -> Fit:
 
 
 def _once(fit: Fit, target: Target, simulators: Simulators) -> Fit:
-    others = _others(fit, target)
-    if not len(others):
+    left_out = _astray(fit, target)
+    others = np.setdiff1d(np.arange(len(target.grasps)), left_out)
+    if not (len(left_out) and len(others)):
         return fit
     part = fit.subset(others)
     of_others = Simulators(part.problem, exact=simulators.one_model)
     alone = fit_exactly(target.subset(others), part.problem, of_others, part.vector)
-    start = _own_anew(fit, np.setdiff1d(np.arange(len(target.grasps)), others), alone, target, simulators)
+    start = _own_anew(fit, left_out, alone, target, simulators)
     residual = target.residual(predict(simulators.exact, [fit.problem.case(start)])[0])
     if np.sum((fit.weight * residual) ** 2) >= fit.cost:
         return fit
@@ -62,16 +63,13 @@ def _own_anew(fit: Fit, left_out: np.ndarray, alone: Fit, target: Target, simula
     return led.moved(own.problem, fit_once(target.subset(left_out), own.problem, of_own, own.vector, free=free).vector)
 
 
-def _others(fit: Fit, target: Target) -> np.ndarray:
-    """Indices of the grasps without the few, or those of one object, that hold most of what is beyond the noise.
-
-    None if no few do.
-    """
+def _astray(fit: Fit, target: Target) -> np.ndarray:
+    """Indices of the few grasps, or of an object's, that hold most of what is beyond the noise; none if none do."""
     squares = np.sum((fit.weight * fit.residual) ** 2 - (fit.weight * target.mask[..., None]) ** 2, axis=(1, 2))
     few = np.argsort(-squares)[: max(1, int(_FEW * len(squares)))]
     objects = np.array([grasp.object for grasp in target.grasps])
     of_objects = [np.flatnonzero(objects == name) for name in target.objects]
     for some in (few, max(of_objects, key=lambda own: squares[own].sum())):
         if squares[some].sum() >= _MOST * squares.sum() > 0:
-            return np.setdiff1d(np.arange(len(squares)), some)
+            return some
     return np.empty(0, int)

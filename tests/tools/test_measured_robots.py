@@ -59,14 +59,14 @@ def test_every_command_is_one_that_the_verbs_take(tmp_path, monkeypatch):
 
 def row(**values) -> dict:
     rewards = {"simulator": 115.0, "ib": 75.0, "catalogue": 80.0, "force_pi": 70.0, "retrained": 95.0, "perfect": 100.0}
-    found = {"robot": 7, "hidden": 9, "found": 6, "others": [], "before": 9.0, "after": 1.2, "gained": 0.5}
+    found = {"robot": 7, "hidden": 9, "found": 6, "others": [], "before": 9.0, "after": 1.2}
     return found | rewards | values
 
 
 def test_the_table_has_a_row_for_each_robot_and_their_mean(tmp_path, monkeypatch):
     page = tmp_path / "robots.md"
     page.write_text(f"before\n{measured_robots.BEGIN}\nold\n{measured_robots.END}\nafter\n")
-    rows = {7: row(), 9: row(robot=9, retrained=105.0, gained=0.75, others=["stiction"])}
+    rows = {7: row(), 9: row(robot=9, retrained=105.0, others=["stiction"])}
     for number in (9, 7):
         (tmp_path / f"robot_{number}" / "robot").mkdir(parents=True)
         (tmp_path / f"robot_{number}" / "robot" / "evaluation.json").touch()
