@@ -94,7 +94,10 @@ def _grasp(gripper: Gripper) -> Iterator[Finding]:
         yield from _sensors(gripper, pressed, force[-1])
     noise = np.array([gripper.training.position_std] * place.shape[1] + [gripper.training.force_std_n] * force.shape[1])
     other = np.concatenate(_pressed(gripper, Plant(gripper, 1, threads=1, other_collisions=True)), axis=1)
-    differs = np.sqrt(np.mean(((other - np.concatenate([place, force], axis=1)) / noise) ** 2))
+    if not noise.any():
+        return  # nothing to hold differences against
+    apart = (other - np.concatenate([place, force], axis=1))[:, noise > 0]
+    differs = np.sqrt(np.mean((apart / noise[noise > 0]) ** 2))
     if differs > _NOISE:
         told = f"MuJoCo's two collision codes give grasps that are {differs:.2g} × the noise apart"
         yield warning("contacts", told, f"round the pads, or let them touch in one point; {_PAGE}")

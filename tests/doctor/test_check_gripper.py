@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
 from pathlib import Path
 
@@ -10,7 +11,7 @@ import pytest
 
 from forcegrasp.cli.main import main
 from forcegrasp.doctor.gripper import check_gripper
-from forcegrasp.physics import shipped_grippers
+from forcegrasp.physics import load_gripper, shipped_grippers
 from forcegrasp.physics.plant import Plant
 
 SECOND = Path(__file__).parents[1] / "grippers"
@@ -71,6 +72,16 @@ def test_contacts_that_depend_on_the_collision_code(changed):
     round_object = {'type="box" size="0.02 0.03 0.03"': 'type="cylinder" size="0.02 0.03"'}
     (line,) = said(changed(xml=round_object))["warning"]
     assert "× the noise apart" in line
+
+
+@pytest.mark.parametrize(("force_std_n", "compared"), [(0.1, True), (0.0, False)])
+def test_readings_without_noise_are_no_yardstick(force_std_n, compared, monkeypatch):
+    hand = load_gripper("franka_hand")
+    training = dataclasses.replace(hand.training, position_std=0.0, force_std_n=force_std_n)
+    monkeypatch.setattr("forcegrasp.physics.load_gripper", lambda name: dataclasses.replace(hand, training=training))
+    lines = " ".join(said("franka_hand")["fine"])
+    assert ("collision codes" in lines) == compared
+    assert "nan" not in lines
 
 
 def test_a_scene_that_diverges(changed, monkeypatch):
