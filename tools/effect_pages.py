@@ -94,6 +94,7 @@ _PLANS = {
     ),
     "readout_skew": _STEPS,
     "elastic_transmission": Show("steps of a servo's jaw", ()),
+    "velocity_lag": Show("steps of a servo's jaw", ()),
     "force_limit": Show(
         "squeezes of growing strength, as fast steps",
         ((23.8, JUMP, 0.5), (22.5, JUMP, 0.5), (21, JUMP, 0.6), (19, JUMP, 0.6), (26, JUMP, 0.4)),

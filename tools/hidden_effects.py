@@ -40,7 +40,7 @@ PAIRS = (
 OF_SERVOS = (
     "coulomb_friction", "stiction", "load_friction", "presliding", "direction_friction", "position_deadband",
     "back_emf", "motor_offset", "swinging_load", "readout_skew", "command_delay", "rate_limit", "actuator_lag",
-    "smooth_friction",
+    "smooth_friction", "stale_velocity",
 )  # fmt: skip
 PAIRS_OF_SERVOS = (
     ("coulomb_friction", "motor_offset"),

@@ -51,6 +51,14 @@ def is_significant(candidate: Candidate, least_gain: float, least_share: float =
     )
 
 
+def may_be_besides(steps: Sequence[Step]) -> Candidate | None:
+    """What a search ended with, if noise would hardly do as well: too little of what is left to be an answer."""
+    if not steps or steps[-1].effects or not steps[-1].candidates:
+        return None
+    best = steps[-1].candidates[0]
+    return best if not best.replaces and is_significant(best, 0.0, LEAST_SHARE_OF_MANY) else None
+
+
 def place(candidate: Candidate, least_gain: float) -> tuple[bool, float]:
     """What candidates are ordered by: a true effect that explains too little yet must not hide one that does."""
     return not is_significant(candidate, least_gain), -candidate.heldout_gain

@@ -92,6 +92,7 @@ class Effect:
     needs_object: ClassVar[bool] = False  #: shows only where fingers press on something
     servo_only: ClassVar[bool] = False  #: of drives alone; where fingers grasp, another effect has its part
     needs_position_loop: ClassVar[bool] = False  #: has no meaning where efforts are commanded
+    needs_velocity_gain: ClassVar[bool] = False  #: has no meaning where servos do not act on their velocity
     base_parameter: ClassVar[str] = ""  #: one that says the same; where a gripper has it, the effect is left out
     least_channels: ClassVar[int] = 0  #: force readings that the gripper must have for it to make a difference
     # of the gripper, see for_gripper

@@ -53,6 +53,8 @@ def why_left_out(effect: type[Effect], gripper: Gripper) -> str:
         return f"is one of servos alone; {gripper.name} has fingers"
     if effect.needs_position_loop and gripper.command != "position":
         return f"needs positions that are commanded; of {gripper.name} it is the effort"
+    if effect.needs_velocity_gain and not gripper.has_velocity_gain:
+        return f"needs servos that act on their velocity; those of {gripper.name} have no `kv`"
     if effect.base_parameter in gripper.parameters:
         return f"is the base parameter {effect.base_parameter} of {gripper.name}"
     if effect.least_channels > len(gripper.forces):

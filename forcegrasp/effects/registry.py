@@ -50,6 +50,7 @@ _SHIPPED = (
     "stiction",
     "stiffening_contact",
     "swapped_forces",
+    "velocity_lag",
     "viscoelastic_contact",
 )
 

@@ -199,6 +199,14 @@ class Gripper(ShortRepr):
         """
         return _STALL * self.max_step if self.force == "motor" else math.inf
 
+    @functools.cached_property
+    def has_velocity_gain(self) -> bool:
+        """Whether its servos act on their velocity: MuJoCo's `kv`, in the scene or as a base parameter."""
+        written = [(w.field, w.column) for p in self.parameters.values() for w in p.writes]
+        model = self.compile()
+        gains = [model.actuator(motor.actuator).biasprm[2] for motor in self.motors]
+        return ("actuator_biasprm", 2) in written or any(gains)
+
     @property
     def shape(self) -> str:
         """What the scene's object is: "cylinder", "sphere" or "box"; empty of a mechanism that grasps nothing."""

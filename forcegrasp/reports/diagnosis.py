@@ -30,6 +30,7 @@ from forcegrasp.reports.comparison import (
     worst_cell,
 )
 from forcegrasp.reports.diagnosis_words import (
+    besides_sentence,
     fault_words,
     lacks,
     left_sentence,
@@ -212,8 +213,7 @@ def lines(diagnosis: Diagnosis, advice: Advice | None) -> list[str]:
         text.append(row)
     if diagnosis.verdict is Verdict.UNKNOWN or diagnosis.verdict.names_effects:
         text.append(left_sentence(diagnosis))
-    if each := recordings_sentence(diagnosis):
-        text.append(each)
+    text += [more for more in (besides_sentence(diagnosis), recordings_sentence(diagnosis)) if more]
     if diagnosis.law is not None:
         text.append(law_words(diagnosis.law))
     elif diagnosis.law_sought and diagnosis.left:

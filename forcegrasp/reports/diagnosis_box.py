@@ -10,6 +10,7 @@ from forcegrasp.identify.intervals import listed
 from forcegrasp.identify.verdict import Verdict
 from forcegrasp.reports.diagnosis import answer
 from forcegrasp.reports.diagnosis_words import (
+    besides_sentence,
     fault_words,
     is_not_all,
     lacks,
@@ -47,6 +48,7 @@ def answer_box(diagnosis: Diagnosis, advice: Advice | None, commands: Sequence[C
         ("How sure", certainty(d)),
         ("Runner-up", runner_up(d) if d.verdict.lacks_effects else ""),
         ("What is left", f"{left[0].upper()}{left[1:]}." if found or d.verdict is Verdict.UNKNOWN else ""),
+        ("Perhaps", f"{more}." if (more := besides_sentence(d)) else ""),
         ("A law", f"{law_words(d.law)}." if d.law is not None else ""),
         ("Noise", noise_words(d) if found else ""),
         ("Look first at", f"{odd_words(d)}." if d.odd and d.steps else ""),

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from forcegrasp.diagnosis.evidence import may_be_besides
 from forcegrasp.diagnosis.faults import Fault
-from forcegrasp.diagnosis.result import Diagnosis, Step, kept_steps
+from forcegrasp.diagnosis.result import Candidate, Diagnosis, Step, kept_steps
 from forcegrasp.diagnosis.verdict import EXPLAINED_FAR, MUCH
 from forcegrasp.effects.for_gripper import effect_of
 from forcegrasp.identify.cross_validation import heldout_residual, rms_of_recordings
@@ -144,6 +145,24 @@ def is_not_all(diagnosis: Diagnosis) -> bool:
     """Whether the effects that were found leave so much that more must be missing."""
     d = diagnosis
     return bool(d.left) and (d.error_after > MUCH * d.floor or d.explained < EXPLAINED_FAR)
+
+
+def besides(diagnosis: Diagnosis) -> Candidate | None:
+    """An effect that may be there besides those that were found, where much is left."""
+    found = diagnosis.verdict.names_effects and is_not_all(diagnosis)
+    return may_be_besides(diagnosis.steps) if found else None
+
+
+def besides_sentence(diagnosis: Diagnosis) -> str:
+    """What may be there besides, and why it is not among what was found; empty if there is nothing."""
+    more = besides(diagnosis)
+    if more is None:
+        return ""
+    return (
+        f"{more.effect.name} may be there besides: it takes the held-out error to {more.error_after:.2f} × noise,"
+        f" {percent(more.share)} of the mean square that is left beyond it. That is little, and something that is not"
+        " in the catalogue might look like it"
+    )
 
 
 def _but(diagnosis: Diagnosis) -> str:

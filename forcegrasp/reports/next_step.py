@@ -16,7 +16,7 @@ from forcegrasp.identify.verdict import Verdict
 from forcegrasp.measure import MeasurementSet
 from forcegrasp.physics.gripper import Gripper
 from forcegrasp.reports.comparison import at_floor
-from forcegrasp.reports.diagnosis_words import is_not_all
+from forcegrasp.reports.diagnosis_words import besides, is_not_all
 from forcegrasp.reports.html import Command
 
 
@@ -62,7 +62,12 @@ def after_diagnosis(
         return [Command(_to_tell_apart(d, advice), joined), *([] if effect_of(first, gripper).of_set else [preferred])]
     if is_not_all(d):
         look = Command(f"look at what {with_all} leaves", _line("compare", f"data={data}", f"model={found}"))
-        return [look, *([] if d.law_sought else [_for_a_law(data)]), added]
+        more = besides(d)
+        tried = [] if more is None else [
+            Command(f"see what {more.effect.name} does besides",
+                    _line("add", f"data={data}", f"model={found}", f"effect={more.effect.name}", "out=better.yaml"))
+        ]  # fmt: skip
+        return [look, *tried, *([] if d.law_sought else [_for_a_law(data)]), added]
     return [_use(with_all, found, data, gripper), added]
 
 

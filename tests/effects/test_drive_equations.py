@@ -387,6 +387,40 @@ def test_elastic_transmission_is_two_masses(share, frequency):
     assert np.abs(expected - goal).max() > 0.15 * goal
 
 
+@pytest.mark.parametrize("lag", [0.003, 0.02])
+@pytest.mark.parametrize("variant", ["difference", "filter"])
+def test_velocity_lag_damps_by_a_late_velocity(variant, lag):
+    """A step of a servo that was moving already, against its equation of motion in small steps of an own."""
+    plant, start_rad_s = Plant(load_gripper("so101_jaw"), 1, threads=1, step_factor=0.25), 0.5
+    plant.attach([(get_effect("velocity_lag")(np.array([[lag]]), plant.dt, variant), np.array([0]))])
+    plant.reset(np.arange(1), np.zeros(1), np.zeros((1, 1)), np.full((1, 1), start_rad_s))
+    inertia, goal, step, window = plant.model.dof_M0[0], 0.3, plant.dt, round(2 * lag / plant.dt)
+    ways = [start_rad_s * step * k for k in range(-window, 1)]  # before the start it moved as at the start
+    q, v, late, seen, expected = 0.0, start_rad_s, start_rad_s, [], []
+    for _ in range(1500):
+        late = late + (1 - np.exp(-step / lag)) * (v - late) if variant == "filter" else 0.0
+        known = (q - ways[-1 - window]) / (2 * lag) if variant == "difference" else late
+        v += step * (17.8 * (goal - q) - 0.6 * known) / inertia
+        q += step * v
+        ways.append(q)
+        expected.append(q)
+        plant.advance(np.full((1, 1), goal))
+        seen.append(plant.position[0, 0])
+    assert np.abs(np.array(seen) - expected).max() < 0.02 * goal
+    assert np.abs(seen - np.array(seen)[-1]).max() > 0.1 * goal
+
+
+def test_velocity_lag_leaves_steady_motion_as_it_is():
+    plant = Plant(load_gripper("so101_jaw"), 2, threads=1)
+    plant.attach([(get_effect("velocity_lag")(np.array([[0.02]]), plant.dt), np.array([1]))])
+    plant.reset(np.arange(2), np.zeros(2))
+    apart = []
+    for k in range(3000):
+        plant.advance(np.full((2, 1), 0.2 * k * plant.dt))
+        apart.append(abs(float(np.diff(plant.position[:, 0])[0])))
+    assert max(apart) > 1e-3 > 1e3 * apart[-1]
+
+
 @pytest.mark.parametrize("frequency", [0.5, 100.0])
 @pytest.mark.parametrize("share", [0.1, 4.0])
 def test_elastic_transmission_is_stable(share, frequency):

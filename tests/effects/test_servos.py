@@ -53,13 +53,26 @@ def test_what_needs_a_position_loop_or_pads_is_left_out():
     assert effect_of("encoder_bias", jaw).variants == ("reading", "loop")
     assert effect_of("encoder_bias", pendulum).variants == ("reading",)
     assert "elastic_transmission" not in effects_of(gripper)
-    for name in ("position_deadband", "back_emf", "command_deadband", "rate_limit", "backlash"):
+    for name in ("position_deadband", "back_emf", "command_deadband", "rate_limit", "backlash", "velocity_lag"):
         assert name in effects_of(jaw)
         with pytest.raises(ConfigError, match=f"effect {name}: needs .*positions that are commanded"):
             effect_of(name, pendulum)
     for mechanism in (jaw, pendulum, gripper):
         known = effects_of(mechanism)
         assert all(bool(why_left_out(e, mechanism)) == (e.name not in known) for e in catalogue().values())
+
+
+def test_a_late_velocity_needs_a_servo_that_acts_on_it(tmp_path):
+    jaw = load_gripper("so101_jaw")
+    scene = jaw.model.read_text()
+    assert 'kv="0.6"' in scene
+    (tmp_path / "so101_jaw.xml").write_text(scene.replace('kv="0.6"', ""))
+    described = jaw.path.read_text()
+    for text, known in ((described, True), (described.replace("-actuator_biasprm 2", "dof_damping"), False)):
+        (tmp_path / "jaw.yaml").write_text(text)
+        assert ("velocity_lag" in effects_of(load_gripper(str(tmp_path / "jaw.yaml")))) == known
+    with pytest.raises(ConfigError, match=r"velocity_lag: needs servos that act on their velocity; .* have no `kv`"):
+        effect_of("velocity_lag", load_gripper(str(tmp_path / "jaw.yaml")))
 
 
 @pytest.mark.parametrize(

@@ -37,6 +37,7 @@ CLASSES: dict[str, type[Effect]] = {
     "position_deadband": drive.PositionDeadband,
     "back_emf": drive.BackEmf,
     "swinging_load": drive.SwingingLoad,
+    "stale_velocity": drive.StaleVelocity,
     "smooth_friction": otherwise.SmoothFriction,
     "smooth_stribeck": otherwise.SmoothStribeck,
     "tilt": otherwise.Tilt,
@@ -152,6 +153,7 @@ OTHERWISE: dict[str, tuple[str, Sizes]] = {
 
 OUTSIDE: dict[str, Sizes] = {
     "swinging_load": _sizes("share", 0.1, 0.3, 1.0),  # elastic_transmission, which is one of servos alone
+    "stale_velocity": _sizes("window", 0.006, 0.015, 0.03),  # velocity_lag, one of servos alone, too
     "motor_cogging": _sizes("amplitude", 0.01, 0.03, 0.1),
     "motor_fade": _sizes("loss", 0.05, 0.15, 0.4),
     "directional_gain": _sizes("closing_excess", 0.03, 0.1, 0.3),

@@ -75,6 +75,21 @@ class CoulombFriction(Effect):
 
 
 @dataclass
+class StaleVelocity(Effect):
+    """The drive's speed is how far the encoder came in the last ``window``, and damps by that."""
+
+    window: float = 0.0  # s
+
+    def start(self, n, rng):
+        self._delay = Delay(self.window)
+
+    def motor(self, s):
+        if self.window == 0:
+            return 0.0
+        return s.servo.b2 * ((s.q - self._delay(s.q)) / self.window - s.v)
+
+
+@dataclass
 class Stiction(Effect):
     """Dry friction that is stronger at rest: it falls from ``breakaway`` to ``sliding`` within ``stribeck`` m/s."""
 

@@ -25,9 +25,9 @@ SAMPLE_S, POSITION_STD_M = 0.01, 5e-5
 EFFECTS = (
     "command_delay", "command_deadband", "rate_limit", "coulomb_friction", "stiction", "load_friction", "presliding",
     "smooth_friction", "direction_friction", "position_deadband", "back_emf", "motor_offset", "actuator_lag",
-    "force_limit", "swinging_load", "readout_skew", "encoder_bias",
+    "force_limit", "swinging_load", "stale_velocity", "readout_skew", "encoder_bias",
 )  # fmt: skip
-CALLED = {"swinging_load": "elastic_transmission"}
+CALLED = {"swinging_load": "elastic_transmission", "stale_velocity": "velocity_lag"}
 _KG = FINGER_KG + ROTOR_KG
 
 

@@ -107,6 +107,9 @@ def test_symptoms_of_the_drive() -> None:
     np.testing.assert_allclose(np.max(-np.diff(weak.q, axis=1)) / 0.04, highest, rtol=0.05)
     ringing = rig("swinging_load", share=1.0, frequency=4.0)
     np.testing.assert_allclose(ringing.q[0, NUDGE], plain.q[0, NUDGE], atol=2e-4)
+    late = rig("stale_velocity", window=0.03)
+    np.testing.assert_allclose(late.q[0, NUDGE], plain.q[0, NUDGE], atol=2e-4)  # damped late, it rings
+    assert np.abs(late.q[:, NEAR : NEAR + 5] - plain.q[:, NEAR : NEAR + 5]).max() > 1e-4
     lagging = rig("actuator_lag", time_constant=0.05)
     assert np.all(lagging.q[:, NEAR + 1 : NEAR + 5] > plain.q[:, NEAR + 1 : NEAR + 5])
     np.testing.assert_allclose(lagging.q[0, settled], plain.q[0, settled], atol=2e-5)

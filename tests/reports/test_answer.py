@@ -96,6 +96,20 @@ def test_an_answer_is_as_sure_as_its_weakest_step(made_up):
     assert tie["Runner-up"] == "force_drift leaves 1.28 × noise, force_bias 1.00."
 
 
+def test_what_may_be_there_besides_is_said_and_can_be_tried(made_up):
+    much = dataclasses.replace(made_up.diagnosis("effect"), left="in all", floor=0.5)
+    last = dataclasses.replace(much.steps[0], effects=())
+    more = dataclasses.replace(
+        last.candidates[0], setting=EffectSetting.typical(get_effect("backlash")), share=0.12, error_after=0.9
+    )
+    for share, said in ((0.12, True), (0.05, False)):
+        steps = (*much.steps, dataclasses.replace(last, candidates=(dataclasses.replace(more, share=share),)))
+        answer = box(dataclasses.replace(much, steps=steps))
+        tried = [c.line for c in answer.commands if "effect=backlash" in c.line]
+        assert tried == ["forcegrasp add 'data=my set' model=out/model.yaml effect=backlash out=better.yaml"] * said
+        assert dict(answer.rows).get("Perhaps", "").startswith("backlash may be there besides: it takes") == said
+
+
 def test_an_effect_that_contains_what_was_found_is_no_runner_up(made_up):
     one = made_up.diagnosis("effect")
     best, other = one.steps[0].candidates

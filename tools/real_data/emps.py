@@ -8,6 +8,7 @@ import numpy as np
 from scipy.io import loadmat
 
 from forcegrasp.models.model_file import read_model
+from tools.real_data import emps_regression
 from tools.real_data.emps_loop import GTAU, Carriage, simulate, velocity_delay
 from tools.real_data.judge import best_model, whole
 from tools.real_data.study import Error, Parameter, Study, checksums
@@ -31,8 +32,7 @@ def study(data: Path, out: Path) -> Study:
         "emps", "EMPS: a carriage on a ball screw",
         "the drive with its published gains; mass and viscous friction are fitted",
         "fitted on DATA_EMPS, judged on DATA_EMPS_PULSES, replayed from start to end",
-        checksums(data, list(folder.glob("*.mat"))), [" ".join(s["command"]) for s in verbs.done.values()],
-        seconds=verbs.seconds,
+        checksums(data, list(folder.glob("*.mat"))), seconds=verbs.seconds,
     )  # fmt: skip
     best = best_model(out / "diagnosis")
     model = read_model(best)
@@ -48,12 +48,18 @@ def study(data: Path, out: Path) -> Study:
         noise = noise_of(model)[k] * scale
         published = yard[0][1:][k] * scale
         result.errors.append(Error(signal, unit, before[k] * scale, after[k] * scale, noise, published))
-    rows = [["the drive's velocity", "position [µm]", "force [N]"]]
-    result.tables["The authors' model on the pulses"] = rows + [
-        [name, f"{1e6 * q:.2f}", f"{f:.2f}"] for name, q, f in yard
+    own = [("what was found", *after)]
+    if "velocity_lag" not in result.found:
+        late = verbs.run("add", "add", f"data={fit}", f"model={best}", "effect=velocity_lag", makes="late.yaml")
+        lag = read_model(late).effects[-1].parameters["lag_s"].value
+        own.append((f"and `velocity_lag`, {1e3 * lag:.1f} ms", *errors(check, late)))
+    result.commands = [" ".join(step["command"]) for step in verbs.done.values()]
+    result.tables["On the pulses"] = [["model", "position [µm]", "force [N]"]] + [
+        [name, f"{1e6 * q:.2f}", f"{f:.2f}"] for name, q, f in own + yard
     ]
-    for file in ("DATA_EMPS", "DATA_EMPS_PULSES"):
-        raw = read(folder / f"{file}.mat")
+    recordings = {file: read(folder / f"{file}.mat") for file in ("DATA_EMPS", "DATA_EMPS_PULSES")}
+    result.tables["The force by regression, without a simulation"] = emps_regression.table(recordings)
+    for file, raw in recordings.items():
         a, b, late = velocity_delay(raw["qm"], raw["qg"], raw["vir"] - raw.get("pulses_N", 0.0))
         result.notes.append(
             f"{file}: the drive's voltage is {a:.3f} kp·kv times its position error and {b:.3f} kv times a"
@@ -84,7 +90,8 @@ def yardsticks(file: Path) -> list[tuple[str, float, float]]:
     raw = read(file)
     pulses = raw.get("pulses_N", np.zeros_like(raw["qm"]))
     found = []
-    for late, name in enumerate(("as it is", "difference over 1 ms", "difference over 2 ms")):
+    velocities = ("the drive's own velocity", "its difference over 1 ms", "its difference over 2 ms")
+    for late, name in enumerate(f"the authors', with {velocity}" for velocity in velocities):
         simulated = simulate(Carriage(), raw["qg"], pulses, raw["qm"][0], late)
         left = simulated - np.column_stack([raw["qm"], raw["vir"] - pulses])
         position, volts = np.sqrt(np.mean(left**2, axis=0))
