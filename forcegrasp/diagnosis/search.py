@@ -9,6 +9,7 @@ import numpy as np
 
 from forcegrasp.diagnosis import families
 from forcegrasp.diagnosis.evidence import LEAST_SHARE_TOGETHER, with_close_rivals
+from forcegrasp.diagnosis.exchange import exchange
 from forcegrasp.diagnosis.few import with_few
 from forcegrasp.diagnosis.needless import drop_needless
 from forcegrasp.diagnosis.noise_check import Noise, unexpected_noise
@@ -84,6 +85,8 @@ def diagnose(
             break
         study = with_few(study, fit)
         step = look_further(study, fit, screen, untried, rng, richer)
+        if not step.effects and step.error_before > _AS_GOOD_AS_NOTHING * floor:
+            step = exchange(study, fit, screen, untried, steps, rng) or step
         if not step.effects:
             steps.append(step)
             break

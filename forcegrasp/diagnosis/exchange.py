@@ -1,0 +1,71 @@
+"""Puts a look-alike in the place of an effect that was found too early: what was still missing may have decided."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+
+from forcegrasp.diagnosis.evidence import LEAST_RISE, LEAST_SHARE, is_beyond_chance
+from forcegrasp.diagnosis.families import roughly_without
+from forcegrasp.diagnosis.result import Candidate, Step, kept_steps
+from forcegrasp.diagnosis.screen import Screen
+from forcegrasp.diagnosis.step import look_further
+from forcegrasp.diagnosis.study import Study
+from forcegrasp.effects import Effect
+from forcegrasp.identify.fit import Fit
+
+
+def exchange(
+    study: Study, fit: Fit, screen: Screen, effects: Sequence[type[Effect]], steps: Sequence[Step],
+    rng: np.random.Generator,
+) -> Step | None:  # fmt: skip
+    """A step that puts another effect in the place of one that was found; None if none does better.
+
+    Each effect was chosen while those found later were missing, and one that is missing can make a look-alike of the
+    truth fit better. So each is looked for again, with all others in the model.
+
+    Args:
+      study: the measurements.
+      fit: with all effects that were found.
+      screen: of the catalogue.
+      effects: those that are not in the model.
+      steps: that found the effects.
+      rng: for the null distribution.
+    """
+    held = study.heldout(fit)
+    fitted = [step for step in kept_steps(steps) if not step.is_counted]
+    for step in fitted if len(fitted) > 1 else ():  # the only one was chosen with all there is in the model
+        name = step.effects[0]
+        alike = [e for e in effects if are_alike(e, type_of(name, fit))]
+        if not alike:
+            continue
+        study.progress(f"looking for what may stand in place of {name}")
+        found = look_further(study, roughly_without(name, fit, study), screen, alike, rng)
+        if not found.effects:
+            continue
+        candidates = tuple(_against(c, held, study) for c in found.candidates)
+        best = candidates[0]
+        if is_beyond_chance(best.gains, LEAST_RISE) and best.share >= LEAST_SHARE:
+            study.progress(f"{best.effect.name} does better than {name}")
+            first = dataclasses.replace(best, replaces=name)
+            error = study.error(held)
+            return dataclasses.replace(found, candidates=(first, *candidates[1:]), error_before=error, of_many=False)
+    return None
+
+
+def _against(candidate: Candidate, held: np.ndarray, study: Study) -> Candidate:
+    """A candidate judged against the model that has what it may replace, by the residuals that this leaves."""
+    after = study.heldout(candidate.fit)
+    return dataclasses.replace(candidate, gains=study.gains(held, after), share=study.explained(held, after))
+
+
+def type_of(name: str, fit: Fit) -> type[Effect]:
+    """The effect of that name in a fit."""
+    return next(one.effect for one in fit.problem.effects if one.effect.name == name)
+
+
+def are_alike(one: type[Effect], other: type[Effect]) -> bool:
+    """Whether the catalogue says of two effects that they look alike, or that they are of one kind."""
+    return one.name in other.look_alikes or other.name in one.look_alikes or one.family == other.family

@@ -1,0 +1,90 @@
+"""An effect that was found too early gives way to the one that it looks like; what is true stays."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from forcegrasp.diagnosis.exchange import are_alike, exchange
+from forcegrasp.diagnosis.result import Step, kept_steps
+from forcegrasp.diagnosis.screen import Screen
+from forcegrasp.diagnosis.search import diagnose
+from forcegrasp.effects import catalogue, get_effect
+from forcegrasp.effects.for_gripper import effect_of, effects_of
+from forcegrasp.identify.fit_set import fit_model
+from forcegrasp.identify.noise_floor import beyond_fit, numerical_error
+from tests.diagnosis.test_families import jaw_with, silent
+from tests.diagnosis.test_needless import step_with
+
+
+@pytest.fixture(scope="module")
+def rubbing():
+    """A jaw with dry friction, and its base model."""
+    loaded = jaw_with("coulomb_friction", force_n=0.08)
+    return loaded, *fit_model(loaded, 0, silent)
+
+
+def exchanged(rubbing, *names: str, only_last: bool = False):
+    """What takes the place of one of these effects, which are in the model; and the step that found the last one."""
+    study, step, fit = step_with(rubbing, *names)
+    study = dataclasses.replace(study, numerical=beyond_fit(fit, numerical_error(fit, study.target)))
+    step = dataclasses.replace(step, error_after=study.error(study.heldout(fit)))
+    steps = [step] if only_last else [dataclasses.replace(step, effects=(name,)) for name in names]
+    others = [e for e in effects_of(fit.problem.gripper).values() if e.name in ("coulomb_friction", "encoder_bias")]
+    others = [e for e in others if e.name not in names]
+    screen = Screen(others, study)
+    return exchange(study, fit, screen, others, steps, np.random.default_rng(0)), steps
+
+
+def test_what_was_hidden_takes_the_place_of_its_look_alike(rubbing):
+    found, steps = exchanged(rubbing, "actuator_lag", "position_deadband")
+    assert found is not None
+    best = found.candidates[0]
+    assert (found.effects[0], best.replaces) == ("coulomb_friction", "position_deadband")
+    assert [one.effect.name for one in best.fit.problem.effects] == ["actuator_lag", "coulomb_friction"]
+    assert found.error_before == pytest.approx(steps[-1].error_after)
+    assert found.error_after == best.error_after < 1.1 < found.error_before
+    assert best.share > 0.9
+    assert [step.effects[0] for step in kept_steps([*steps, found])] == ["actuator_lag", "coulomb_friction"]
+
+
+def test_what_is_true_stays(rubbing):
+    assert exchanged(rubbing, "actuator_lag", "coulomb_friction")[0] is None
+
+
+def test_the_only_effect_was_chosen_with_all_there_is_in_the_model(rubbing, monkeypatch):
+    monkeypatch.setattr("forcegrasp.diagnosis.exchange.look_further", lambda *_: pytest.fail("looked for another"))
+    assert exchanged(rubbing, "position_deadband", only_last=True)[0] is None
+
+
+def test_alike_are_look_alikes_either_way_and_effects_of_one_kind():
+    rate, force, friction = (get_effect(n) for n in ("rate_limit", "force_limit", "coulomb_friction"))
+    assert are_alike(rate, force)
+    assert not are_alike(rate, friction)
+    for one in catalogue().values():
+        assert all(are_alike(one, other) == are_alike(other, one) for other in catalogue().values())
+        assert all(are_alike(one, get_effect(name)) for name in one.look_alikes)
+
+
+def test_a_search_that_ends_with_more_than_noise_looks_for_exchanges_and_goes_on(rubbing, monkeypatch):
+    _, target, simulators, base = rubbing
+    names = ("position_deadband", "actuator_lag")
+    _, step, fit = step_with(rubbing, *names)
+    instead = step_with(rubbing, "coulomb_friction", "actuator_lag")[1:]
+    found = dataclasses.replace(instead[0], effects=("coulomb_friction",), error_before=step.error_after)
+    candidate = dataclasses.replace(found.candidates[0], fit=instead[1], replaces="position_deadband")
+    calls = []
+
+    def recorded(*arguments) -> Step | None:
+        calls.append(arguments)
+        return dataclasses.replace(found, candidates=(candidate,)) if len(calls) == 1 else None
+
+    monkeypatch.setattr("forcegrasp.diagnosis.search.exchange", recorded)
+    steps = [dataclasses.replace(step, effects=(name,)) for name in names]
+    other = [effect_of("motor_offset", target.gripper)]
+    diagnosis = diagnose(target, base, simulators, other, np.random.default_rng(0), start=(fit, steps))
+    assert calls
+    assert "coulomb_friction" in diagnosis.preferred
+    assert "position_deadband" not in diagnosis.preferred
