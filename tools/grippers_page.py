@@ -7,9 +7,12 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, Protocol
 
+from tools.marked_part import with_part
+from tools.results.tables import table
+
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 PAGE, PICTURE = DOCS / "grippers.md", DOCS / "figures" / "grippers.png"
-BEGIN, END = "<!-- written by tools/grippers.py: begin -->", "<!-- written by tools/grippers.py: end -->"
+WRITER = "tools/grippers.py"
 #: What every grasp of the picture has in common; the rest is drawn.
 GRASP = ("policy=force_pi", "kappa=0.5", "radius_m=0.015", "seed=3")
 _GAP = 8
@@ -25,32 +28,30 @@ class Results(Protocol):
 
 def write(results: Results, grippers: Sequence[str], is_right: Callable[[Row], bool], page: Path = PAGE) -> None:
     """Writes what there is so far between the marks of the page."""
-    before, rest = page.read_text("utf-8").split(BEGIN)
-    after = rest.split(END)[1]
-    tables = [*trained(results, grippers), "", *diagnosed(results, grippers, is_right)]
-    page.write_text("\n".join([before + BEGIN, "", *tables, "", END]) + after, "utf-8")
+    tables = f"{trained(results, grippers)}\n\n{diagnosed(results, grippers, is_right)}"
+    page.write_text(with_part(page.read_text("utf-8"), WRITER, tables), "utf-8")
     print(f"wrote {page}")
 
 
-def trained(results: Results, grippers: Sequence[str]) -> list[str]:
-    """Lines of the table of trained policies; a cell has the policy's figure, and after the slash that of force_pi."""
+def trained(results: Results, grippers: Sequence[str]) -> str:
+    """The table of trained policies; a cell has the policy's figure, and after the slash that of force_pi."""
     heads = ["gripper", "control steps", "minutes", "force reward", "peak force [N]", "overshoot [%]", "moved [mm]"]
-    lines = [_line(heads), "|---" * len(heads) + "|"]
+    lines = []
     for gripper in grippers:
         for row in results.of("train", gripper):
             pairs = [
                 " / ".join(f"{row['policies'][who][key]:.{digits}f}" for who in ("policy", "force_pi"))
                 for key, digits in (("force_reward", 1), ("peak_force_n", 2), ("overshoot_percent", 0), ("moved_mm", 2))
             ]
-            lines.append(_line([f"`{gripper}`", f"{row['frames']:,}", f"{row['seconds'] / 60:.1f}", *pairs]))
+            lines.append([f"`{gripper}`", f"{row['frames']:,}", f"{row['seconds'] / 60:.1f}", *pairs])
         if not results.of("train", gripper):
-            lines.append(_line([f"`{gripper}`", *["–"] * 6]))
-    return lines
+            lines.append([f"`{gripper}`", *["–"] * 6])
+    return table(heads, lines)
 
 
-def diagnosed(results: Results, grippers: Sequence[str], is_right: Callable[[Row], bool]) -> list[str]:
-    """Lines of the table of diagnosed sets, by gripper and what was hidden."""
-    lines = ["| gripper | hidden | right | error ÷ floor, median (largest) | seconds a set |", "|---|---|---|---|---|"]
+def diagnosed(results: Results, grippers: Sequence[str], is_right: Callable[[Row], bool]) -> str:
+    """The table of diagnosed sets, by gripper and what was hidden."""
+    lines = []
     for gripper in grippers:
         rows = results.of("diagnose", gripper)
         for hidden in dict.fromkeys(row["hidden"] for row in rows):
@@ -58,14 +59,10 @@ def diagnosed(results: Results, grippers: Sequence[str], is_right: Callable[[Row
             right, ratios = sum(map(is_right, some)), sorted(row["ratio"] for row in some)
             seconds = sum(row["seconds"] for row in some) / len(some)
             error = f"{ratios[len(ratios) // 2]:.2f} ({ratios[-1]:.2f})"
-            lines.append(_line([f"`{gripper}`", hidden, f"{right} of {len(some)}", error, f"{seconds:.0f}"]))
+            lines.append([f"`{gripper}`", hidden, f"{right} of {len(some)}", error, f"{seconds:.0f}"])
         if not rows:
-            lines.append(_line([f"`{gripper}`", *["–"] * 4]))
-    return lines
-
-
-def _line(cells: Sequence[str]) -> str:
-    return f"| {' | '.join(cells)} |"
+            lines.append([f"`{gripper}`", *["–"] * 4])
+    return table(["gripper", "hidden", "right", "error ÷ floor, median (largest)", "seconds a set"], lines)
 
 
 def draw(grippers: Sequence[str], picture: Path = PICTURE) -> None:

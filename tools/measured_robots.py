@@ -20,7 +20,7 @@ from typing import Any
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 PAGE, PICTURE = ROOT / "docs" / "robots.md", Path("figures", "measured_robots.png")
-BEGIN, END = (f"<!-- written by tools/measured_robots.py: {what} -->" for what in ("begin", "end"))
+WRITER = "tools/measured_robots.py"
 #: Of the half on which nothing was chosen.
 ROBOTS = (1, 3, 5, 7, 9, 11, 13, 15)
 #: Control steps of a retraining.
@@ -100,8 +100,8 @@ def judged(folder: Path) -> Row:
     }
 
 
-def table(rows: Sequence[Row]) -> list[str]:
-    """Lines of the table: a row for each robot, and their mean."""
+def table(rows: Sequence[Row]) -> str:
+    """A row for each robot, and their mean."""
     from tools.results import tables
 
     def rewards(of: Row) -> list[str]:
@@ -118,7 +118,7 @@ def table(rows: Sequence[Row]) -> list[str]:
         found = f"{row['found']} of {row['hidden']}"
         lines.append([str(row["robot"]), found, besides, errors, *rewards(row)])
     means = {name: sum(row[name] for row in rows) / len(rows) for name in ("simulator", *_WHO)}
-    return tables.table(heads, [*lines, ["mean", "", "", "", *rewards(means)]]).splitlines()
+    return tables.table(heads, [*lines, ["mean", "", "", "", *rewards(means)]])
 
 
 def report(out: Path, page: Path = PAGE) -> None:
@@ -127,8 +127,9 @@ def report(out: Path, page: Path = PAGE) -> None:
     rows = [judged(folder) for folder in folders if (folder / "robot" / "evaluation.json").exists()]
     if not rows:
         raise SystemExit(f"{out}: no robot is done; run this program without --report first")
-    before, rest = page.read_text("utf-8").split(BEGIN)
-    page.write_text("\n".join([before + BEGIN, "", *table(rows), "", END]) + rest.split(END)[1], "utf-8")
+    from tools.marked_part import with_part
+
+    page.write_text(with_part(page.read_text("utf-8"), WRITER, table(rows)), "utf-8")
     draw(rows, page.parent / PICTURE)
     print(f"wrote {page}: {len(rows)} robots")
 

@@ -1,6 +1,6 @@
 """Writes the table of the prior into docs/robots.md.
 
-python tools/robots_page.py
+python -m tools.robots_page
 """
 
 from __future__ import annotations
@@ -12,9 +12,10 @@ from forcegrasp.models.object_body import ObjectBody
 from forcegrasp.models.robot_prior import EFFECTS, FRICTION, GAINS, MASS, NOISE
 from forcegrasp.models.robots import size_ranges
 from forcegrasp.physics import default_gripper
+from tools.marked_part import with_part
 
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "robots.md"
-BEGIN, END = "<!-- written by tools/robots_page.py: begin -->", "<!-- written by tools/robots_page.py: end -->"
+WRITER = "tools/robots_page.py"
 
 
 def table() -> Iterator[str]:
@@ -44,10 +45,9 @@ def table() -> Iterator[str]:
 
 def page(text: str) -> str:
     """The page with the table as it is now."""
-    before, rest = text.split(BEGIN)
     mean = sum(prior.chance for prior in EFFECTS.values()) - 1  # every object has a body
     said = f"A robot has {mean:.1f} effects on average."
-    return before + "\n".join([BEGIN, "", *table(), "", said, "", END]) + rest.split(END)[1]
+    return with_part(text, WRITER, "\n".join([*table(), "", said]))
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""docs/robots.md has the prior as it is. If this fails: python tools/robots_page.py"""
+"""docs/robots.md has the prior as it is. If this fails: python -m tools.robots_page"""
 
 from __future__ import annotations
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from tools import grippers, grippers_page
+from tools.marked_part import marks, with_part
 
 
 def row(hidden: str, named: list[str], ratio: float, verdict: str = "effect") -> dict:
@@ -63,7 +64,8 @@ def test_policies_are_evaluated_on_the_same_few_grasps():
 
 def test_report_fills_in_the_page_between_its_marks(tmp_path):
     results, page = grippers.Results(tmp_path), tmp_path / "page.md"
-    page.write_text(f"before\n{grippers_page.BEGIN}\nold\n{grippers_page.END}\nafter\n")
+    begin, end = marks(grippers_page.WRITER)
+    page.write_text(f"before\n{begin}\nold\n{end}\nafter\n")
     policy = {"force_reward": 121.23, "peak_force_n": 2.0, "overshoot_percent": 5.4, "moved_mm": 0.5}
     policies = {"policy": policy, "force_pi": policy | {"force_reward": 111.0}}
     results.add("a", {"stage": "train", "gripper": "tiago", "frames": 1000, "seconds": 90, "policies": policies})
@@ -83,4 +85,4 @@ def test_report_fills_in_the_page_between_its_marks(tmp_path):
 
 def test_the_page_has_the_marks():
     text = grippers_page.PAGE.read_text("utf-8")
-    assert text.index(grippers_page.BEGIN) < text.index(grippers_page.END)
+    assert with_part(text, grippers_page.WRITER, "new") != text

@@ -6,6 +6,7 @@ import pytest
 
 from forcegrasp.models.model_file import read_model
 from tools import measured_robots
+from tools.marked_part import marks
 from tools.results import execute
 
 
@@ -65,7 +66,8 @@ def row(**values) -> dict:
 
 def test_the_table_has_a_row_for_each_robot_and_their_mean(tmp_path, monkeypatch):
     page = tmp_path / "robots.md"
-    page.write_text(f"before\n{measured_robots.BEGIN}\nold\n{measured_robots.END}\nafter\n")
+    begin, end = marks(measured_robots.WRITER)
+    page.write_text(f"before\n{begin}\nold\n{end}\nafter\n")
     rows = {7: row(), 9: row(robot=9, retrained=105.0, others=["stiction"])}
     for number in (9, 7):
         (tmp_path / f"robot_{number}" / "robot").mkdir(parents=True)

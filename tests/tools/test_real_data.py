@@ -8,8 +8,9 @@ import subprocess
 import numpy as np
 import pytest
 
+from tools.marked_part import marks
 from tools.real_data import bam_models, dfki_regression, emps_loop
-from tools.real_data.page import write_page
+from tools.real_data.page import WRITER, write_page
 from tools.real_data.study import Error, Parameter, Study, checksums
 from tools.real_data.verbs import Verbs
 
@@ -117,11 +118,11 @@ def test_the_page_tells_what_a_study_found(tmp_path, monkeypatch):
     (tmp_path / "emps").mkdir()
     study().write(tmp_path / "emps")
     page = tmp_path / "page.md"
-    marks = [f"<!-- made by tools/real_data: {n} -->\nold\n<!-- end of {n} -->" for n in ("emps", "checksums")]
     jaw, gone = (f"| `{name}` | `{'0f' * 32}` |" for name in ("so101_jaw/a.csv", "emps/gone.mat"))
-    page.write_text(
-        "kept\n" + "\n".join(marks).replace("old\n<!-- end of checksums", f"{jaw}\n{gone}\n<!-- end of checksums")
-    )
+    parts = {"emps": "old", "checksums": f"{jaw}\n{gone}"}
+    page.write_text("kept\n" + "\n".join(
+        f"{begin}\n{parts[name]}\n{end}" for name, (begin, end) in ((n, marks(f"{WRITER}, {n}")) for n in parts)
+    ))  # fmt: skip
     write_page(page, tmp_path, ["emps", "xl330"])
     text = page.read_text()
     assert text.startswith("kept\n")
