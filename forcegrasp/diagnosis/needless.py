@@ -24,7 +24,8 @@ def drop_needless(study: Study, step: Step, fit: Fit, given: int) -> tuple[Step,
       fit: with all effects.
       given: number of effects that were in the model before the search; they stay.
     """
-    found = _without_needless(study, fit, [one.effect.name for one in fit.problem.effects[given:-1]])
+    names = [one.effect.name for one in fit.problem.effects[given:-1]]
+    found = None if step.replaces else _without_needless(study, fit, names)  # a step takes the place of one at most
     if found is None:
         return step, fit
     name, less = found

@@ -171,7 +171,7 @@ class _Start:
             redundant = add_nothing(every)
             every.sort(key=lambda c: (c.effect.name in redundant, *self.place(c)))
             first = every[0] if every else None
-            if first is None or first.effect.name in names:
+            if first is None or first.effect.name in names or first.replaces:  # the last were fitted to the end already
                 return tuple(every), redundant
             # fitted to the end the others are no better than this rough one: it is to be fitted, too
             names.add(first.effect.name)

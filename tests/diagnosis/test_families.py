@@ -12,6 +12,7 @@ from forcegrasp.diagnosis.add_effect import add_effect
 from forcegrasp.diagnosis.diagnose_set import diagnose_set
 from forcegrasp.diagnosis.evidence import add_nothing
 from forcegrasp.diagnosis.result import kept_steps
+from forcegrasp.diagnosis.step import _Start
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.effects import get_effect
 from forcegrasp.effects.for_gripper import effect_of, effects_of
@@ -145,3 +146,19 @@ def test_a_step_whose_effect_was_replaced_is_not_part_of_the_answer(made_up):
     richer = dataclasses.replace(first.candidates[0], replaces=first.effects[0])
     second = dataclasses.replace(first, effects=("stiction",), candidates=(richer,))
     assert kept_steps([first, second]) == [second]
+
+
+def test_what_takes_an_effects_place_does_so_though_another_seemed_better_at_first(made_up, monkeypatch):
+    """Rough fits rank another effect first; fitted to the end it is worse."""
+    first, second = made_up.diagnosis("effect").steps[0].candidates
+    other, richer = (
+        dataclasses.replace(c, setting=EffectSetting.typical(get_effect(name)), gains=np.full(8, gain), replaces=place)
+        for c, name, gain, place in ((first, "rate_limit", 90.0, ""), (second, "back_emf", 50.0, "force_limit"))
+    )
+    nothing = (np.zeros_like(made_up.base.fit.residual),) * 2
+    study = Study(made_up.target, Simulators(made_up.base.fit.problem), (), nothing)
+    start = _Start(study, made_up.base.fit)
+    monkeypatch.setattr(start, "_to_the_end", lambda rough: rough)
+    monkeypatch.setattr(start, "_judge", lambda *_: dataclasses.replace(other, gains=np.full(8, 10.0)))
+    ordered, _ = start.refine_on_reference_tier([other, richer])
+    assert [(c.effect.name, c.replaces) for c in ordered] == [("back_emf", "force_limit"), ("rate_limit", "")]

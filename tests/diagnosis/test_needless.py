@@ -72,3 +72,10 @@ def test_all_that_is_no_longer_needed_goes_and_its_step_with_it(rubbing):
     assert steps == [step]
     assert [one.effect.name for one in less.problem.effects] == ["coulomb_friction"]
     assert drop_all_needless(study, [first, step], fit, 2) == ([first, step], fit)  # they were given
+
+
+def test_a_step_takes_the_place_of_one_effect_at_most(rubbing):
+    study, step, fit = step_with(rubbing, "motor_offset", "coulomb_friction")
+    (last,) = step.candidates
+    step = dataclasses.replace(step, candidates=(dataclasses.replace(last, replaces="stiction"),))
+    assert drop_needless(study, step, fit, 0) == (step, fit)
