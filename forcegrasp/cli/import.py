@@ -20,7 +20,7 @@ NOTES = """
 
 def run(config: ImportConfig) -> None:
     """Runs the verb."""
-    from forcegrasp.importers import FORMATS, read_source, unlike
+    from forcegrasp.importers import mechanism_of, read_source, unlike
     from forcegrasp.importers.example import example_set
     from forcegrasp.importers.servo_set import as_set
     from forcegrasp.measure import check_servo, write_servo_set
@@ -35,7 +35,7 @@ def run(config: ImportConfig) -> None:
         raise ConfigError("which recordings? forcegrasp import SOURCE format=sage, or example=true for a starter set")
     form = "" if config.format == "map" else config.format
     recordings = read_source([Path(source) for source in config.source], form, config.map, config.joints)
-    name = config.mechanism or (FORMATS[form].MECHANISM if form else "")
+    name = config.mechanism or (mechanism_of(form, recordings) if form else "")
     if not name:
         raise ConfigError("mechanism: what was recorded? Give the name of a shipped one, or a description's path")
     mechanism = load_gripper(name)

@@ -61,7 +61,11 @@ class Problem:
     ) -> None:
         self.gripper, self.grasps, self.effects = gripper, tuple(grasps), tuple(effects)
         self._given = (
-            {}
+            {
+                name: np.array([g.settings[name] for g in grasps])
+                for name in gripper.settings
+                if all(name in g.settings for g in grasps)
+            }
             if gripper.is_servo
             else {
                 "radius_m": np.array([np.nan if g.radius_m is None else g.radius_m for g in grasps]),

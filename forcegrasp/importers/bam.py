@@ -13,12 +13,10 @@ from forcegrasp.errors import MeasurementError
 from forcegrasp.files.bounded import read_bytes
 from forcegrasp.importers.recording import OtherFileError, Recording, files_below
 
-MECHANISM = "xl330_pendulum"
+MECHANISM, ANY_MECHANISM = "xl330_pendulum", "bam_pendulum"
 _MAX_BYTES = 200_000_000
 _NEEDED = ("timestamp", "goal_position", "position")
 _SETTINGS = ("kp", "mass", "length", "arm_mass", "vin")
-#: What of a log the shipped mechanism is of.
-_BENCH = {"motor": "xl330", "mass": 0.49, "length": 0.1}
 
 
 def find(source: Path) -> list[Path]:
@@ -79,9 +77,6 @@ def _column(file: Path, entries: list[dict[str, Any]], name: str) -> np.ndarray:
         raise MeasurementError(f"{file}: entry {row}: {name} must be a number") from error
 
 
-def unlike(one: Recording) -> str:
-    """What to say of a log of another servo or pendulum than that of the shipped mechanism; empty if of none."""
-    of = {"motor": one.joints[0], **one.settings}
-    differ = [f"{name} {of[name]}" for name, value in _BENCH.items() if of.get(name, value) != value]
-    bench = ", ".join(f"{name} {value}" for name, value in _BENCH.items())
-    return f"{MECHANISM} is of {bench}, and these logs of {', '.join(differ)}: give mechanism=" if differ else ""
+def mechanism_of(one: Recording) -> str:
+    """The mechanism that comes with the package for a log's servo; mass and length of the pendulum are the log's."""
+    return MECHANISM if one.joints[0].startswith("xl330") else ANY_MECHANISM

@@ -56,6 +56,21 @@ def read_source(sources: Sequence[Path], format_name: str, map_file: str, joints
     return [tidy(one.of_joints(joints) if joints else one) for one in _with_own_names(found)]
 
 
+def mechanism_of(format_name: str, recordings: Sequence[Recording]) -> str:
+    """The mechanism that comes with the package for recordings of a format; empty if there is none.
+
+    Raises:
+      MeasurementError: if they are of several.
+    """
+    module = FORMATS[format_name]
+    choose = getattr(module, "mechanism_of", lambda one: module.MECHANISM)
+    found = {choose(one): one.name for one in recordings}
+    if len(found) > 1:
+        of_each = ", ".join(f"{recording} of {name}" for name, recording in found.items())
+        raise MeasurementError(f"{of_each}: recordings of several mechanisms; import them apart, or give mechanism=")
+    return next(iter(found))
+
+
 def unlike(format_name: str, recordings: Sequence[Recording]) -> list[str]:
     """In what recordings may be unlike the mechanism that their format is of by default; a line each."""
     ask = getattr(FORMATS[format_name], "unlike", None)

@@ -10,7 +10,7 @@ import numpy as np
 from forcegrasp.errors import ConfigError, MeasurementError
 from forcegrasp.importers.recording import Recording
 from forcegrasp.measure.schema import MeasuredGrasp, MeasurementSet, columns_of, fingerprint_of_set
-from forcegrasp.measure.servo_set import settings_of
+from forcegrasp.measure.servo_set import needed_settings, settings_of
 from forcegrasp.physics.gripper import EFFORT_SCALE, Gripper
 from forcegrasp.short_repr import counted
 
@@ -59,8 +59,7 @@ def _recording(one: Recording, mechanism: Gripper) -> MeasuredGrasp:
             f"{one.name}: commands are {holds}; {mechanism.name} takes {mechanism.commands[0].unit}: choose another"
             " mechanism"
         )
-    settings = settings_of(mechanism)
-    if missing := [name for name in settings if name not in one.settings]:
+    if missing := [name for name in needed_settings(mechanism) if name not in one.settings]:
         raise MeasurementError(f"{one.name}: does not say {', '.join(missing)}, which {mechanism.name} needs")
     effort = np.empty((len(one.time_s), 0))
     if mechanism.forces:
@@ -80,5 +79,6 @@ def _recording(one: Recording, mechanism: Gripper) -> MeasuredGrasp:
     return MeasuredGrasp(
         name=one.name, object="", session=one.name, radius_m=None, offset_m=None, split=None, time_s=one.time_s,
         command_m=one.command, position_m=one.position, force_n=effort, object_m=None, columns=columns_of(mechanism),
-        settings={name: one.settings[name] for name in settings}, enabled=one.enabled, load=one.load,
+        settings={name: one.settings[name] for name in settings_of(mechanism) if name in one.settings},
+        enabled=one.enabled, load=one.load,
     )  # fmt: skip

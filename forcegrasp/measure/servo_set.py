@@ -59,10 +59,10 @@ def read_servo_set(folder: Path, content: dict[str, Any]) -> MeasurementSet:
         raise refusal(
             place, "mechanism", f"{mechanism.name} has fingers; its sets are of kind grasps", MeasurementError
         )
-    settings = settings_of(mechanism)
-    index = read_csv(
-        find_file(folder, INDEX), FileColumns(("recording", "split"), settings, optional=("split",), blank=("split",))
-    )
+    needed = needed_settings(mechanism)
+    optional = ("split", *(name for name in mechanism.settings if name not in needed))
+    of_index = FileColumns(("recording", "split"), settings_of(mechanism), optional=optional, blank=("split",))
+    index = read_csv(find_file(folder, INDEX), of_index)
     columns = columns_of(mechanism)
     in_samples = FileColumns(("recording",), (*columns.signals, ENABLED, LOAD), optional=(ENABLED, LOAD))
     samples = read_samples(folder, in_samples)
@@ -83,8 +83,13 @@ def read_servo_set(folder: Path, content: dict[str, Any]) -> MeasurementSet:
 
 
 def settings_of(mechanism: Gripper) -> tuple[str, ...]:
-    """Settings that each recording of a mechanism must have, such as kp."""
-    return tuple(dict.fromkeys(p.times for p in mechanism.parameters.values() if p.times))
+    """Settings of a mechanism's recordings: those that each must have, and those that the scene takes."""
+    return tuple(dict.fromkeys([*needed_settings(mechanism), *mechanism.settings]))
+
+
+def needed_settings(mechanism: Gripper) -> list[str]:
+    """Settings that each recording must have, such as kp: base parameters are multiplied by them."""
+    return [p.times for p in mechanism.parameters.values() if p.times]
 
 
 def _recordings(folder: Path, index: Table, samples: Table, mechanism: Gripper) -> tuple[MeasuredGrasp, ...]:
@@ -113,7 +118,7 @@ def _recording(facts: dict[str, Any], part: pl.DataFrame, mechanism: Gripper) ->
         object_m=None,
         rows=part["row"].to_numpy().astype(np.int64),
         columns=columns,
-        settings={name: float(facts[name]) for name in settings_of(mechanism)},
+        settings={name: float(facts[name]) for name in settings_of(mechanism) if name in facts},
         enabled=part[ENABLED].to_numpy() > 0 if ENABLED in part.columns else None,
         load=np.array(part[LOAD].to_numpy()) if LOAD in part.columns else None,
     )

@@ -5,7 +5,8 @@ from __future__ import annotations
 import copy
 import functools
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from importlib.resources import files
 from pathlib import Path
 
@@ -14,7 +15,7 @@ import numpy as np
 
 from forcegrasp.errors import ConfigError
 from forcegrasp.physics.fast import compile_fast
-from forcegrasp.physics.gripper_parts import BaseParameter, Channel, Finger, Motor, Training
+from forcegrasp.physics.gripper_parts import BaseParameter, Channel, FieldWrite, Finger, Motor, Training
 from forcegrasp.physics.guard import silence_log
 from forcegrasp.physics.opening import OpeningLaw, measure_opening, straight_law
 from forcegrasp.physics.scene_file import check_scene
@@ -69,6 +70,8 @@ class Gripper(ShortRepr):
     force_scale: float
     command: str = "position"  #: what is commanded: "position", "effort" or "voltage"
     unsigned: bool = False  #: whether the motors' efforts are read as sizes without a sign
+    #: Numbers of a mechanism's recordings that the scene takes as they are: name → fields that take them.
+    settings: Mapping[str, tuple[FieldWrite, ...]] = field(default_factory=dict[str, tuple[FieldWrite, ...]])
 
     def summary(self) -> str:
         return f"{cut(self.name)}, {counted(len(self.parameters), 'parameter')}"

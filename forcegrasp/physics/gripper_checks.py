@@ -168,7 +168,7 @@ def check_write(where: str, model: mujoco.MjModel, write: FieldWrite) -> None:
     """Raises ConfigError where a parameter writes what is no field of numbers, or no column of it."""
     field: np.ndarray | None = getattr(model, write.field, None) if write.field in MODEL_FIELDS else None
     if field is None or not np.issubdtype(np.asarray(field).dtype, np.floating):
-        known = [name for name in MODEL_FIELDS if name.startswith(("actuator_", "dof_", "geom_"))]
+        known = [name for name in MODEL_FIELDS if name.startswith(("actuator_", "body_", "dof_", "geom_"))]
         raise ConfigError(f"{where} is no field of numbers in MuJoCo's model{closest(write.field, known)}")
     columns = field.shape[1] if field.ndim == 2 else None
     if (columns is None) != (write.column is None) or (columns is not None and write.column >= columns):

@@ -16,7 +16,7 @@ from forcegrasp.physics.gripper_parts import BaseParameter, FieldWrite
 
 FORMAT, FIRST_FORMAT = "forcegrasp-gripper/2", "forcegrasp-gripper/1"
 MECHANISM_FORMAT = "forcegrasp-mechanism/1"
-_WRITE = re.compile(r"(-?)((?:actuator|dof|geom)_\w+)(?:@([^ @]+))?(?: (\d+))?")
+_WRITE = re.compile(r"(-?)((?:actuator|body|dof|geom)_\w+)(?:@([^ @]+))?(?: (\d+))?")
 
 
 def _field_write(written: object) -> FieldWrite:
@@ -27,6 +27,7 @@ def _field_write(written: object) -> FieldWrite:
     return FieldWrite(field, None if column is None else int(column), -1.0 if sign else 1.0, joint or "")
 
 
+Writes = list[Annotated[FieldWrite, PlainValidator(_field_write)]]
 Name = Annotated[str, text(200)]
 Pair = Annotated[tuple[float, float], counted(2, 2, "two numbers in brackets")]
 Range = Annotated[Pair, must(lambda ends: ends[0] <= ends[1], "must be [low, high] with low ≤ high")]
@@ -89,9 +90,7 @@ class ParameterEntry(Record):
     high: float = Field(description="how far a fit may go up")
     unit: Name = Field(description="text for tables")
     scope: Literal["gripper", "object", "recording", "grasp"] = Field(description="of what there is one value each")
-    writes: list[Annotated[FieldWrite, PlainValidator(_field_write)]] = Field(
-        description="fields of MuJoCo's model that take the value", examples=["[dof_damping]"]
-    )
+    writes: Writes = Field(description="fields of MuJoCo's model that take the value", examples=["[dof_damping]"])
 
     @model_validator(mode="after")
     def _leaves_room(self) -> ParameterEntry:
@@ -262,3 +261,17 @@ class MechanismDescription(Record):
     parameters: Annotated[dict[str, ServoParameter], AfterValidator(_writes_or_is_read)] = Field(
         description="the base model"
     )
+    settings: dict[str, Writes] = Field(
+        default_factory=dict,
+        description="numbers of a recording that the scene takes as they are, where recordings have them",
+        examples=["{mass: [body_mass]}"],
+    )
+
+    @model_validator(mode="after")
+    def _settings_are_given(self) -> MechanismDescription:
+        for name, writes in self.settings.items():
+            if name in self.parameters:
+                raise wrong("is among the parameters, too; a number is given or fitted", "settings", name)
+            if not writes:
+                raise wrong("must name a field of the model, such as `body_mass`", "settings", name)
+        return self

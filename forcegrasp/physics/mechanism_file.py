@@ -47,6 +47,7 @@ def load_mechanism(path: Path, raw: dict[str, Any]) -> Gripper:
         force_scale=scale.force or 0.0,  # the scene's to say
         command=said.command,
         unsigned=said.effort == "unsigned",
+        settings={name: tuple(writes) for name, writes in said.settings.items()},
     )
     return _in_scene(mechanism)
 
@@ -74,9 +75,11 @@ def _in_scene(mechanism: Gripper) -> Gripper:
             if name in [getattr(other, key) for other in mechanism.motors[:index]]:
                 raise refusal(mechanism.path, f"motors[{index}].{key}", f"{name} is there twice")
     joints = [motor.joint for motor in mechanism.motors]
-    for parameter in mechanism.parameters.values():
-        for write in parameter.writes:
-            where = f"{mechanism.path}: parameters.{parameter.name}.writes: {write.field}"
+    written = {f"parameters.{name}.writes": p.writes for name, p in mechanism.parameters.items()}
+    written |= {f"settings.{name}": writes for name, writes in mechanism.settings.items()}
+    for key, writes in written.items():
+        for write in writes:
+            where = f"{mechanism.path}: {key}: {write.field}"
             check_write(where, model, write)
             if write.joint and write.joint not in joints:
                 raise ConfigError(f"{where}@{write.joint}: is no motor's joint{closest(write.joint, joints)}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from collections.abc import Sequence
 from typing import Any
 
 import mujoco
@@ -12,7 +13,7 @@ from mujoco.batch import Batch
 from forcegrasp.physics import guard
 from forcegrasp.physics.fast import SPHERE
 from forcegrasp.physics.gripper import Gripper
-from forcegrasp.physics.gripper_parts import BaseParameter
+from forcegrasp.physics.gripper_parts import FieldWrite
 from forcegrasp.physics.inertia import inertia_of_radius
 from forcegrasp.physics.scene_layout import SceneLayout
 
@@ -92,18 +93,15 @@ class ModelFields(SceneLayout):
         self.field(name)
         return self._base[name]
 
-    def write(self, parameter: BaseParameter, ids: np.ndarray, values: np.ndarray) -> None:
-        """Writes a base parameter of these rows into the fields that follow it. ``values``: ``(len(ids),)``."""
-        rows = {"actuator": self.actuators, "dof": self.gripper_dofs, "geom": self.object_geoms}
+    def write(self, writes: Sequence[FieldWrite], ids: np.ndarray, values: np.ndarray) -> None:
+        """Writes a number of these rows into the fields that follow it. ``values``: ``(len(ids),)``."""
         joints = [motor.joint for motor in self.gripper.motors]
-        for write in parameter.writes:
+        bodies = [int(self.model.joint(joint).bodyid[0]) for joint in joints]  # that the motors move
+        rows = {"actuator": self.actuators, "body": bodies, "dof": self.gripper_dofs, "geom": self.object_geoms}
+        of_motors = rows | {"dof": self.motor_dofs}
+        for write in writes:
             kind = write.field.split("_")[0]
-            own = (
-                [(self.actuators if kind == "actuator" else self.motor_dofs)[joints.index(write.joint)]]
-                if write.joint
-                else []
-            )
-            for row in own or rows[kind]:
+            for row in [of_motors[kind][joints.index(write.joint)]] if write.joint else rows[kind]:
                 column = () if write.column is None else (write.column,)
                 more = self._more_damping[row] if write.field == "dof_damping" else 0.0
                 self._write_base(write.field, (ids, row, *column), write.sign * values + more)

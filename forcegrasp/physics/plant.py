@@ -343,5 +343,6 @@ def write_base(plant: Plant, ids: np.ndarray, values: Mapping[str, np.ndarray]) 
         elif name == "radius_m":
             plant.write_radius(ids, value)
         elif name not in ("offset_m", START_VELOCITY, *OF_READINGS):
-            plant.write(plant.gripper.parameters[name], ids, value)
+            given = plant.gripper.settings.get(name)
+            plant.write(plant.gripper.parameters[name].writes if given is None else given, ids, value)
     return values.get("offset_m", np.zeros(len(ids)))

@@ -44,6 +44,7 @@ def symptom_of(target: Target, before: Fit, after: Fit) -> Symptom:
         (float(falls[..., k][target.phase == phase].sum()), k, phase)
         for k in range(len(target.axis))
         for phase in range(len(target.phases))
+        if (target.phase == phase).any()  # where the error rises everywhere, one without samples would be the best
     ]
     _, k, phase = max(cells)
     inside = target.phase == phase

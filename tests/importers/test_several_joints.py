@@ -76,7 +76,7 @@ def test_a_parameter_writes_the_joint_that_it_names():
     arm = load_gripper(str(ARM))
     plant, ids = Plant(arm, 1), np.arange(1)
     for name, value in (("shoulder_damping", 0.7), ("elbow_gain", 9.0)):
-        plant.write(arm.parameters[name], ids, np.array([value]))
+        plant.write(arm.parameters[name].writes, ids, np.array([value]))
     assert plant.field("dof_damping")[0].tolist() == [0.7, 0.2]
     assert plant.field("actuator_gainprm")[0, :, 0].tolist() == [9.0, 15.0]
 

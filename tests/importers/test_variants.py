@@ -13,7 +13,7 @@ import torch
 
 from forcegrasp.cli.main import main
 from forcegrasp.errors import MeasurementError
-from forcegrasp.importers import Recording, read_source, unlike
+from forcegrasp.importers import Recording, mechanism_of, read_source, unlike
 
 TIME = np.arange(60) * 0.02
 COMMAND = np.sin(5 * TIME)
@@ -121,9 +121,12 @@ def bam(file: Path, **more: object) -> Path:
 def test_bam_of_other_recorders(tmp_path):
     one = read(bam(tmp_path / "mx.json", **{"arm-mass": 0.02, "vin": 15.0}), "bam")
     assert one.settings == {"kp": 32.0, "mass": 1.13, "length": 0.12, "arm_mass": 0.02, "vin": 15.0}
-    (line,) = unlike("bam", [one, one])
-    assert "these logs of motor mx106, mass 1.13, length 0.12: give mechanism=" in line
-    assert not unlike("bam", [read(bam(tmp_path / "xl.json", motor="xl330", mass=0.49, length=0.1), "bam")])
+    other = read(bam(tmp_path / "xl.json", motor="xl330"), "bam")
+    assert [mechanism_of("bam", [log]) for log in (one, other)] == ["bam_pendulum", "xl330_pendulum"]
+    assert mechanism_of("sage", [one]) == "so101_jaw"
+    both = "mx_sin of bam_pendulum, xl_sin of xl330_pendulum: recordings of several mechanisms; import them apart"
+    with pytest.raises(MeasurementError, match=both.replace("_sin", "")):
+        mechanism_of("bam", [one, other])
 
     log = json.loads((tmp_path / "mx.json").read_text())
     for entry in log["entries"]:
@@ -153,11 +156,11 @@ def test_bam_s_resampled_copies_are_not_taken_for_more_recordings(tmp_path):
     assert not [note for note in read(tmp_path / "data_processed", "bam").notes if "copies" in note]
 
 
-def test_the_verb_warns_of_another_servo_where_no_mechanism_is_given(tmp_path, capsys):
-    log = str(bam(tmp_path / "mx.json"))
-    for given, warned in (("", True), ("mechanism=xl330_pendulum", False)):
-        assert main(["import", log, "format=bam", f"out={tmp_path / str(warned)}", *given.split()]) == 0
-        assert ("warning: xl330_pendulum is of motor xl330" in capsys.readouterr().out) == warned
+def test_the_verb_takes_the_mechanism_of_the_logs_servo_where_none_is_given(tmp_path, capsys):
+    for given, motor, taken in (("", "mx106", "bam"), ("", "xl330", "xl330"), ("xl330_pendulum", "mx106", "xl330")):
+        log = str(bam(tmp_path / "a.json", motor=motor))
+        assert main(["import", log, "format=bam", f"out={tmp_path / (motor + given)}", f"mechanism={given}"]) == 0
+        assert f"60 samples of {taken}_pendulum" in capsys.readouterr().out
 
 
 def test_emps_without_the_constants_of_its_drive_and_with_broken_signals(tmp_path):

@@ -77,7 +77,7 @@ def test_a_damping_that_is_written_keeps_what_the_step_needs():
     made_up = plant.model.dof_damping - reference.model.dof_damping
     assert made_up.max() > 0
     for one in (plant, reference):
-        one.write(gripper.parameters["joint_damping"], np.arange(2), np.array([20.0, 50.0]))
+        one.write(gripper.parameters["joint_damping"].writes, np.arange(2), np.array([20.0, 50.0]))
     fingers = reference.motor_dofs
     difference = plant.field("dof_damping")[:, fingers] - reference.field("dof_damping")[:, fingers]
     assert difference == pytest.approx(np.broadcast_to(made_up[fingers], (2, 2)))

@@ -239,7 +239,7 @@ BROKEN_VALUES = [
     (f"{_DAMPING}.writes", ["damping"], f"{_DAMPING}.writes[0]: 'damping' must look like"),
     (f"{_DAMPING}.writes", ["dof_damping x"], f"{_DAMPING}.writes[0]: 'dof_damping x' must look like"),
     (f"{_DAMPING}.writes", [{"dof_damping": 0}], "must look like"),
-    (f"{_DAMPING}.writes", ["body_mass"], "'body_mass' must look like"),
+    (f"{_DAMPING}.writes", ["tendon_damping"], "'tendon_damping' must look like"),
     (f"{_DAMPING}.writes", ["dof_dampin"], "in MuJoCo's model; did you mean dof_damping"),
     (f"{_DAMPING}.writes", ["geom_type"], "geom_type is no field of numbers"),
     (f"{_DAMPING}.writes", ["dof_damping 0"], "dof_damping needs no column"),

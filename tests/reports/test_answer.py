@@ -224,3 +224,11 @@ def test_a_value_has_one_interval_wherever_it_stands(made_up, tmp_path):
     assert line == f"  left_n {written['value']:.4g} N (95 %: {interval})"
     table = next(b for b in diagnosis_report.sections(diagnosis, None, made_up.tried)[1].blocks if hasattr(b, "header"))
     assert list(table.rows[0]) == ["left_n", f"{written['value']:.4g}", interval, "N"]
+
+
+def test_a_symptom_is_where_there_are_samples_though_the_error_rises_everywhere(made_up):
+    target, before, after = made_up.target, made_up.added.before, made_up.added.after
+    phase = target.phase.copy()
+    phase[phase == phase.max()] = phase.min()
+    symptom = symptom_of(dataclasses.replace(target, phase=phase), after, before)
+    assert symptom.after.samples == symptom.before.samples > 0
