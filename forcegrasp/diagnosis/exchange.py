@@ -34,11 +34,10 @@ def exchange(
       steps: that found the effects.
       rng: for the null distribution.
     """
-    held = study.heldout(fit)
-    fitted = [step for step in kept_steps(steps) if not step.is_counted]
-    for step in fitted if len(fitted) > 1 else ():  # the only one was chosen with all there is in the model
-        name = step.effects[0]
-        alike = [e for e in effects if are_alike(e, type_of(name, fit))]
+    held, known = study.heldout(fit), {one.effect.name: one.effect for one in fit.problem.effects}
+    names = [step.effects[0] for step in kept_steps(steps) if step.effects[0] in known and not step.is_counted]
+    for name in names if len(names) > 1 else ():  # the only one was chosen with all there is in the model
+        alike = [e for e in effects if are_alike(e, known[name])]
         if not alike:
             continue
         study.progress(f"looking for what may stand in place of {name}")
@@ -59,11 +58,6 @@ def _against(candidate: Candidate, held: np.ndarray, study: Study) -> Candidate:
     """A candidate judged against the model that has what it may replace, by the residuals that this leaves."""
     after = study.heldout(candidate.fit)
     return dataclasses.replace(candidate, gains=study.gains(held, after), share=study.explained(held, after))
-
-
-def type_of(name: str, fit: Fit) -> type[Effect]:
-    """The effect of that name in a fit."""
-    return next(one.effect for one in fit.problem.effects if one.effect.name == name)
 
 
 def are_alike(one: type[Effect], other: type[Effect]) -> bool:
