@@ -232,3 +232,15 @@ def test_a_symptom_is_where_there_are_samples_though_the_error_rises_everywhere(
     phase[phase == phase.max()] = phase.min()
     symptom = symptom_of(dataclasses.replace(target, phase=phase), after, before)
     assert symptom.after.samples == symptom.before.samples > 0
+
+
+def test_shares_and_what_is_left_are_one_though_recordings_are_weighed_anew(made_up):
+    """The second step starts from more than the first one left."""
+    two = two_effects(made_up)
+    first, second = two.steps
+    second = dataclasses.replace(second, error_before=3.0, error_after=2.0)
+    jumped = dataclasses.replace(two, steps=(first, second), error_after=2.0)
+    shares = jumped.shares()
+    assert sum(shares.values()) == pytest.approx(1 - (2.0**2 - 1) / (5.0**2 - 1))
+    assert shares["force_bias"] / shares["force_drift"] == pytest.approx((5.0**2 - 2.2**2) / (3.0**2 - 2.0**2))
+    assert two.shares()["force_bias"] == pytest.approx((5.0**2 - 2.2**2) / (5.0**2 - 1))  # without a jump as it fell
