@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import re
 import shutil
@@ -9,6 +10,7 @@ import subprocess
 import urllib.request
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -245,3 +247,21 @@ def test_a_report_is_read_without_scripts(browser, diagnosed, tmp_path):
     assert "forcegrasp diagnose" in text
     assert "Look at the grasps" not in text
     assert any("Content Security Policy" in message for message in browser.messages())
+
+
+def test_what_is_not_counted_does_not_flatten_what_is(browser, made_up, tmp_path):
+    far = made_up.comparison.predicted.copy()
+    far[:, :5] += 1000 * made_up.target.sigma
+    highest = {}
+    for first_phase in (-1, 0):
+        phase = made_up.target.phase.copy()
+        phase[:, :5] = first_phase
+        target = dataclasses.replace(made_up.target, phase=phase)
+        comparison = dataclasses.replace(made_up.comparison, target=target, predicted=far)
+        changed = SimpleNamespace(**(vars(made_up) | {"comparison": comparison}))
+        browser.ask("/url", url=write("compare", changed, tmp_path / str(first_phase)).as_uri())
+        labels = "[...document.querySelectorAll('.charts > svg text[text-anchor=end]')]"
+        highest[first_phase] = browser.run(
+            f"return Math.max(...{labels}.map(t => Math.abs(parseFloat(t.textContent))))"
+        )
+    assert highest[-1] < 100 < 500 < highest[0]
