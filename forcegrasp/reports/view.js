@@ -140,7 +140,7 @@ function showView(place, data) {
     const x = t => left + ((t - low) / (high - low || 1)) * (right - left);
     const within = time.map((t, k) => k).filter(k => time[k] >= low && time[k] <= high), every = Math.ceil(within.length / 1500);
     const inside = within.filter((k, place) => place % every === 0);
-    // what is not counted, such as a start whose forces nobody knows, must not flatten all else
+    // what a model says where it is not counted, such as at a start whose forces nobody knows, must not flatten all else
     const counts = k => !part.spans.some(([phase, from, to]) => phase < 0 && time[k] >= from && (time[k] < to || k === time.length - 1));
     const counted = inside.filter(counts), scaled = counted.length ? counted : inside;
     // a line goes on to the edges of what is seen
@@ -148,7 +148,7 @@ function showView(place, data) {
     const measured = part.measured[signal], models = part.predicted.map(p => p[signal]);
 
     function panel(y0, y1, curves, factor, dots, always, label, extra) {
-      const values = [...always, ...curves.flatMap(c => scaled.map(k => factor * c[k]))], bottom = Math.min(...values), ceiling = Math.max(...values);
+      const values = [...always, ...curves.flatMap((c, n) => (dots && n === 0 ? inside : scaled).map(k => factor * c[k]))], bottom = Math.min(...values), ceiling = Math.max(...values);
       const margin = 0.06 * (ceiling - bottom) || factor;
       const y = v => y1 - ((v - bottom + margin) / (ceiling - bottom + 2 * margin)) * (y1 - y0);
       const inner = shape(svg, "svg", { x: left, y: y0, width: right - left, height: y1 - y0, viewBox: `${left} ${y0} ${right - left} ${y1 - y0}` });
