@@ -44,13 +44,11 @@ def exchange(
         found = look_further(study, roughly_without(name, fit, study), screen, alike, rng)
         if not found.effects:
             continue
-        candidates = tuple(_against(c, held, study) for c in found.candidates)
-        best = candidates[0]
+        best = dataclasses.replace(_against(found.candidates[0], held, study), replaces=name)
         if is_beyond_chance(best.gains, LEAST_RISE) and best.share >= LEAST_SHARE:
             study.progress(f"{best.effect.name} does better than {name}")
-            first = dataclasses.replace(best, replaces=name)
-            error = study.error(held)
-            return dataclasses.replace(found, candidates=(first, *candidates[1:]), error_before=error, of_many=False)
+            candidates = (best, *(_against(c, held, study) for c in found.candidates[1:]))
+            return dataclasses.replace(found, candidates=candidates, error_before=study.error(held), of_many=False)
     return None
 
 

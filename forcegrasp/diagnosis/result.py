@@ -164,7 +164,8 @@ class Diagnosis(ShortRepr):
             shares[step.effects[0]] = float(fall) + shares.pop(step.replaces, 0.0)
         # recordings are weighed anew after each step, and what one starts from is then not what the last one left
         most, total = 1.0 - max(0.0, self.error_after**2 - 1.0) / beyond, sum(shares.values())
-        return {name: share * min(1.0, most / total) if total > 0 else share for name, share in shares.items()}
+        factor = min(1.0, most / total) if total > 0 else 1.0
+        return {name: factor * share for name, share in shares.items()}
 
     def summary(self) -> str:
         change = f"error {self.error_before:.2f} → {self.error_after:.2f} × noise, floor {self.floor:.2f}"

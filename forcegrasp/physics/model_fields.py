@@ -96,7 +96,7 @@ class ModelFields(SceneLayout):
     def write(self, writes: Sequence[FieldWrite], ids: np.ndarray, values: np.ndarray) -> None:
         """Writes a number of these rows into the fields that follow it. ``values``: ``(len(ids),)``."""
         joints = [motor.joint for motor in self.gripper.motors]
-        bodies = [int(self.model.joint(joint).bodyid[0]) for joint in joints]  # that the motors move
+        bodies = self.model.dof_bodyid[self.motor_dofs]  # that the motors move
         rows = {"actuator": self.actuators, "body": bodies, "dof": self.gripper_dofs, "geom": self.object_geoms}
         of_motors = rows | {"dof": self.motor_dofs}
         for write in writes:

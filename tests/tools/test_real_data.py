@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tools.marked_part import marks
-from tools.real_data import bam_models, dfki_regression, emps_loop
+from tools.real_data import bam_models, dfki_regression, emps_loop, emps_regression
 from tools.real_data.page import WRITER, write_page
 from tools.real_data.study import Error, Parameter, Study, checksums
 from tools.real_data.verbs import Verbs
@@ -23,6 +23,18 @@ def test_a_carriage_at_constant_speed_needs_what_its_friction_takes():
     assert emps_loop.GTAU * volts[-1] == pytest.approx(force, rel=1e-3)
     lag = speed * time[-1] - position[-1]
     assert emps_loop.KV * (emps_loop.KP * lag - speed) == pytest.approx(force / emps_loop.GTAU, rel=1e-3)
+
+
+def test_a_regression_finds_the_friction_that_a_carriage_has():
+    time = np.arange(0, 6, emps_loop.PERIOD_S)
+    goal, one = 0.1 * np.sin(2 * np.pi * 0.4 * time), emps_loop.Carriage()
+    position, volts = emps_loop.simulate(one, goal, np.zeros_like(time), 0.0).T
+    found, left = emps_regression.regress({"qm": position, "vir": volts}, ("offset", "d"))
+    truth = {"M": one.mass, "Fv": one.viscous, "Fc": one.coulomb, "offset": one.offset}
+    assert {name: found[name] for name in truth} == pytest.approx(truth, rel=0.1)
+    assert abs(found["d"]) < 0.05 * one.viscous
+    _, without = emps_regression.regress({"qm": position, "vir": volts}, ())
+    assert without > 1.5 * left
 
 
 def test_pulses_push_the_carriage_and_do_not_count_as_the_drives_voltage():
@@ -152,6 +164,9 @@ def test_what_was_run_is_not_run_again(tmp_path, monkeypatch):
     assert len(ran) == 1
     Verbs(tmp_path / "study").run("import", "import", "b", makes="set")
     assert len(ran) == 2
+    verbs = Verbs(tmp_path / "study")
+    verbs.done["diagnosis"] = {"command": [], "seconds": 40.0}
+    assert verbs.seconds() == verbs.seconds("import") + verbs.seconds("diagnosis") >= 40.0
     assert json.loads((tmp_path / "study" / "commands.json").read_text())["import"]["command"][1] == "b"
 
 

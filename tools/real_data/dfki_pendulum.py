@@ -33,7 +33,7 @@ def study(data: Path, out: Path) -> Study:
         "weight and rod as published; the rotor's inertia and viscous friction are fitted",
         "windows of 0.3 s, each held out once",
         checksums(data, sorted(folder.glob("data_*.csv"))), [" ".join(s["command"]) for s in verbs.done.values()],
-        seconds=verbs.seconds,
+        seconds=verbs.seconds(),
     )  # fmt: skip
     model = read_model(best_model(out / "diagnosis"))
     add_base(result, model, AS_EFFECTS)

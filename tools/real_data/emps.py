@@ -32,7 +32,7 @@ def study(data: Path, out: Path) -> Study:
         "emps", "EMPS: a carriage on a ball screw",
         "the drive with its published gains; mass and viscous friction are fitted",
         "fitted on DATA_EMPS, judged on DATA_EMPS_PULSES, replayed from start to end",
-        checksums(data, list(folder.glob("*.mat"))), seconds=verbs.seconds,
+        checksums(data, list(folder.glob("*.mat"))), seconds=verbs.seconds("import_fit", "import_check", "diagnosis"),
     )  # fmt: skip
     best = best_model(out / "diagnosis")
     model = read_model(best)

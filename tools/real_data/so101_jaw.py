@@ -43,7 +43,7 @@ def study(data: Path, out: Path, splits: int = SPLITS) -> Study:
         result.errors.append(Error(motion, "mrad", left, then, noise))
     if splits:
         result.tables["Splits by whole motions"] = _splits(verbs, measured, motions, out, splits)
-    result.seconds = sum(verbs.done[step]["seconds"] for step in ("import", "diagnosis"))  # of all motions together
+    result.seconds = verbs.seconds("import", "diagnosis")  # of all motions together
     return result
 
 

@@ -27,10 +27,9 @@ class Verbs:
     def _file(self) -> Path:
         return self.out / "commands.json"
 
-    @property
-    def seconds(self) -> float:
-        """Of all steps together."""
-        return sum(step["seconds"] for step in self.done.values())
+    def seconds(self, *steps: str) -> float:
+        """Of these steps together, or of all; one that was done before counts what it took then."""
+        return sum(self.done[step]["seconds"] for step in steps or self.done)
 
     def run(self, step: str, verb: str, *arguments: str, makes: str | Path) -> Path:
         """Runs ``forcegrasp verb arguments out=makes``, unless this very command was run before; returns its folder.

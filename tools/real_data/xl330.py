@@ -55,7 +55,7 @@ def study(data: Path, out: Path) -> Study:
     family.append(["all that was found", f"{after:.1f}", ", ".join(result.found)])
     result.tables["One member of the friction family at a time, added to the base model"] = family
     result.tables["The authors' models, fitted here on the same logs"] = _yardsticks(files, check, out)
-    result.commands, result.seconds = [" ".join(s["command"]) for s in verbs.done.values()], verbs.seconds
+    result.commands, result.seconds = [" ".join(s["command"]) for s in verbs.done.values()], verbs.seconds()
     return result
 
 
