@@ -17,8 +17,11 @@ _OTHER_CLOCK = 1.2
 _OFTEN, _LEAST_COMMANDS = 0.05, 40
 # Rows at the start of a grasp, before anything is touched, that a zero is read from: seconds, and rows at least.
 _FREE_S, _LEAST_ROWS = 0.25, 5
-# A zero has changed if it differs by so many times what it scatters, with two grasps at least on either side.
-_CHANGED, _EITHER_SIDE = 10.0, 2
+# A zero has changed if it differs by so many standard deviations of a grasp's own, with two grasps at least on either
+# side, of which this share lies nearer to its own side's median: a drift from grasp to grasp has neither.
+_CHANGED, _EITHER_SIDE, _STAYS = 5.0, 2, 0.8
+# The standard deviation over the median absolute deviation, of a normal distribution.
+_MAD = 1.4826
 # Two channels press on the same object: one that reads so many times the other is in another unit.
 _OTHER_UNIT, _SAMPLES = 5.0, 20
 
@@ -88,15 +91,23 @@ def find_tare(measured: MeasurementSet) -> Tare | None:
     if measured.columns.read_effort or not zeros.size or len(zeros) < 2 * _EITHER_SIDE:
         return None
     noise = np.median([[force_noise(f) for f in grasp.force_n.T] for grasp in measured.grasps], axis=0)
-    best, found = _CHANGED, None
-    for first in range(_EITHER_SIDE, len(zeros) - _EITHER_SIDE + 1):
-        before, after = zeros[:first], zeros[first:]
-        change = after.mean(axis=0) - before.mean(axis=0)
-        scatter = np.maximum.reduce([np.ptp(before, axis=0) / 2, np.ptp(after, axis=0) / 2, noise / 2])
-        size = np.abs(change) / np.maximum(scatter, 1e-9)
-        if size.max() > best:
-            best, found = float(size.max()), Tare(first, np.where(size > _CHANGED / 2, change, 0.0))
-    return found
+    least = np.maximum(noise / np.sqrt(_LEAST_ROWS), 1e-9)
+    # the split about whose sides' medians readings lie closest: a grasp that starts in contact moves no median
+    splits = range(_EITHER_SIDE, len(zeros) - _EITHER_SIDE + 1)
+    first = min(splits, key=lambda first: float((np.abs(zeros - _sides(zeros, first)) / least).sum()))
+    sides = _sides(zeros, first)
+    apart, change = np.abs(zeros - sides), sides[-1] - sides[0]
+    scatter = np.maximum(_MAD * np.median(apart, axis=0), least)
+    near = apart < np.abs(zeros - (sides[0] + sides[-1] - sides))
+    stays = np.minimum(near[:first].mean(axis=0), near[first:].mean(axis=0)) >= _STAYS
+    changed = (np.abs(change) > _CHANGED * scatter) & stays
+    return Tare(first, np.where(changed, change, 0.0)) if changed.any() else None
+
+
+def _sides(zeros: np.ndarray, first: int) -> np.ndarray:
+    """Each grasp's median zero of its side of a split, ``(grasps, channels)``."""
+    before, after = np.median(zeros[:first], axis=0), np.median(zeros[first:], axis=0)
+    return np.where(np.arange(len(zeros))[:, None] < first, before, after)
 
 
 def _zero(time: np.ndarray, force: np.ndarray) -> np.ndarray:

@@ -69,6 +69,18 @@ def test_a_zero_that_changes_for_good(sound):
     assert "grasp 'g4': from here on forces are shifted (f_l_n by -0.3" in warning
 
 
+def test_a_small_change_of_zero_amid_noise_and_grasps_that_start_pressed(sound):
+    def readings(index, force):
+        force = force + rng.normal(0, 0.013, force.shape)
+        return force + (0.5 if index in (2, 9) else 0.1 * (index >= 6))
+
+    rng = np.random.default_rng(4)
+    tare = find_tare(pressed(make_set([make_grasp(i) for i in range(14)]), readings))
+    assert tare is not None
+    assert tare.first == 6
+    assert tare.change_n == pytest.approx([0.1, 0.1], abs=0.02)
+
+
 @pytest.mark.parametrize(
     "drift",
     [
