@@ -82,7 +82,7 @@ def diagnose_set(
             if not fault.is_borne_out(further.fit):  # an effect had made it seem so
                 continue
             found = with_fault(further, fault.told_by(further.fit), (said[0], said[2].fit))
-            certain = not found.left and fault.moved is None  # else an effect may do as well
+            certain = not found.left and fault.moved is None and not fault.of_most  # else an effect may do as well
             likely = found if certain else more_likely(found, search(*said))
             return with_law(likely, right[1] if likely.target.grasps is right[0].grasps else said[1])
     return with_law(*as_said())

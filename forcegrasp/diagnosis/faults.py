@@ -10,7 +10,7 @@ import numpy as np
 
 from forcegrasp.diagnosis.felt_sizes import SEEN_M, doubtful_radii
 from forcegrasp.diagnosis.signatures import Background
-from forcegrasp.diagnosis.tolerance import WORTH, Moved, move_given
+from forcegrasp.diagnosis.tolerance import MOST, WORTH, Moved, move_given, wanted_moves
 from forcegrasp.identify.base_fit import rms_error
 from forcegrasp.identify.fit import Fit
 from forcegrasp.identify.intervals import listed
@@ -38,11 +38,17 @@ class Fault(ShortRepr):
     put_right: Loaded[MeasurementSet]
     moved: Moved | None = None  #: what was moved within the tolerance of what is given, so that it is no fault
     fitted_m: dict[str, float] = field(default_factory=dict)  #: given radii that are fitted instead, by object, metres
+    least_m: float = SEEN_M  #: by how much less they were as given
+    of_most: bool = False  #: radii of most objects are doubted, so that an effect may do as well
 
     def is_borne_out(self, fit: Fit) -> bool:
         """Whether a fit of the set put right, with the effects that were found, still wants other radii than given."""
+        wrong = self._still_wrong(fit)
+        return bool(wrong) if self.of_most else len(wrong) == len(self.fitted_m)
+
+    def _still_wrong(self, fit: Fit) -> list[str]:
         values = _radii(fit)
-        return all(abs(values[name] - said) > SEEN_M for name, said in self.fitted_m.items())
+        return [name for name, said in self.fitted_m.items() if abs(values[name] - said) > self.least_m]
 
     def told_by(self, fit: Fit) -> Fault:
         """The same with what a fit of the set put right makes of what is fitted."""
@@ -50,6 +56,7 @@ class Fault(ShortRepr):
         told = [
             f"the radius of {name} is {1e3 * values[name]:.1f} mm, the set says {1e3 * said:.1f} mm"
             for name, said in self.fitted_m.items()
+            if name in self._still_wrong(fit)
         ]
         return dataclasses.replace(self, words="; ".join(told)) if told else self
 
@@ -91,14 +98,27 @@ def suspects(loaded: Loaded[MeasurementSet], target: Target, fit: Fit) -> list[F
         words = f"{listed(early)} are what was read one row later{late}"
         check = "which row each column was written to, and its clock"
         found.append(Fault("early_row", words, check, _changed(loaded, lambda _, g: _one_row_later(g, early))))
-    if wrong := doubtful_radii(target, fit, measured.radius_std_m):
-        words = f"fingers met {listed(list(wrong))} elsewhere than the set says"
-        right = _changed(loaded, lambda _, g: dataclasses.replace(g, radius_m=None) if g.object in wrong else g)
-        check = f"the radius of {listed(list(wrong))}, with a calliper: it may be another object's, or a diameter"
-        found.append(Fault("object_radius", words, check, right, fitted_m=wrong))
-    if not found and (moved := within_tolerance(loaded, target, fit)) is not None:
-        found.append(moved)
+    wrong = doubtful_radii(target, fit, measured.radius_std_m)
+    moved = None if found else wanted_moves(measured, target, fit)
+    apart = [] if moved is None or moved.is_within else moved.radii_apart()
+    if set(apart) > set(wrong):
+        said = {g.object: g.radius_m for g in measured.grasps if g.object in apart and g.radius_m is not None}
+        check = "the radii, with a calliper; were they measured by a ruler, meta.yaml may say object_radius_std_m"
+        doubted = dataclasses.replace(_wrong_radii(loaded, said), check=check, of_most=True)
+        found.append(dataclasses.replace(doubted, least_m=MOST * measured.radius_std_m))
+    elif wrong:
+        found.append(_wrong_radii(loaded, wrong))
+    elif moved is not None and moved.is_within:
+        found.append(_moved(loaded, moved))
     return found
+
+
+def _wrong_radii(loaded: Loaded[MeasurementSet], wrong: dict[str, float]) -> Fault:
+    """Given radii, by object, are to be fitted instead."""
+    words = f"fingers met {listed(list(wrong))} elsewhere than the set says"
+    right = _changed(loaded, lambda _, g: dataclasses.replace(g, radius_m=None) if g.object in wrong else g)
+    check = f"the radius of {listed(list(wrong))}, with a calliper: it may be another object's, or a diameter"
+    return Fault("object_radius", words, check, right, fitted_m=wrong)
 
 
 def within_tolerance(loaded: Loaded[MeasurementSet], target: Target, fit: Fit, worth: float = WORTH) -> Fault | None:
@@ -111,8 +131,10 @@ def within_tolerance(loaded: Loaded[MeasurementSet], target: Target, fit: Fit, w
       worth: least share of the squares beyond the noise.
     """
     moved = move_given(loaded.measured, target, fit, worth)
-    if moved is None:
-        return None
+    return None if moved is None else _moved(loaded, moved)
+
+
+def _moved(loaded: Loaded[MeasurementSet], moved: Moved) -> Fault:
     name, right = f"{'_and_'.join(moved.groups)}_tolerance", _changed(loaded, lambda _, g: moved.put(g))
     return Fault(name, moved.words(), moved.check, right, moved)
 

@@ -17,8 +17,10 @@ from forcegrasp.measure.schema import MeasuredGrasp, MeasurementSet
 from forcegrasp.physics.gripper import FORCE_SKEW, SKEW
 from forcegrasp.replay.replay import Replay
 
-# What is further off than so many standard deviations is no tolerance; what is nearer than this is not told.
-_MOST, _TOLD = 3.0, 1.0
+#: What is further off than so many standard deviations is no tolerance.
+MOST = 3.0
+# What is nearer than so many is not told.
+_TOLD = 1.0
 # All moves together are no surprise if one of so many standard deviations would be as likely.
 _NO_SURPRISE = 2.0
 #: It is worth a fit if it takes this share off the squares that a fit leaves beyond the noise.
@@ -87,6 +89,17 @@ class Moved:
         return float(len(self.numbers) + np.sum(self.deviations**2) / 2)
 
     @property
+    def is_within(self) -> bool:
+        """Whether all are within the tolerance."""
+        return bool(np.abs(self.deviations).max() < MOST)
+
+    def radii_apart(self) -> list[str]:
+        """Objects whose radius is beyond the tolerance, if that is not so of all alike, as an effect would have it."""
+        sizes = {n.owner: move for n, move in zip(self.numbers, self.deviations, strict=True) if n.kind == "radius_m"}
+        alike = not sizes or max(sizes.values()) - min(sizes.values()) < MOST
+        return [] if alike else [name for name, move in sizes.items() if abs(move) >= MOST]
+
+    @property
     def is_no_surprise(self) -> bool:
         """Whether what is given need be no less exact than was said."""
         return bool(np.sum(self.deviations**2) <= _NO_SURPRISE**2)
@@ -126,7 +139,13 @@ def all_radii(measured: MeasurementSet, target: Target, move_m: float) -> Moved 
 
 
 def move_given(measured: MeasurementSet, target: Target, fit: Fit, worth: float = WORTH) -> Moved | None:
-    """What is given as the readings have it; None if that explains little, or takes more than the tolerance.
+    """What :func:`wanted_moves` says, if that is within the tolerance of what is given; else None."""
+    moved = wanted_moves(measured, target, fit, worth)
+    return moved if moved is not None and moved.is_within else None
+
+
+def wanted_moves(measured: MeasurementSet, target: Target, fit: Fit, worth: float = WORTH) -> Moved | None:
+    """What is given as the readings have it, up to :data:`MOST` standard deviations; None if that explains little.
 
     Linear steps from a fit, whose parameters follow, with a Gaussian prior of the set's standard deviations on what is
     given: on the time of reading or the clock's period alone, on both, on radii and places, or on all.
@@ -135,6 +154,7 @@ def move_given(measured: MeasurementSet, target: Target, fit: Fit, worth: float 
       measured: the set.
       target: its grasps, lined up.
       fit: of the base model, with all as given.
+      worth: least share of the squares beyond the noise.
     """
     numbers = _numbers(measured, target)
     columns = _columns(target, fit, numbers)
@@ -152,7 +172,7 @@ def move_given(measured: MeasurementSet, target: Target, fit: Fit, worth: float 
         moved, _ = _step(fit, _columns(target, fit, moved.numbers), moved.numbers, None, before)
         if np.abs(moved.deviations - before).max() < _SETTLED:
             break
-    return moved if 0 < np.abs(moved.deviations).max() < _MOST else None
+    return moved if np.any(moved.deviations) else None
 
 
 def _numbers(measured: MeasurementSet, target: Target) -> tuple[_Number, ...]:
@@ -220,5 +240,5 @@ def _step(
     slopes = np.column_stack([fit.jacobian.reshape(-1, len(fit.problem)), columns[:, chosen]])
     prior, residual = np.eye(slopes.shape[1])[len(fit.problem) :], fit.residual.ravel()
     step = np.linalg.lstsq(np.vstack([slopes, prior]), np.r_[residual, -start], rcond=None)[0]
-    moves = np.clip(start + step[len(fit.problem) :], -_MOST, _MOST)  # the first step may lead too far
+    moves = np.clip(start + step[len(fit.problem) :], -MOST, MOST)  # the first step may lead too far
     return Moved(tuple(numbers[index] for index in chosen), moves), float(np.sum((residual - slopes @ step) ** 2))

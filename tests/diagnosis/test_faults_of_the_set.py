@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from forcegrasp.diagnosis.moved_set import go_on_with_moved, within_tolerance_af
 from forcegrasp.diagnosis.odd_grasps import odd_grasps
 from forcegrasp.diagnosis.result import Diagnosis
 from forcegrasp.diagnosis.search import diagnose
-from forcegrasp.diagnosis.tolerance import move_given
+from forcegrasp.diagnosis.tolerance import move_given, wanted_moves
 from forcegrasp.effects import get_effect
 from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.identify.fit_set import apply_model, fit_model
@@ -95,6 +96,43 @@ def test_one_wrong_radius_is_told_and_fitted(sound):
     assert fitted["radius_m of thing_1"] == pytest.approx(true, abs=1e-4)
     target, _, right = apply_model(loaded, model, silent, refit=True)
     assert not doubtful_radii(target, right.fit, loaded.measured.radius_std_m)
+
+
+def test_radii_that_a_ruler_gave_are_doubted_where_no_effect_would_do(sound):
+    loaded, model = sound
+    off = {"thing_0": 4e-4, "thing_1": -3e-4, "thing_2": 0.0}
+    wrong = changed(loaded, lambda g: dataclasses.replace(g, radius_m=g.radius_m + off[g.object]))
+    target, _, base = apply_model(wrong, model, silent, refit=True)
+    (fault,) = suspects(wrong, target, base.fit)
+    assert (fault.name, fault.of_most, sorted(fault.fitted_m)) == ("object_radius", True, ["thing_0", "thing_1"])
+    assert "object_radius_std_m" in fault.check
+    right = {g.object: g.radius_m for g in fault.put_right.measured.grasps}
+    assert [right[name] is None for name in off] == [True, True, False]
+
+    def fitted(first_m: float, second_m: float):
+        """A fit that says so."""
+        problem = Problem(loaded.gripper, fault.put_right.measured.grasps, [])
+        values = [
+            {"thing_0": first_m, "thing_1": second_m}.get(entry.name.removeprefix("radius_m of "), 0.0)
+            for entry in problem.entries
+        ]
+        return SimpleNamespace(problem=problem, values=np.array(values))
+
+    said = fault.fitted_m
+    one = fitted(said["thing_0"] - 4e-4, said["thing_1"] + 1e-5)
+    assert fault.is_borne_out(one)
+    assert "thing_0" in fault.told_by(one).words
+    assert "thing_1" not in fault.told_by(one).words
+    assert not fault.is_borne_out(fitted(said["thing_0"] + 1e-5, said["thing_1"] + 1e-5))
+
+    alike = changed(loaded, lambda g: dataclasses.replace(g, radius_m=g.radius_m + 4e-4))
+    target, _, base = apply_model(alike, model, silent, refit=True)
+    moved = wanted_moves(alike.measured, target, base.fit)
+    assert moved is not None
+    assert not moved.is_within
+    assert move_given(alike.measured, target, base.fit) is None
+    assert moved.radii_apart() == []
+    assert suspects(alike, target, base.fit) == []
 
 
 def test_swapped_force_columns_are_told(sound):
