@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from forcegrasp.diagnosis.doubt import leaves_less, more_likely, with_fault
-from forcegrasp.diagnosis.faults import suspects
+from forcegrasp.diagnosis.faults import Fault, leaves_nothing, suspects
 from forcegrasp.diagnosis.law import find_law
 from forcegrasp.diagnosis.moved_set import go_on_with_moved, within_tolerance_after_all
 from forcegrasp.diagnosis.result import Diagnosis, Step
@@ -22,12 +22,17 @@ from forcegrasp.identify.fit import Fit, Simulators
 from forcegrasp.identify.loading import Loaded
 from forcegrasp.identify.progress import Progress
 from forcegrasp.identify.target import Target
+from forcegrasp.identify.verdict import Verdict
 from forcegrasp.measure import MeasurementSet
 from forcegrasp.models.model_file import Model
 from forcegrasp.physics.gripper import Gripper
 
 #: A diagnosis needs so many grasps: with fewer, nothing can be held out.
 LEAST_GRASPS = 6
+
+
+#: A set lined up, what simulates its grasps, and the base model that was fitted to it.
+Fitted = tuple[Target, Simulators, BaseFit]
 
 
 def diagnose_set(
@@ -51,7 +56,7 @@ def diagnose_set(
         )
     chosen = chosen_effects(loaded.gripper, names)
 
-    def fitted(one: Loaded[MeasurementSet]) -> tuple[Target, Simulators, BaseFit]:
+    def fitted(one: Loaded[MeasurementSet]) -> Fitted:
         if model is None:
             return fit_set.fit_model(one, seed, progress)
         return fit_set.apply_model(one, model, progress, refit=True)
@@ -74,15 +79,27 @@ def diagnose_set(
         found = find_law(diagnosis, simulators, rng, progress) if law else None
         return dataclasses.replace(diagnosis, law=found, law_sought=law), simulators
 
-    for fault in suspects(loaded, said[0], said[2].fit):
+    def put_right(fault: Fault) -> tuple[Fault, Fitted] | None:
         progress(f"fitting the set with {fault.name} put right")
-        right = fitted(fault.put_right)
-        if leaves_less(fault, (right[0], right[2].fit), (said[0], said[2].fit)):
+        right, wider = fitted(fault.put_right), fault.wider
+        if not leaves_less(fault, (right[0], right[2].fit), (said[0], said[2].fit)):
+            return None
+        if wider is not None and not leaves_nothing(right[2].fit, right[0]):
+            progress("fitting it with the radii of more objects put right")
+            more = fitted(wider.put_right)
+            if leaves_less(wider, (more[0], more[2].fit), (right[0], right[2].fit)):
+                return wider, more
+        return fault, right
+
+    for suspect in suspects(loaded, said[0], said[2].fit):
+        if (better := put_right(suspect)) is not None:
+            fault, right = better
             further = search(*right)
             if not fault.is_borne_out(further.fit):  # an effect had made it seem so
                 continue
             found = with_fault(further, fault.told_by(further.fit), (said[0], said[2].fit))
-            certain = not found.left and fault.moved is None and not fault.of_most  # else an effect may do as well
+            # else effects may do as well without it
+            certain = found.verdict is Verdict.DATA and not (found.left or fault.moved or fault.of_most)
             likely = found if certain else more_likely(found, search(*said))
             return with_law(likely, right[1] if likely.target.grasps is right[0].grasps else said[1])
     return with_law(*as_said())

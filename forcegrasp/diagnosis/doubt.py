@@ -43,10 +43,13 @@ def more_likely(right: Diagnosis, said: Diagnosis) -> Diagnosis:
     """The diagnosis that held-out grasps speak for: of the set put right, or as it is; of neither, both are named."""
     if right.fault is None:
         return right
+    moved, named = right.fault.moved, said.verdict.names_effects
+    if moved is None and named and not said.left and len(said.fit.problem.effects) <= len(right.fit.problem.effects):
+        return said  # which has no fault, needs no more effects, and leaves nothing
     gains = _gains(right.fault, (right.target, right.fit), (said.target, said.fit))
-    if is_beyond_chance(gains, LEAST_LEAD) or not said.verdict.names_effects:
+    if is_beyond_chance(gains, LEAST_LEAD) or not named:
         return right
-    moved, explained = right.fault.moved, right.verdict is Verdict.EXPLAINED
+    explained = right.verdict is Verdict.EXPLAINED
     # a time of reading is a delay by another name: below the simulation's own error no lead tells them apart
     same = moved is not None and explained and moved.groups == ("timing",)
     if is_beyond_chance(-gains, LEAST_LEAD) and not same:

@@ -40,6 +40,7 @@ class Fault(ShortRepr):
     fitted_m: dict[str, float] = field(default_factory=dict)  #: given radii that are fitted instead, by object, metres
     least_m: float = SEEN_M  #: by how much less they were as given
     of_most: bool = False  #: radii of most objects are doubted, so that an effect may do as well
+    wider: Fault | None = None  #: the same of more objects, to be tried if something is left
 
     def is_borne_out(self, fit: Fit) -> bool:
         """Whether a fit of the set put right, with the effects that were found, still wants other radii than given."""
@@ -70,6 +71,11 @@ def _radii(fit: Fit) -> dict[str, float]:
     return {name.removeprefix("radius_m of "): value for name, value in named if name.startswith("radius_m of ")}
 
 
+def leaves_nothing(fit: Fit, target: Target) -> bool:
+    """Whether a fit leaves too little for the set to be doubted."""
+    return rms_error(fit, target) < _NOTHING
+
+
 def suspects(loaded: Loaded[MeasurementSet], target: Target, fit: Fit) -> list[Fault]:
     """The faults that a set gives reason to look for.
 
@@ -79,9 +85,9 @@ def suspects(loaded: Loaded[MeasurementSet], target: Target, fit: Fit) -> list[F
       fit: of the base model.
     """
     measured, found = loaded.measured, []
-    if loaded.gripper.is_servo or rms_error(fit, target) < _NOTHING:
+    if loaded.gripper.is_servo or leaves_nothing(fit, target):
         return []
-    if (factor := clock_factor(measured, loaded.gripper.period_s)) is not None:
+    if (factor := clock_factor(measured, loaded.gripper.period_s, 1 + MOST * measured.period_std_share)) is not None:
         words = f"time stamps are {times(factor)} for commands {loaded.gripper.period_s:g} s apart"
         right = _changed(loaded, lambda _, g: _slower(g, 1 / factor))
         found.append(Fault("time_scale", words, "the clock and unit of t_s", right))
@@ -98,16 +104,13 @@ def suspects(loaded: Loaded[MeasurementSet], target: Target, fit: Fit) -> list[F
         words = f"{listed(early)} are what was read one row later{late}"
         check = "which row each column was written to, and its clock"
         found.append(Fault("early_row", words, check, _changed(loaded, lambda _, g: _one_row_later(g, early))))
-    wrong = doubtful_radii(target, fit, measured.radius_std_m)
     moved = None if found else wanted_moves(measured, target, fit)
-    apart = [] if moved is None or moved.is_within else moved.radii_apart()
-    if set(apart) > set(wrong):
-        said = {g.object: g.radius_m for g in measured.grasps if g.object in apart and g.radius_m is not None}
-        check = "the radii, with a calliper; were they measured by a ruler, meta.yaml may say object_radius_std_m"
-        doubted = dataclasses.replace(_wrong_radii(loaded, said), check=check, of_most=True)
-        found.append(dataclasses.replace(doubted, least_m=MOST * measured.radius_std_m))
-    elif wrong:
-        found.append(_wrong_radii(loaded, wrong))
+    most = None if moved is None or moved.is_within else _most_radii(loaded, moved.radii_apart())
+    if wrong := doubtful_radii(target, fit, measured.radius_std_m):
+        wider = most if most is not None and set(most.fitted_m) > set(wrong) else None
+        found.append(dataclasses.replace(_wrong_radii(loaded, wrong), wider=wider))
+    elif most is not None:
+        found.append(most)
     elif moved is not None and moved.is_within:
         found.append(_moved(loaded, moved))
     return found
@@ -119,6 +122,15 @@ def _wrong_radii(loaded: Loaded[MeasurementSet], wrong: dict[str, float]) -> Fau
     right = _changed(loaded, lambda _, g: dataclasses.replace(g, radius_m=None) if g.object in wrong else g)
     check = f"the radius of {listed(list(wrong))}, with a calliper: it may be another object's, or a diameter"
     return Fault("object_radius", words, check, right, fitted_m=wrong)
+
+
+def _most_radii(loaded: Loaded[MeasurementSet], apart: Sequence[str]) -> Fault | None:
+    """Radii that are beyond their tolerance, some more and some less."""
+    measured = loaded.measured
+    said = {g.object: g.radius_m for g in measured.grasps if g.object in apart and g.radius_m is not None}
+    check = "the radii, with a calliper; were they measured by a ruler, meta.yaml may say object_radius_std_m"
+    most = dataclasses.replace(_wrong_radii(loaded, said), check=check, of_most=True)
+    return dataclasses.replace(most, least_m=MOST * measured.radius_std_m) if said else None
 
 
 def within_tolerance(loaded: Loaded[MeasurementSet], target: Target, fit: Fit, worth: float = WORTH) -> Fault | None:

@@ -43,14 +43,7 @@ def check_relation(measured: MeasurementSet, joint: int, span: float) -> list[st
     name = measured.columns.command[joint]
     if not name.startswith("qdes"):
         return []
-    for one in measured.grasps:
-        shift = _copied(one.command_m[:, joint], one.position_m[:, joint])
-        if shift is not None:
-            apart = f"{abs(shift)} rows {'earlier' if shift > 0 else 'later'}" if shift else "as it is"
-            raise MeasurementError(
-                f"{place(measured.path, one, None, name)}: is the position itself, {apart}: nothing that was commanded;"
-                " name the command's own column"
-            )
+    refuse_copied_command(measured, joint)
     slopes = [slope for one in measured.grasps if (slope := _slope(one, joint)) is not None]
     middle = float(np.median(slopes)) if slopes else 1.0
     for factor, what in _FACTORS:
@@ -65,6 +58,18 @@ def check_relation(measured: MeasurementSet, joint: int, span: float) -> list[st
             f" {measured.columns.unit}?"
         ]
     return _far_apart(measured, joint, span) if slopes and abs(middle - 1) < _NEAR else []
+
+
+def refuse_copied_command(measured: MeasurementSet, motor: int) -> None:
+    """Raises MeasurementError if commands of a motor are its position, as it is or some rows apart."""
+    for one in measured.grasps:
+        shift = _copied(one.command_m[:, motor], one.position_m[:, motor])
+        if shift is not None:
+            apart = f"{abs(shift)} rows {'earlier' if shift > 0 else 'later'}" if shift else "as it is"
+            raise MeasurementError(
+                f"{place(measured.path, one, None, measured.columns.command[motor])}: is the position itself, {apart}:"
+                " nothing that was commanded; name the command's own column"
+            )
 
 
 def _copied(command: np.ndarray, position: np.ndarray) -> int | None:

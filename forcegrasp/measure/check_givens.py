@@ -61,15 +61,21 @@ def times(factor: float) -> str:
     return f"{factor:.3g} times too long" if factor > 1 else f"{1 / factor:.3g} times too short"
 
 
-def clock_factor(measured: MeasurementSet, period_s: float) -> float | None:
-    """How many times a gripper's period its commands are apart; None if that may be right, or too few changed."""
+def clock_factor(measured: MeasurementSet, period_s: float, most: float = _OTHER_CLOCK) -> float | None:
+    """How many times a gripper's period its commands are apart; None if that may be right, or too few changed.
+
+    Args:
+      measured: the set.
+      period_s: the gripper's.
+      most: the largest factor, either way, that may be right.
+    """
     apart = command_period_s(measured)
-    return None if apart is None or same_clock(apart, period_s) else apart / period_s
+    return None if apart is None or same_clock(apart, period_s, most) else apart / period_s
 
 
-def same_clock(one_s: float, other_s: float) -> bool:
-    """Whether two control periods differ by no more than jitter."""
-    return 1 / _OTHER_CLOCK < one_s / other_s < _OTHER_CLOCK
+def same_clock(one_s: float, other_s: float, most: float = _OTHER_CLOCK) -> bool:
+    """Whether two control periods differ by no more than a factor; by default, by no more than jitter."""
+    return 1 / most < one_s / other_s < most
 
 
 def command_period_s(measured: MeasurementSet) -> float | None:

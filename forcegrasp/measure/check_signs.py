@@ -15,6 +15,9 @@ from forcegrasp.measure.schema import MeasuredGrasp, MeasurementSet, side_of
 PadsAt = Callable[[np.ndarray], np.ndarray | None]
 #: Positions may lag behind commands by any of these, in seconds.
 _LAGS = (0.0, 0.05, 0.1, 0.2, 0.4, 0.8)
+# Two motors are told different things if that changes by this share of their range; positions are crossed if their
+# difference goes the other way, with a correlation like this, and more so than the same way.
+_APART, _CROSSED = 0.05, 0.3
 
 
 def check_signs(
@@ -31,6 +34,8 @@ def check_signs(
     reach = open_m - closed_m
     for motor in range(len(measured.columns.position)):
         _check_follows(measured, motor, abs(reach))
+    if len(measured.columns.position) == len(measured.columns.command) == 2:
+        _check_own_commands(measured, abs(reach))
     if measured.columns.read_effort:
         _check_effort(measured)
     for channel in range(0 if measured.columns.read_effort else len(measured.columns.force)):
@@ -61,6 +66,27 @@ def _check_follows(measured: MeasurementSet, motor: int, reach: float) -> None:
         raise MeasurementError(
             f"{place(measured.path, against[0][1], 0, measured.columns.position[motor])}: runs against"
             f" {measured.columns.command[motor]}; both must be 0 when closed and grow when opening"
+        )
+
+
+def _check_own_commands(measured: MeasurementSet, reach: float) -> None:
+    """Where two motors are told different things each must do its own."""
+    crossed, right = [], 0
+    for grasp in measured.grasps:
+        apart = grasp.command_m[:, 0] - grasp.command_m[:, 1]
+        if np.ptp(apart) < _APART * reach:
+            continue
+        stand = grasp.position_m[:, 0] - grasp.position_m[:, 1]
+        found = [_correlation(stand, _held(grasp.time_s, apart, grasp.time_s - lag)) for lag in _LAGS]
+        if -min(found) > max(_CROSSED, *found):
+            crossed.append(grasp)
+        else:
+            right += 1
+    if len(crossed) > right:
+        one, other = measured.columns.position
+        raise MeasurementError(
+            f"{place(measured.path, crossed[0], 0, one)}: follows the commands of {other}, and that its own;"
+            " swap the columns of the positions or of the commands"
         )
 
 

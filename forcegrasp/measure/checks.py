@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from forcegrasp.errors import MeasurementError
+from forcegrasp.measure.check_commands import refuse_copied_command
 from forcegrasp.measure.check_copies import check_copies
 from forcegrasp.measure.check_liveness import check_liveness
 from forcegrasp.measure.check_signs import PadsAt, check_signs
@@ -63,6 +64,8 @@ def check_set(
     warnings += check_liveness(measured, abs(open_m - closed_m))
     if pads_at is None and measured.columns.are_pads:
         pads_at = np.asarray
+    for motor in range(len(measured.columns.position)):
+        refuse_copied_command(measured, motor)
     check_signs(measured, open_m, closed_m, pads_at, half_opening_m)
     if len(measured.grasps) == 1:
         warnings.append(f"{show(measured.path)}: {ALONE}")

@@ -9,6 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from forcegrasp.diagnosis import doubt
 from forcegrasp.diagnosis.diagnose_set import diagnose_set
 from forcegrasp.diagnosis.faults import suspects
 from forcegrasp.diagnosis.felt_sizes import doubtful_radii
@@ -103,7 +104,10 @@ def test_radii_that_a_ruler_gave_are_doubted_where_no_effect_would_do(sound):
     off = {"thing_0": 4e-4, "thing_1": -3e-4, "thing_2": 0.0}
     wrong = changed(loaded, lambda g: dataclasses.replace(g, radius_m=g.radius_m + off[g.object]))
     target, _, base = apply_model(wrong, model, silent, refit=True)
-    (fault,) = suspects(wrong, target, base.fit)
+    (felt,) = suspects(wrong, target, base.fit)
+    fault = felt.wider
+    assert fault is not None
+    assert (felt.name, felt.of_most, list(felt.fitted_m)) == ("object_radius", False, ["thing_0"])
     assert (fault.name, fault.of_most, sorted(fault.fitted_m)) == ("object_radius", True, ["thing_0", "thing_1"])
     assert "object_radius_std_m" in fault.check
     right = {g.object: g.radius_m for g in fault.put_right.measured.grasps}
@@ -133,6 +137,28 @@ def test_radii_that_a_ruler_gave_are_doubted_where_no_effect_would_do(sound):
     assert move_given(alike.measured, target, base.fit) is None
     assert moved.radii_apart() == []
     assert suspects(alike, target, base.fit) == []
+
+
+@pytest.mark.parametrize(
+    ("verdict", "with_fault", "without", "left", "named"),
+    [
+        ("data", 0, 1, "", ("backlash", "early_row")),
+        ("effect", 2, 1, "", ("backlash",)),
+        ("effect", 2, 1, "much", ("backlash", "early_row")),
+        ("effect", 1, 2, "", ("backlash", "early_row")),
+    ],
+)
+def test_a_fault_that_spares_no_effect_is_left_out(monkeypatch, made_up, verdict, with_fault, without, left, named):
+    def found(count: int, **changes) -> Diagnosis:
+        """A diagnosis with so many effects in its model."""
+        fit = SimpleNamespace(problem=SimpleNamespace(effects=[None] * count))
+        return dataclasses.replace(made_up.diagnosis("effect"), fit=fit, **changes)
+
+    monkeypatch.setattr(doubt, "_gains", lambda *_: np.zeros(9))
+    fault = SimpleNamespace(name="early_row", moved=None)
+    right = found(with_fault, verdict=Verdict(verdict), fault=fault, effects=("early_row",) + ("lag",) * with_fault)
+    said = found(without, effects=("backlash",), left=left)
+    assert doubt.more_likely(right, said).effects == named
 
 
 def test_swapped_force_columns_are_told(sound):

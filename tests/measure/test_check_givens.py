@@ -42,6 +42,13 @@ def test_another_clock(sound, factor, told):
     assert told in warning
 
 
+def test_a_clock_that_is_a_little_off_is_told_where_less_is_allowed(sound):
+    slow = changed(sound, lambda _, g: dataclasses.replace(g, time_s=g.time_s * 1.05))
+    assert check_givens(slow, PERIOD_S) == []
+    assert clock_factor(slow, PERIOD_S, 1.006) == pytest.approx(1.05)
+    assert clock_factor(sound, PERIOD_S, 1.006) is None
+
+
 def test_jitter_is_no_other_clock(sound):
     late = np.random.default_rng(0).uniform(0, 0.3 * PERIOD_S, len(sound.grasps[0].time_s))
     assert clock_factor(changed(sound, lambda _, g: dataclasses.replace(g, time_s=g.time_s + late)), PERIOD_S) is None

@@ -178,6 +178,28 @@ def test_refused(made, case, command, noise):
         ), message
 
 
+def _one_waits(time):
+    """The left finger closes half a second before the right one, ``(T, 2)``."""
+    return np.stack([closing(time), closing(time, start_s=0.9)], axis=1)
+
+
+@pytest.mark.parametrize("lag_s", [0.02, 0.3])
+@pytest.mark.parametrize("column", ["position_m", "command_m"])
+def test_a_finger_that_follows_the_commands_of_the_other(lag_s, column):
+    right = [make_grasp(i, command=_one_waits, lag_s=lag_s) for i in range(2)]
+    check_set(make_set(right), OPEN_M)
+    crossed = [change(g, **{column: getattr(g, column)[:, ::-1]}) for g in right]
+    with pytest.raises(MeasurementError, match="column q_l_m: follows the commands of q_r_m, and that its own; swap"):
+        check_set(make_set(crossed), OPEN_M)
+
+
+@pytest.mark.parametrize(("rows", "told"), [(0, "as it is"), (1, "1 rows earlier"), (-1, "1 rows later")])
+def test_a_command_that_is_the_position(grasps, rows, told):
+    copied = [change(g, command_m=np.roll(g.position_m, rows, axis=0)) for g in grasps]
+    with pytest.raises(MeasurementError, match=f"column qdes_l_m: is the position itself, {told}: nothing that was"):
+        check_set(make_set(copied), OPEN_M)
+
+
 @pytest.mark.parametrize("shape", [(99, 2), (100, 1), (100, 3), (100,), (0, 2)])
 @pytest.mark.parametrize("name", ["force_n", "position_m", "command_m"])
 def test_shapes(measured, grasps, name, shape):
