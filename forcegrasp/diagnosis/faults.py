@@ -128,9 +128,11 @@ def _most_radii(loaded: Loaded[MeasurementSet], apart: Sequence[str]) -> Fault |
     """Radii that are beyond their tolerance, some more and some less."""
     measured = loaded.measured
     said = {g.object: g.radius_m for g in measured.grasps if g.object in apart and g.radius_m is not None}
+    if not said:
+        return None
     check = "the radii, with a calliper; were they measured by a ruler, meta.yaml may say object_radius_std_m"
     most = dataclasses.replace(_wrong_radii(loaded, said), check=check, of_most=True)
-    return dataclasses.replace(most, least_m=MOST * measured.radius_std_m) if said else None
+    return dataclasses.replace(most, least_m=MOST * measured.radius_std_m)
 
 
 def within_tolerance(loaded: Loaded[MeasurementSet], target: Target, fit: Fit, worth: float = WORTH) -> Fault | None:
