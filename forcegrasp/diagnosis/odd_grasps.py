@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -59,16 +60,16 @@ def odd_grasps(target: Target, fit: Fit) -> tuple[OddGrasp, ...]:
     count, suspects, usual = max(1, min(_MOST, int(_SHARE * len(errors)))), np.array([], int), 1.0
     problem, vector = fit.problem, fit.vector
     for _ in range(_ROUNDS):  # those that the others miss most are left out, and judged again by the others
-        before, suspects = set(suspects), np.argsort(-errors)[:count]
-        if set(suspects) == before:
+        before, suspects = set(suspects), _suspects(errors, labels, count)
+        if set(suspects) == before:  # as if there are none
             break
         rest = np.setdiff1d(np.arange(len(errors)), suspects)
-        if {labels[i] for i in rest} != set(objects):  # of some object nothing else is known
-            return ()
         others = Subset(target, rest, fit)
         problem, vector = others.problem, others.fit(_coordinates(others.problem, (problem, vector))).vector
         errors = _errors_as(target, np.arange(len(errors)), target.grasps, problem, vector)
         usual = max(1.0, float(np.median(errors[rest])))
+    if not suspects.size:
+        return ()
     alone = [target.grasps[i] for i in suspects]
     as_said = errors[suspects]
     odd = [k for k in range(len(suspects)) if as_said[k] > _ODD * usual]
@@ -87,6 +88,16 @@ def odd_grasps(target: Target, fit: Fit) -> tuple[OddGrasp, ...]:
         fits = error <= _FITS * usual
         found.append(OddGrasp(alone[k].name, alone[k].object, float(as_said[k]), like if fits else "", error))
     return tuple(found)
+
+
+def _suspects(errors: np.ndarray, labels: Sequence[str], count: int) -> np.ndarray:
+    """Indices of the grasps of the largest errors, without the last one of an object: nothing else is known of it."""
+    left, chosen = Counter(labels), []
+    for index in np.argsort(-errors).tolist():
+        if left[labels[index]] > 1 and len(chosen) < count:
+            left[labels[index]] -= 1
+            chosen.append(index)
+    return np.array(chosen, int)
 
 
 def _coordinates(problem: Problem, known: tuple[Problem, np.ndarray]) -> np.ndarray:

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from forcegrasp.diagnosis import doubt
+from forcegrasp.diagnosis import odd_grasps as odd_grasps_module
 from forcegrasp.diagnosis.diagnose_set import diagnose_set
 from forcegrasp.diagnosis.faults import suspects
 from forcegrasp.diagnosis.felt_sizes import doubtful_radii
@@ -355,6 +356,13 @@ def test_swapped_labels_are_told_and_nothing_else_is_looked_for(sound):
     assert told == {(one.name, other.object, one.object), (other.name, one.object, other.object)}
     assert all(g.error > 4 and g.error_like < 2 for g in diagnosis.odd)
     assert f"grasp {one.name} of {other.object}" in answer(diagnosis)
+
+
+def test_of_each_object_a_grasp_is_left_to_judge_the_others_by():
+    errors, labels = np.array([9.0, 8.0, 7.0, 1.0, 2.0, 1.0, 5.0]), ["a", "a", "a", "b", "b", "c", "d"]
+    assert odd_grasps_module._suspects(errors, labels, 4).tolist() == [0, 1, 4]
+    assert odd_grasps_module._suspects(errors, labels, 1).tolist() == [0]
+    assert odd_grasps_module._suspects(errors[-2:], labels[-2:], 1).tolist() == []
 
 
 def test_a_grasp_that_fits_no_object_is_told_and_does_not_decide(sound):
