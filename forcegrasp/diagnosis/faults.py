@@ -48,6 +48,7 @@ class Fault(ShortRepr):
         return bool(wrong) if self.of_most else len(wrong) == len(self.fitted_m)
 
     def _still_wrong(self, fit: Fit) -> list[str]:
+        """The objects whose radius a fit puts elsewhere than given."""
         values = _radii(fit)
         return [name for name, said in self.fitted_m.items() if abs(values[name] - said) > self.least_m]
 
@@ -104,7 +105,8 @@ def suspects(loaded: Loaded[MeasurementSet], target: Target, fit: Fit) -> list[F
         words = f"{listed(early)} are what was read one row later{late}"
         check = "which row each column was written to, and its clock"
         found.append(Fault("early_row", words, check, _changed(loaded, lambda _, g: _one_row_later(g, early))))
-    moved = None if found else wanted_moves(measured, target, fit)
+    # rows that do not keep step with commands make a clock seem off: that must not hide the rest
+    moved = wanted_moves(measured, target, fit) if all(one.name == "time_scale" for one in found) else None
     most = None if moved is None or moved.is_within else _most_radii(loaded, moved.radii_apart())
     if wrong := doubtful_radii(target, fit, measured.radius_std_m):
         wider = most if most is not None and set(most.fitted_m) > set(wrong) else None
