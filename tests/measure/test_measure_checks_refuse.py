@@ -193,6 +193,15 @@ def test_a_finger_that_follows_the_commands_of_the_other(lag_s, column):
         check_set(make_set(crossed), OPEN_M)
 
 
+def test_a_delay_of_half_a_period_crosses_no_fingers():
+    def swinging(grasp):
+        command = grasp.command_m + np.stack([0.004 * np.sin(2.5 * np.pi * grasp.time_s), 0 * grasp.time_s], axis=1)
+        late = np.concatenate([np.repeat(command[:1], 10, axis=0), command[:-10]])  # 0.4 s
+        return change(grasp, command_m=command, position_m=late + (grasp.position_m - grasp.command_m))
+
+    check_set(make_set([swinging(make_grasp(i, lag_s=0.01)) for i in range(2)]), OPEN_M)
+
+
 @pytest.mark.parametrize(("rows", "told"), [(0, "as it is"), (1, "1 rows earlier"), (-1, "1 rows later")])
 def test_a_command_that_is_the_position(grasps, rows, told):
     copied = [change(g, command_m=np.roll(g.position_m, rows, axis=0)) for g in grasps]
