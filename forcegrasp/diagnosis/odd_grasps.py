@@ -92,10 +92,12 @@ def odd_grasps(target: Target, fit: Fit) -> tuple[OddGrasp, ...]:
 
 def _suspects(errors: np.ndarray, labels: Sequence[str], count: int) -> np.ndarray:
     """Indices of the grasps of the largest errors, without the last one of an object: nothing else is known of it."""
-    left, chosen = Counter(labels), []
-    for index in np.argsort(-errors).tolist():
-        if left[labels[index]] > 1 and len(chosen) < count:
-            left[labels[index]] -= 1
+    left = Counter(labels)
+    chosen: list[int] = []
+    for index in map(int, np.argsort(-errors)):
+        label = labels[index]
+        if left[label] > 1 and len(chosen) < count:
+            left[label] -= 1
             chosen.append(index)
     return np.array(chosen, int)
 
