@@ -29,8 +29,6 @@ from forcegrasp.physics.gripper import Gripper
 
 #: A diagnosis needs so many grasps: with fewer, nothing can be held out.
 LEAST_GRASPS = 6
-
-
 #: A set lined up, what simulates its grasps, and the base model that was fitted to it.
 Fitted = tuple[Target, Simulators, BaseFit]
 

@@ -47,18 +47,17 @@ class Fault(ShortRepr):
         wrong = self._still_wrong(fit)
         return bool(wrong) if self.of_most else len(wrong) == len(self.fitted_m)
 
-    def _still_wrong(self, fit: Fit) -> list[str]:
-        """The objects whose radius a fit puts elsewhere than given."""
+    def _still_wrong(self, fit: Fit) -> dict[str, float]:
+        """The given radii, by object, that a fit puts elsewhere."""
         values = _radii(fit)
-        return [name for name, said in self.fitted_m.items() if abs(values[name] - said) > self.least_m]
+        return {name: said for name, said in self.fitted_m.items() if abs(values[name] - said) > self.least_m}
 
     def told_by(self, fit: Fit) -> Fault:
         """The same with what a fit of the set put right makes of what is fitted."""
         values = _radii(fit)
         told = [
             f"the radius of {name} is {1e3 * values[name]:.1f} mm, the set says {1e3 * said:.1f} mm"
-            for name, said in self.fitted_m.items()
-            if name in self._still_wrong(fit)
+            for name, said in self._still_wrong(fit).items()
         ]
         return dataclasses.replace(self, words="; ".join(told)) if told else self
 
