@@ -75,7 +75,8 @@ def diagnose(
     screen = Screen(effects, study)
     believed: tuple[list[Step], Fit, Study] | None = None  # what is, if the rest explains too little in the end
     for _ in range(MOST_EFFECTS):
-        known, dropped = {setting.effect for setting in fit.problem.effects}, {step.replaces for step in steps}
+        known = {setting.effect for setting in fit.problem.effects}
+        dropped = {step.replaces for step in steps} | {name for effect in known for name in effect.instead_of}
         untried = [
             e for e in effects
             if e not in known and e.name not in dropped and not any(families.contain(e, other) for other in known)

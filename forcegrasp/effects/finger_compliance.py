@@ -41,6 +41,6 @@ class FingerCompliance(Effect):
 
     def act(self) -> Contribution:
         before = self.state["deflection"]
-        gap = self["compliance_m_n"] * self.pad_force - before
+        gap = self["compliance_m_n"] * self.plant.press_n[self.rows] - before
         self.state["deflection"] = deflection = before + first_order_weight(self.dt, SETTLING_S) * gap
         return Contribution(pad_shift_m=deflection)

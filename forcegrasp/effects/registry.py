@@ -37,6 +37,7 @@ _SHIPPED = (
     "force_lag",
     "force_limit",
     "force_saturation",
+    "hunt_crossley_contact",
     "load_friction",
     "motor_offset",
     "object_friction",

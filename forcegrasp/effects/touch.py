@@ -15,18 +15,28 @@ def untouched(which: np.ndarray) -> np.ndarray:
 def depth_in_object(effect: Effect, force: np.ndarray) -> np.ndarray:
     """Depth of the pads below the surface, metres, ``(rows, 2)``; negative above it, −inf before the first touch.
 
-    An object's surface is where it was first felt. The contact's own force does not tell: a contact that opens has no
-    force left long before it ends.
+    Once an object is felt, its shape says where its surface is. The contact's own force does not tell: a contact that
+    opens has no force left long before it ends.
 
     Args:
       effect: whose rows, plant and memory of the surface it is.
       force: forces of the contact itself, newtons, ``(rows, 2)``.
     """
-    plant, rows, surface = effect.plant, effect.rows, effect.state["surface"]
-    # how far a pad stands from the object's middle; the right finger stands on its positive side
-    reach = plant.pad_position[rows] + plant.pad_shift_m[rows] + plant.object_position[rows, None] * np.array([1, -1])
-    effect.state["surface"] = surface = np.where((force > 0) & np.isinf(surface), reach, surface)
+    surface, reach = effect.state["surface"], pad_reach(effect)
+    felt = (force > 0) & np.isinf(surface)
+    if felt.any():
+        new = np.flatnonzero(felt.any(axis=1))
+        met = surface.copy()
+        met[new] = (reach - effect.plant.pad_shift_m[effect.rows])[new] - effect.plant.clearance(effect.rows[new])
+        effect.state["surface"] = surface = np.where(felt, met, surface)
     return surface - reach
+
+
+def pad_reach(effect: Effect) -> np.ndarray:
+    """How far pads stand from the object's middle, from where they are when closed on it, metres, ``(rows, 2)``."""
+    plant, rows = effect.plant, effect.rows
+    # the right finger stands on the object's positive side
+    return plant.pad_position[rows] + plant.pad_shift_m[rows] + plant.object_position[rows, None] * np.array([1, -1])
 
 
 def contact_push(push: np.ndarray) -> Contribution:

@@ -194,6 +194,20 @@ class Gripper(ShortRepr):
             return None
         return np.repeat(self.opening.opening_at(position) / 2, 2, axis=1)
 
+    @functools.cached_property
+    def pads_stay_parallel(self) -> bool:
+        """Whether the pads do not turn from open to closed."""
+        if self.is_direct or self.is_servo:
+            return True
+        model = self.compile()
+        data, bodies = mujoco.MjData(model), [model.body(finger.body).id for finger in self.fingers]
+        turned = []
+        for qpos in self.opening.qpos[[0, -1]]:
+            data.qpos[:] = qpos
+            mujoco.mj_kinematics(model, data)
+            turned.append(data.xmat[bodies].copy())
+        return bool(np.abs(turned[1] - turned[0]).max() < _TURNED)
+
     @property
     def stall(self) -> float:
         """Movement in a control step above which a motor's effort says nothing of contact, m or rad.
@@ -286,6 +300,8 @@ def effort_sensor(motor: Motor) -> str:
     return own_sensor(f"effort_{motor.actuator}")
 
 
+# Pads turn if an axis of theirs moves by so much.
+_TURNED = 0.05
 #: Contact points that an added sensor counts.
 _CONTACTS = 8
 

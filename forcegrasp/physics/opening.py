@@ -91,8 +91,8 @@ def measure_opening(
         mujoco.mj_step(model, data, round(_HOLD_S / model.opt.timestep))
         mujoco.mj_forward(model, data)
         position = float(np.mean([(data.qpos[q] - m.closed) * m.sign for q, m in zip(joints, motors, strict=True)]))
-        opening = _distance(model, data, *pads)
-        faces = faces or [_distance(model, data, side, [model.geom(object_geom).id]) for side in pads]
+        opening = least_distance(model, data, *pads)
+        faces = faces or [least_distance(model, data, side, [model.geom(object_geom).id]) for side in pads]
         rows.append([position, opening, *(data.geom_xpos[geoms, axis].mean() for geoms in pads), *data.qpos])
     table = np.array(rows)[np.argsort([row[0] for row in rows])]
     position, opening, left, right = table[:, :4].T
@@ -105,8 +105,14 @@ def measure_opening(
     return OpeningLaw(position[first:], opening[first:], travel, (faces[0] + half, faces[1] + half), table[first:, 4:])
 
 
-def _distance(model: mujoco.MjModel, data: mujoco.MjData, some: Iterable[int], others: Iterable[int]) -> float:
-    return min(float(mujoco.mj_geomDistance(model, data, i, j, _FAR_M, None)) for i in some for j in others)
+def least_distance(model: mujoco.MjModel, data: mujoco.MjData, some: Iterable[int], others: Iterable[int]) -> float:
+    """Between two groups of geoms, metres; negative where they overlap."""
+    flags = model.opt.disableflags
+    # by libccd distances between boxes and cylinders are millimetres off
+    model.opt.disableflags = flags & ~mujoco.mjtDisableBit.mjDSBL_NATIVECCD.value
+    found = min(float(mujoco.mj_geomDistance(model, data, i, j, _FAR_M, None)) for i in some for j in others)
+    model.opt.disableflags = flags
+    return found
 
 
 def object_half_width(model: mujoco.MjModel, object_geom: str, axis: int) -> float:

@@ -54,6 +54,8 @@ class Plant(ModelFields):
         self.position = np.zeros((n, self.motors))  #: of the motors (left, right, or the one), m or rad; 0 is closed
         #: Sum of each finger's contact forces at the last physics step, before f_α, newtons, ``(n, 2)``.
         self.pad_force = np.zeros((n, 2))
+        #: The same with what effects in the contact press, ``(n, 2)``.
+        self.press_n = np.zeros((n, 2))
         #: True fingertip forces (left, right): the interaction with the object times f_α, newtons, ``(n, 2)``.
         self.force = np.zeros((n, 2))
         self.transduced_force = np.zeros((n, self.channels))  #: what goes into the force readings, newtons
@@ -88,7 +90,7 @@ class Plant(ModelFields):
         Gravity, springs, a load and what presses against the pads; not friction, and not what effects push.
         """
         weight = self.batch.bind("qfrc_spring") - self.batch.bind("qfrc_bias")
-        return weight[:, self._motor_v] * self._signs + self._to_motors(self.pad_force) + self._load[:, None]
+        return weight[:, self._motor_v] * self._signs + self._to_motors(self.press_n) + self._load[:, None]
 
     @property
     def pad_position(self) -> np.ndarray:
@@ -99,6 +101,13 @@ class Plant(ModelFields):
     def object_position(self) -> np.ndarray:
         """Object position along the grasp axis from where the scene puts it, metres, ``(n,)``."""
         return self._object_of(self._qpos)
+
+    def clearance(self, rows: np.ndarray) -> np.ndarray:
+        """Distance between each side's pads and the object, metres, ``(len(rows), 2)``; negative inside it.
+
+        Of pads that no effect shifts.
+        """
+        return np.array([self.distances(self.field("geom_size")[row], self._qpos[row]) for row in rows])
 
     def presses(self, rows: np.ndarray) -> np.ndarray:
         """Which motors' pads an object pushes against, ``(len(rows), motors)``."""
@@ -114,6 +123,15 @@ class Plant(ModelFields):
             return gain * self.gripper.stroke
         reach = [self.travel[self._moved_by(motor)].sum() for motor in range(self.motors)]
         return (gain * self.gripper.stroke / reach)[:, self._mover]
+
+    def mass_between(self, rows: np.ndarray) -> np.ndarray:
+        """Mass that the distance between each side's pads and the object has, kg, ``(len(rows), 2)``.
+
+        That of both, one against the other; the object's alone on a side that stands still.
+        """
+        inertia = self.batch.expand("dof_M0")[rows]
+        moved = inertia[:, self._motor_v][:, self._mover]
+        return 1 / (self.travel**2 / moved + 1 / inertia[:, self.object_dof, None])
 
     def attach(self, effects: Sequence[tuple[PlantEffect, np.ndarray]]) -> None:
         """Puts effects into the plant, each on its own rows, in the order of their stages; replaces earlier ones."""
@@ -323,7 +341,8 @@ class Plant(ModelFields):
     def _read(self) -> None:
         self.position, self.pad_force = self._motors_of(self._qpos), self._pads_of(self._sensors)
         scale = self.force_scale[:, None]
-        self.force = self.effects.interaction(self.pad_force) * scale
+        self.press_n = self.effects.interaction(self.pad_force)
+        self.force = self.press_n * scale
         self.transduced_force = self._channels_of(self._sensors, self.force, scale)
         self.measured_force = self.transduced_force.copy()
         self.measured_position = self.position.copy()

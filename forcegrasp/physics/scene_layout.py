@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,7 +12,7 @@ import numpy as np
 
 from forcegrasp.physics.gripper import Gripper, effort_sensor, own_sensor
 from forcegrasp.physics.gripper_parts import Finger
-from forcegrasp.physics.opening import command_law
+from forcegrasp.physics.opening import command_law, least_distance, pad_geoms
 
 
 class SceneLayout:
@@ -88,6 +89,34 @@ class SceneLayout:
             length_per_position = self._command_scale[index] * drive.gainprm[0] / -drive.biasprm[1]
             factors[index] = -length_per_position / self.travel[self._moved_by(index)].sum()
         return addresses, factors
+
+    @functools.cached_property
+    def pad_geoms(self) -> np.ndarray:
+        """Geoms of both sides that touch the object."""
+        return np.concatenate(self._pad_geoms)
+
+    @functools.cached_property
+    def _pad_geoms(self) -> list[np.ndarray]:
+        return [pad_geoms(self.model, finger.body) for finger in self.gripper.fingers]
+
+    def distances(self, sizes: np.ndarray, qpos: np.ndarray) -> np.ndarray:
+        """Distance between each side's pads and the object, metres, ``(2,)``; negative inside it.
+
+        Args:
+          sizes: of all geoms, ``(ngeom, 3)``.
+          qpos: how the scene stands, ``(nq,)``.
+        """
+        model, data = self._at_rest
+        model.geom_size[:], data.qpos[:] = sizes, qpos
+        mujoco.mj_kinematics(model, data)
+        solid = [g for g in self.object_geoms if model.geom_contype[g] or model.geom_conaffinity[g]]
+        return np.array([least_distance(model, data, pads, solid) for pads in self._pad_geoms])
+
+    @functools.cached_property
+    def _at_rest(self) -> tuple[mujoco.MjModel, mujoco.MjData]:
+        """A copy of the scene, in which distances are measured."""
+        model = copy.copy(self.model)
+        return model, mujoco.MjData(model)
 
     def _moved_by(self, motor: int) -> np.ndarray:
         return (self._mover == motor) & (self.travel != 0)
