@@ -111,6 +111,10 @@ _PLANS = {
         "a slow squeeze to a high force, and a slow release",
         ((25, 0.02, 0.2), (19, 0.003, 0.3), (26, 0.006, 0.2)),
     ),
+    "hunt_crossley_contact": Show(
+        "a slow squeeze to a high force, a release, and a fast touch",
+        ((25, 0.02, 0.2), (19, 0.003, 0.3), (26, 0.02, 0.2), (20, JUMP, 0.4)),
+    ),
     "viscoelastic_contact": Show(
         "a fast squeeze, a long hold, a partial release, another hold",
         ((26, 0.02, 0.1), (19, JUMP, 2.0), (21.5, JUMP, 1.6), (27, 0.02, 0.2)),

@@ -149,7 +149,10 @@ def right_names(job: Job) -> set[str]:
     if job.group == "outside":
         return set()
     called = VARIANT_OF | CALLED | {name: answer for name, (answer, _) in OTHERWISE.items()}
-    also = {"contact_friction"} if job.contact == "mujoco_rubbing" else set()
+    of_contact = {
+        "mujoco_rubbing": "contact_friction", "penalty": "hunt_crossley_contact", "hertz": "hunt_crossley_contact"
+    }  # fmt: skip
+    also = {of_contact[job.contact]} if job.contact in of_contact else set()
     return {called.get(name, name) for name in job.hidden} | also
 
 

@@ -18,7 +18,8 @@ class HuntCrossleyContact(Effect):
     """Pads and object press on each other by a power of the depth, and harder while they approach.
 
     MuJoCo's contacts have a curve of force over depth of their own, are damped strongly, and press by how the bodies
-    accelerate. Here only depth and its rate count. Pads press then and do not rub: the object has to stand on something.
+    accelerate. Here only depth and its rate count. Pads press then and do not rub: the object has to stand on
+    something.
     """
 
     name = "hunt_crossley_contact"
@@ -38,7 +39,7 @@ class HuntCrossleyContact(Effect):
             null=np.inf, logarithmic=True, follows="force",
         ),
         Parameter("power", "power p", "1", 1.0, 8.0, 1.5, null=1.5),
-        Parameter("damping_s_m", "damping λ", "s/m", 0.0, 100.0, 5.0),
+        Parameter("damping_s_m", "damping λ", "s/m", 0.0, 100.0, 5.0, null=5.0),
     )  # fmt: skip
     order = -1
 

@@ -22,7 +22,7 @@ class StiffeningContact(Effect):
     symptom = "the curve of force over squeeze is more convex than modelled"
     formula = "d(r) with power p + Δp instead of p (MuJoCo's solimp), and F = F_contact + F₁ (δ / 1 mm)³"
     source = "MuJoCo's `solimp`, last number; Duffing's hardening spring"
-    look_alikes = ("finger_compliance", "viscoelastic_contact")
+    look_alikes = ("hunt_crossley_contact", "finger_compliance", "viscoelastic_contact")
     separates = "slow ramps to high force on soft objects"
     parameters = (
         Parameter("extra_power", "Δp, added to the scene's power", "1", 0.0, 8.0, 1.5),

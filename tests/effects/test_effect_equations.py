@@ -78,6 +78,8 @@ class Pads:
     """Stands for a plant with both pads at given places along the grasp axis, and motors of any strength."""
 
     pad_shift_m = np.zeros((1, 2))
+    object_geoms = np.array([0])
+    width_m = 0.004  # of the object's contact
 
     def __init__(self, distance: np.ndarray, force: np.ndarray | float, centre: float = 0.0) -> None:
         pads = np.array([-1, 1]) * distance + centre  # the left one stands on the negative side
@@ -86,6 +88,15 @@ class Pads:
 
     def strongest_press(self, rows: np.ndarray) -> np.ndarray:
         return np.full((len(rows), 2), np.inf)
+
+    def clearance(self, rows: np.ndarray) -> np.ndarray:
+        return np.zeros((len(rows), 2))
+
+    def mass_between(self, rows: np.ndarray) -> np.ndarray:
+        return np.full((len(rows), 2), np.inf)
+
+    def field(self, name: str) -> np.ndarray:
+        return {"geom_solimp": np.array([[[0.0, 0.99, self.width_m, 0.5, 2.0]]])}[name]
 
 
 def press(effect: Effect, distance: np.ndarray, force: np.ndarray, centre: np.ndarray | float = 0.0) -> np.ndarray:
@@ -197,6 +208,49 @@ def test_stiffening_spring_throws_no_finger_out():
         plant.advance(np.maximum(plant.measured_position - 0.003, 0.0), round(0.04 / plant.dt))
     assert not plant.warnings().any()
     assert (plant.position < 0.05).all()
+
+
+def test_hunt_crossley_contact_is_a_power_of_the_depth_that_approaching_raises():
+    distance, force, depth = depth_of((1.0, 0.4))
+    added = press(make("hunt_crossley_contact", 0.7, 1.5, 90.0), distance, force)
+    before = np.concatenate([distance[:1], distance[:-1]])
+    rate = (before - distance) / DT
+    assert ((90 * rate < -1) & (depth > 0)).any()  # let go of faster than it follows, it does not pull
+    expected = 0.7 * (np.maximum(depth, 0) / Pads.width_m) ** 1.5 * np.maximum(1 + 90 * rate, 0)
+    assert added == pytest.approx(expected, abs=1e-9)
+
+
+@pytest.mark.parametrize(("force", "power"), [(1.0, 1.5), (3.0, 2.5)])
+def test_hunt_crossley_contact_takes_the_place_of_the_scenes(force, power):
+    """At rest the servo holds it, and nothing else presses."""
+    plant = settle("hunt_crossley_contact", (force, power, 5.0), 0.0215)
+    depth, width = TOUCH_M - plant.position, plant.field("geom_solimp")[0, plant.object_geoms[0], 2]
+    assert plant.press_n == pytest.approx(force * (depth / width) ** power, rel=2e-3)
+    assert plant.press_n == pytest.approx(GAIN * (plant.position - 0.0215), rel=2e-3)
+    assert (plant.pad_force < 1e-3 * plant.press_n).all()
+
+
+@pytest.mark.parametrize("values", [(1.0, 1.5, 100.0), (100.0, 1.0, 0.0), (300.0, 2.0, 30.0)])
+def test_long_steps_end_where_short_ones_do_however_stiff_the_contact(values):
+    """Steps of 8 ms would throw pads off a contact whose force is that of a step's beginning."""
+    plant = make_plant(1, [(get_effect("hunt_crossley_contact"), values, "", [0])], "fast")
+    start(plant, [0], np.zeros(1))
+    plant.advance(np.full((1, 2), 0.0215), round(1.6 / plant.dt))
+    short = settle("hunt_crossley_contact", values, 0.0215)
+    assert plant.position == pytest.approx(short.position, abs=2e-6)
+    assert plant.press_n == pytest.approx(short.press_n, rel=2e-3)
+
+
+def test_what_effects_in_the_contact_press_bends_fingers_and_loads_gears():
+    stiff = [(get_effect("stiffening_contact"), (0.0, 0.3), "", [0])]
+    for name, values in (("finger_compliance", (0.001,)), ("load_friction", (0.3,))):
+        plant = make_plant(1, [*stiff, (get_effect(name), values, "", [0])], "reference")
+        start(plant, [0], np.zeros(1))
+        plant.advance(np.full((1, 2), 0.0215), 800)
+        assert (plant.press_n > 1.2 * plant.pad_force).all()
+        assert plant.outside_force == pytest.approx(plant.press_n)
+        if name == "finger_compliance":
+            assert plant.pad_shift_m == pytest.approx(0.001 * plant.press_n, rel=1e-3)
 
 
 def test_adhesion_is_full_in_contact_and_fades_over_its_distance():

@@ -1,4 +1,4 @@
-"""Depths of pads in an object: from where it was first felt, until the row is reset."""
+"""Depths of pads in an object: from where it begins, once it was felt, until the row is reset."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ import pytest
 
 from forcegrasp.effects import Effect
 from forcegrasp.effects.touch import depth_in_object, untouched
+from forcegrasp.physics.gripper_file import load_gripper
+from forcegrasp.physics.plant import Plant
 
 
 class Feeler(Effect):
@@ -25,10 +27,15 @@ def feeler() -> Feeler:
     return Feeler(np.empty((2, 0)), 0.002)
 
 
-def _depth(feeler: Feeler, position: float, force: float, thing: float = 0.0) -> np.ndarray:
-    """Of both fingers at one position, in both rows, metres, ``(2, 2)``."""
+def _depth(feeler: Feeler, position: float, force: float, thing: float = 0.0, inside: float = 0.0) -> np.ndarray:
+    """Of both fingers at one position, in both rows, metres, ``(2, 2)``; felt so far inside the object."""
     both = np.full((2, 2), position)
-    plant = SimpleNamespace(pad_position=both, pad_shift_m=np.zeros((2, 2)), object_position=np.full(2, thing))
+    plant = SimpleNamespace(
+        pad_position=both,
+        pad_shift_m=np.zeros((2, 2)),
+        object_position=np.full(2, thing),
+        clearance=lambda rows: np.full((len(rows), 2), -inside),
+    )
     return depth_in_object(feeler.attach(plant, np.arange(2)), np.full((2, 2), force))
 
 
@@ -37,6 +44,22 @@ def test_depth_counts_from_the_first_touch(feeler):
     np.testing.assert_array_equal(_depth(feeler, 0.025, 0.1), 0.0)
     np.testing.assert_allclose(_depth(feeler, 0.024, 0.5), 0.001)
     np.testing.assert_allclose(_depth(feeler, 0.026, 0.0), -0.001)  # let go, but not forgotten
+
+
+def test_what_a_step_went_too_far_before_the_touch_was_felt_counts():
+    felt = Feeler(np.empty((2, 0)), 0.008)
+    np.testing.assert_allclose(_depth(felt, 0.025, 0.1, inside=3e-4), 3e-4)
+    np.testing.assert_allclose(_depth(felt, 0.024, 0.1), 0.0013)
+
+
+@pytest.mark.parametrize("tier", ["reference", "fast"])
+def test_distance_from_an_object_is_that_of_its_shape(tier):
+    """Also where the scene has MuJoCo's older collision code, as TIAGo's."""
+    plant = Plant(load_gripper("tiago"), 2, tier, threads=1)
+    plant.write_radius(np.arange(2), np.array([0.02, 0.025]))
+    plant.reset(np.arange(2), np.array([0.001, 0.0]), np.array([[0.03, 0.03], [0.024, 0.026]]))
+    apart = plant.clearance(np.arange(2))
+    np.testing.assert_allclose(apart, [[0.011, 0.009], [-0.001, 0.001]], atol=2e-5)
 
 
 def test_an_object_that_moves_right_is_deeper_on_the_right(feeler):
