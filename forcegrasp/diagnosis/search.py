@@ -75,12 +75,7 @@ def diagnose(
     screen = Screen(effects, study)
     believed: tuple[list[Step], Fit, Study] | None = None  # what is, if the rest explains too little in the end
     for _ in range(MOST_EFFECTS):
-        known = {setting.effect for setting in fit.problem.effects}
-        dropped = {step.replaces for step in steps} | {name for effect in known for name in effect.instead_of}
-        untried = [
-            e for e in effects
-            if e not in known and e.name not in dropped and not any(families.contain(e, other) for other in known)
-        ]  # fmt: skip
+        untried = left_to_try(effects, fit, steps)
         richer = list(families.extensions(fit, effects))
         if not untried and not richer:
             break
@@ -130,6 +125,19 @@ def diagnose(
         verdict, tuple(dict.fromkeys(names)), tuple(steps), base, fit, target, folds, error_before, error_after,
         of_final, floor, left, odd, noise,
     )  # fmt: skip
+
+
+def left_to_try(effects: Sequence[type[Effect]], fit: Fit, steps: Sequence[Step]) -> list[type[Effect]]:
+    """Those of the effects that a model may still lack.
+
+    Not those in it, nor what they contain or contains them, means nothing beside them, or gave way to one of them.
+    """
+    known = {setting.effect for setting in fit.problem.effects}
+    dropped = {step.replaces for step in steps} | {name for effect in known for name in effect.instead_of}
+    return [
+        e for e in effects
+        if e not in known and e.name not in dropped and not any(families.contain(e, other) for other in known)
+    ]  # fmt: skip
 
 
 def _convincing(before: Study, fewer: Fit, study: Study, fit: Fit) -> bool:

@@ -75,11 +75,11 @@ class HuntCrossleyContact(Effect):
         depth = np.maximum(depth_in_object(self, self.pad_force), 0.0)
         there = np.isfinite(self["force_n"]) & (depth > 0)
         spring = np.where(there, self["force_n"], 0.0) * (depth / state["width_m"]) ** self["power"]
-        grown = np.maximum(1 + self["damping_s_m"] * rate, 0.0)
+        grown = 1 + self["damping_s_m"] * rate
         # Where a step is too long for so stiff or so damped a contact its force is that of the step's end, as far as
         # is needed; what else accelerates pad and object is what did in the last step.
         stiffness = self["power"] * spring * grown / np.maximum(depth, 1e-9)
-        damping = np.where(grown > 0, self["damping_s_m"] * spring, 0.0)
+        damping = self["damping_s_m"] * spring
         late_k, late_c = np.maximum(stiffness * dt - mass / dt, 0.0), np.maximum(damping - mass / dt, 0.0)
         others = rate - state["rate"] + state["push"] * dt / mass
         push = spring * grown + late_k * (rate + others) + late_c * others

@@ -200,13 +200,15 @@ class Gripper(ShortRepr):
         if self.is_direct or self.is_servo:
             return True
         model = self.compile()
-        data, bodies = mujoco.MjData(model), [model.body(finger.body).id for finger in self.fingers]
-        turned = []
-        for qpos in self.opening.qpos[[0, -1]]:
+        bodies = [model.body(finger.body).id for finger in self.fingers]
+
+        def axes(qpos: np.ndarray) -> np.ndarray:
+            data = mujoco.MjData(model)
             data.qpos[:] = qpos
             mujoco.mj_kinematics(model, data)
-            turned.append(data.xmat[bodies].copy())
-        return bool(np.abs(turned[1] - turned[0]).max() < _TURNED)
+            return data.xmat[bodies]
+
+        return bool(np.abs(axes(self.opening.qpos[0]) - axes(self.opening.qpos[-1])).max() < _TURNED)
 
     @property
     def stall(self) -> float:

@@ -109,7 +109,7 @@ class SceneLayout:
         model, data = self._at_rest
         model.geom_size[:], data.qpos[:] = sizes, qpos
         mujoco.mj_kinematics(model, data)
-        solid = [g for g in self.object_geoms if model.geom_contype[g] or model.geom_conaffinity[g]]
+        solid = [int(g) for g in self.object_geoms if model.geom_contype[g] or model.geom_conaffinity[g]]
         return np.array([least_distance(model, data, pads, solid) for pads in self._pad_geoms])
 
     @functools.cached_property

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from forcegrasp.diagnosis.add_effect import add_effect
 from forcegrasp.diagnosis.diagnose_set import diagnose_set
 from forcegrasp.diagnosis.evidence import add_nothing
 from forcegrasp.diagnosis.result import kept_steps
+from forcegrasp.diagnosis.search import left_to_try
 from forcegrasp.diagnosis.step import _Start
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.effects import get_effect
@@ -162,3 +164,22 @@ def test_what_takes_an_effects_place_does_so_though_another_seemed_better_at_fir
     monkeypatch.setattr(start, "_judge", lambda *_: dataclasses.replace(other, gains=np.full(8, 10.0)))
     ordered, _ = start.refine_on_reference_tier([other, richer])
     assert [(c.effect.name, c.replaces) for c in ordered] == [("back_emf", "force_limit"), ("rate_limit", "")]
+
+
+@pytest.mark.parametrize(
+    ("known", "gave_way", "tried"),
+    [
+        (
+            ["hunt_crossley_contact"],
+            "",
+            {"backlash", "coulomb_friction", "stiction"},
+        ),  # MuJoCo's contact, which stiffens, is gone
+        (["stiction"], "", {"backlash", "stiffening_contact", "hunt_crossley_contact"}),  # contains Coulomb friction
+        (["coulomb_friction"], "backlash", {"stiffening_contact", "hunt_crossley_contact"}),  # contained in stiction
+    ],
+)
+def test_what_means_nothing_in_a_model_is_not_tried(known, gave_way, tried):
+    names = ("coulomb_friction", "stiction", "backlash", "stiffening_contact", "hunt_crossley_contact")
+    problem = SimpleNamespace(effects=[EffectSetting.typical(get_effect(name)) for name in known])
+    fit, steps = SimpleNamespace(problem=problem), [SimpleNamespace(replaces=gave_way)]
+    assert {e.name for e in left_to_try([get_effect(name) for name in names], fit, steps)} == tried

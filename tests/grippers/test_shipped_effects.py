@@ -9,8 +9,10 @@ import pytest
 
 from forcegrasp.config import GraspConfig
 from forcegrasp.effects.base import Effect
-from forcegrasp.effects.for_gripper import effects_of
+from forcegrasp.effects.for_gripper import effects_of, why_left_out
+from forcegrasp.effects.registry import catalogue
 from forcegrasp.physics import GraspSampler, Gripper
+from forcegrasp.physics.gripper_file import load_gripper, shipped_grippers
 from forcegrasp.physics.plant import Plant, write_base
 from forcegrasp.physics.sensors import is_rounding, with_noise
 from forcegrasp.physics.simulator import base_parameters
@@ -78,3 +80,10 @@ def test_typical_sizes_change_what_is_read(gripper, plain):
     change = (np.abs(seen - plain[:, None]) / widths).max(axis=(0, 2))
     same = [(effect.name, variant) for row, (effect, variant) in enumerate(cases(gripper), 1) if change[row] < 1e-4]
     assert same == []
+
+
+def test_a_contact_without_friction_is_left_out_where_pads_turn():
+    hunt_crossley = catalogue()["hunt_crossley_contact"]
+    for name in shipped_grippers():
+        why = why_left_out(hunt_crossley, load_gripper(name))
+        assert why == ("needs pads that stay parallel; those of so101_gripper turn" if name == "so101_gripper" else "")
