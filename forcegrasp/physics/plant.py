@@ -127,11 +127,12 @@ class Plant(ModelFields):
     def mass_between(self, rows: np.ndarray) -> np.ndarray:
         """Mass that the distance between each side's pads and the object has, kg, ``(len(rows), 2)``.
 
-        That of both, one against the other; the object's alone on a side that stands still.
+        That of both, one against the other, where a motor that moves both sides is held by both; the object's alone on
+        a side that stands still.
         """
-        inertia = self.batch.expand("dof_M0")[rows]
-        moved = inertia[:, self._motor_v][:, self._mover]
-        return 1 / (self.travel**2 / moved + 1 / inertia[:, self.object_dof, None])
+        inertia, work = self.batch.expand("dof_M0")[rows], self.travel**2
+        shared = np.array([work[self._mover == mover].sum() for mover in self._mover]) * (work > 0)
+        return 1 / (shared / inertia[:, self._motor_v][:, self._mover] + 1 / inertia[:, self.object_dof, None])
 
     def attach(self, effects: Sequence[tuple[PlantEffect, np.ndarray]]) -> None:
         """Puts effects into the plant, each on its own rows, in the order of their stages; replaces earlier ones."""

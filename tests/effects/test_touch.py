@@ -71,3 +71,16 @@ def test_a_reset_forgets_the_surface_of_its_rows_alone(feeler):
     _depth(feeler, 0.025, 0.1)
     feeler.reset(np.array([1]))
     np.testing.assert_allclose(_depth(feeler, 0.020, 0.1), [[0.005, 0.005], [0.0, 0.0]], atol=1e-15)
+
+
+@pytest.mark.parametrize("gripper", ["tiago", "franka_hand", "so101_gripper"])
+def test_the_mass_between_pad_and_object_is_that_of_both(gripper):
+    """Each finger with its motor; both with the one motor; the object alone against a jaw that stands still."""
+    plant = Plant(load_gripper(gripper), 1, threads=1)
+    plant.reset(np.arange(1), np.zeros(1))
+    motors, thing = plant.inertia[0], plant.model.dof_M0[plant.object_dof]
+    if gripper == "franka_hand":
+        motors = motors / (plant.travel**2).sum()
+    elif gripper == "so101_gripper":
+        motors = np.where(plant.travel == 0, np.inf, motors / max(plant.travel**2))
+    np.testing.assert_allclose(plant.mass_between(np.arange(1))[0], 1 / (1 / motors + 1 / thing) + np.zeros(2))
