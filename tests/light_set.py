@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 
@@ -27,7 +28,13 @@ def light_gripper() -> Gripper:
     return load_gripper(str(Path(__file__).parent / "grippers" / "light.yaml"))
 
 
-def light_set(*hidden: str, seed: int = 2, grasps: int = 9, samples: int = 72) -> Loaded[MeasurementSet]:
+def light_set(
+    *hidden: str,
+    seed: int = 2,
+    grasps: int = 9,
+    samples: int = 72,
+    sensor: Callable[[np.ndarray], np.ndarray] = np.asarray,
+) -> Loaded[MeasurementSet]:
     """The grasps that the rig of :mod:`tests.independent.rig` would make, by the light gripper.
 
     Args:
@@ -35,6 +42,7 @@ def light_set(*hidden: str, seed: int = 2, grasps: int = 9, samples: int = 72) -
       seed: of the plan, the gripper's parameters and the noise.
       grasps: how many.
       samples: of each, 40 ms apart.
+      sensor: what the force sensors make of the force, but for noise.
     """
     gripper, setup = light_gripper(), draw_setup(seed, grasps, "rich", samples)
     radius, rest, unloaded = setup.per_grasp("radius"), np.full((samples, 2), gripper.stroke), np.zeros((samples, 2))
@@ -52,6 +60,7 @@ def light_set(*hidden: str, seed: int = 2, grasps: int = 9, samples: int = 72) -
     base |= {"radius_m": radius, "offset_m": setup.offset}
     effects = tuple(parse_effect(text, gripper) for text in hidden)
     (true,) = predict(Replay(gripper, bare, encoders_known=False, strict=True), [Case(base, effects)])
+    true = np.concatenate([true[..., :2], sensor(true[..., 2:])], axis=2)
     rng = np.random.default_rng([seed, 2])
     read = true + rng.standard_normal(true.shape) * [POSITION_STD_M, POSITION_STD_M, FORCE_STD_N, FORCE_STD_N]
     found = tuple(

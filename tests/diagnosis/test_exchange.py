@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 
 import numpy as np
 import pytest
@@ -26,9 +27,15 @@ def rubbing():
     return loaded, *fit_model(loaded, 0, silent)
 
 
-def exchanged(rubbing, *names: str, only_last: bool = False):
+@pytest.fixture(scope="module")
+def found(rubbing):
+    """:func:`step_with` of that jaw, each made once."""
+    return functools.cache(functools.partial(step_with, rubbing))
+
+
+def exchanged(found, *names: str, only_last: bool = False):
     """What takes the place of one of these effects, which are in the model; and the step that found the last one."""
-    study, step, fit = step_with(rubbing, *names)
+    study, step, fit = found(*names)
     study = dataclasses.replace(study, numerical=beyond_fit(fit, numerical_error(fit, study.target)))
     step = dataclasses.replace(step, error_after=study.error(study.heldout(fit)))
     steps = [step] if only_last else [dataclasses.replace(step, effects=(name,)) for name in names]
@@ -38,25 +45,25 @@ def exchanged(rubbing, *names: str, only_last: bool = False):
     return exchange(study, fit, screen, others, steps, np.random.default_rng(0)), steps
 
 
-def test_what_was_hidden_takes_the_place_of_its_look_alike(rubbing):
-    found, steps = exchanged(rubbing, "actuator_lag", "position_deadband")
-    assert found is not None
-    best = found.candidates[0]
-    assert (found.effects[0], best.replaces) == ("coulomb_friction", "position_deadband")
+def test_what_was_hidden_takes_the_place_of_its_look_alike(found):
+    taken, steps = exchanged(found, "actuator_lag", "position_deadband")
+    assert taken is not None
+    best = taken.candidates[0]
+    assert (taken.effects[0], best.replaces) == ("coulomb_friction", "position_deadband")
     assert [one.effect.name for one in best.fit.problem.effects] == ["actuator_lag", "coulomb_friction"]
-    assert found.error_before == pytest.approx(steps[-1].error_after)
-    assert found.error_after == best.error_after < 1.1 < found.error_before
+    assert taken.error_before == pytest.approx(steps[-1].error_after)
+    assert taken.error_after == best.error_after < 1.1 < taken.error_before
     assert best.share > 0.9
-    assert [step.effects[0] for step in kept_steps([*steps, found])] == ["actuator_lag", "coulomb_friction"]
+    assert [step.effects[0] for step in kept_steps([*steps, taken])] == ["actuator_lag", "coulomb_friction"]
 
 
-def test_what_is_true_stays(rubbing):
-    assert exchanged(rubbing, "actuator_lag", "coulomb_friction")[0] is None
+def test_what_is_true_stays(found):
+    assert exchanged(found, "actuator_lag", "coulomb_friction")[0] is None
 
 
-def test_the_only_effect_was_chosen_with_all_there_is_in_the_model(rubbing, monkeypatch):
+def test_the_only_effect_was_chosen_with_all_there_is_in_the_model(found, monkeypatch):
     monkeypatch.setattr("forcegrasp.diagnosis.exchange.look_further", lambda *_: pytest.fail("looked for another"))
-    assert exchanged(rubbing, "position_deadband", only_last=True)[0] is None
+    assert exchanged(found, "position_deadband", only_last=True)[0] is None
 
 
 def test_alike_are_look_alikes_either_way_and_effects_of_one_kind():
@@ -68,18 +75,18 @@ def test_alike_are_look_alikes_either_way_and_effects_of_one_kind():
         assert all(are_alike(one, get_effect(name)) for name in one.look_alikes)
 
 
-def test_a_search_that_ends_with_more_than_noise_looks_for_exchanges_and_goes_on(rubbing, monkeypatch):
+def test_a_search_that_ends_with_more_than_noise_looks_for_exchanges_and_goes_on(rubbing, found, monkeypatch):
     _, target, simulators, base = rubbing
-    names = ("position_deadband", "actuator_lag")
-    _, step, fit = step_with(rubbing, *names)
-    instead = step_with(rubbing, "coulomb_friction", "actuator_lag")[1:]
-    found = dataclasses.replace(instead[0], effects=("coulomb_friction",), error_before=step.error_after)
-    candidate = dataclasses.replace(found.candidates[0], fit=instead[1], replaces="position_deadband")
+    names = ("actuator_lag", "position_deadband")
+    _, step, fit = found(*names)
+    _, instead, other_fit = found("actuator_lag", "coulomb_friction")
+    taken = dataclasses.replace(instead, error_before=step.error_after)
+    candidate = dataclasses.replace(instead.candidates[0], fit=other_fit, replaces="position_deadband")
     calls = []
 
     def recorded(*arguments) -> Step | None:
         calls.append(arguments)
-        return dataclasses.replace(found, candidates=(candidate,)) if len(calls) == 1 else None
+        return dataclasses.replace(taken, candidates=(candidate,)) if len(calls) == 1 else None
 
     monkeypatch.setattr("forcegrasp.diagnosis.search.exchange", recorded)
     steps = [dataclasses.replace(step, effects=(name,)) for name in names]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 
 import numpy as np
 import pytest
@@ -39,8 +40,14 @@ def step_with(rubbing, *names: str):
     return study, Step((names[-1],), (found,), (), 5.0, error), fit
 
 
-def test_a_look_alike_goes_once_what_was_hidden_is_there(rubbing):
-    study, step, fit = step_with(rubbing, "motor_offset", "coulomb_friction")
+@pytest.fixture(scope="module")
+def found(rubbing):
+    """:func:`step_with` of that jaw, each made once."""
+    return functools.cache(functools.partial(step_with, rubbing))
+
+
+def test_a_look_alike_goes_once_what_was_hidden_is_there(found):
+    study, step, fit = found("motor_offset", "coulomb_friction")
     left, less = drop_needless(study, step, fit, 0)
     assert left.replaces == "motor_offset"
     assert [one.effect.name for one in less.problem.effects] == ["coulomb_friction"]
@@ -50,23 +57,23 @@ def test_a_look_alike_goes_once_what_was_hidden_is_there(rubbing):
     assert kept_steps([first, left]) == [left]
 
 
-def test_what_has_become_a_simpler_effect_is_named_so(rubbing):
-    study, step, fit = step_with(rubbing, "motor_offset", "presliding")
+def test_what_has_become_a_simpler_effect_is_named_so(found):
+    study, step, fit = found("motor_offset", "presliding")
     left, less = drop_needless(study, dataclasses.replace(step, effects=("presliding", "coulomb_friction")), fit, 0)
     assert (left.replaces, left.effects) == ("motor_offset", ("coulomb_friction",))
     assert left.candidates[0].effect.name == "coulomb_friction"
     assert [one.effect.name for one in less.problem.effects] == ["coulomb_friction"]
 
 
-def test_what_is_needed_or_was_given_stays(rubbing):
-    study, step, fit = step_with(rubbing, "coulomb_friction", "motor_offset")
+def test_what_is_needed_or_was_given_stays(found):
+    study, step, fit = found("coulomb_friction", "motor_offset")
     assert drop_needless(study, step, fit, 0) == (step, fit)
-    study, step, fit = step_with(rubbing, "motor_offset", "coulomb_friction")
+    study, step, fit = found("motor_offset", "coulomb_friction")
     assert drop_needless(study, step, fit, 1) == (step, fit)
 
 
-def test_all_that_is_no_longer_needed_goes_and_its_step_with_it(rubbing):
-    study, step, fit = step_with(rubbing, "motor_offset", "coulomb_friction")
+def test_all_that_is_no_longer_needed_goes_and_its_step_with_it(found):
+    study, step, fit = found("motor_offset", "coulomb_friction")
     first = dataclasses.replace(step, effects=("motor_offset",))
     steps, less = drop_all_needless(study, [first, step], fit, 0)
     assert steps == [step]
@@ -74,8 +81,8 @@ def test_all_that_is_no_longer_needed_goes_and_its_step_with_it(rubbing):
     assert drop_all_needless(study, [first, step], fit, 2) == ([first, step], fit)  # they were given
 
 
-def test_a_step_takes_the_place_of_one_effect_at_most(rubbing):
-    study, step, fit = step_with(rubbing, "motor_offset", "coulomb_friction")
+def test_a_step_takes_the_place_of_one_effect_at_most(found):
+    study, step, fit = found("motor_offset", "coulomb_friction")
     (last,) = step.candidates
     step = dataclasses.replace(step, candidates=(dataclasses.replace(last, replaces="stiction"),))
     assert drop_needless(study, step, fit, 0) == (step, fit)

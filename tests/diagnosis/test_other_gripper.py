@@ -31,7 +31,7 @@ def test_finds_what_was_hidden_in_another_gripper(tmp_path):
         force_std_n=0.02,
         seed=4,
     )
-    write_set(shortened(recorded.measured, 80), tmp_path / "set")
+    write_set(shortened(recorded.measured, 60), tmp_path / "set")
     loaded = load(tmp_path / "set")
     assert loaded.gripper.name == load_gripper(str(SECOND)).name
     names = ["force_lag", "force_bias"]
