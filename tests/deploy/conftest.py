@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -22,6 +23,16 @@ NEAR = GraspConfig(radius_m=[0.03, 0.035], offset_m=[-0.006, 0.006])
 TRAINING = TrainConfig(grasp=NEAR, physics=PhysicsConfig("fast", 1), ppo=PPOConfig(hidden=[16]))
 
 Make = Callable[..., tuple[Path, TrainConfig]]
+
+
+@pytest.fixture(scope="session", autouse=True)
+def one_table_of_operators() -> Iterator[None]:
+    """Torch makes its table of ONNX operators anew for each export, which takes half of the export's time."""
+    from torch.onnx._internal.exporter._registration import ONNXRegistry
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(ONNXRegistry, "from_torchlib", staticmethod(cache(ONNXRegistry.from_torchlib)))
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -24,7 +24,7 @@ from forcegrasp.physics import load_gripper, shipped_grippers
 from forcegrasp.runs.export import export_policy
 from forcegrasp.runs.policy import load_policy
 
-ROWS, STEPS = 20, 60
+ROWS, STEPS = 10, 60
 TOLERANCE = 1e-5
 
 VARIANTS = {

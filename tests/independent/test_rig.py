@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import os
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 
@@ -25,22 +26,25 @@ NEAR, NUDGE, SQUEEZE, EASE, RELEASE, END = 2, 17, 26, 46, 56, 68
 
 
 @cache
-def little_setup() -> Setup:
-    """A centred and an off-centre object: approach, nudge, squeeze, ease, release, all in steps."""
-    path = np.empty(END)
+def little_setup(pace: int = 1) -> Setup:
+    """A centred and an off-centre object: approach, nudge, squeeze, ease, release, all in steps.
+
+    With a ``pace`` of 2 steps follow one another twice as fast, before all has settled.
+    """
+    path = np.empty(END // pace)
     levels = {0: 0.045, NEAR: 0.03, NUDGE: 0.0298, SQUEEZE: 0.0232, EASE: 0.0234, RELEASE: 0.03}
     for start, level in levels.items():
-        path[start:] = level
-    commands = np.broadcast_to(path[None, :, None], (2, END, 2)).copy()
+        path[start // pace :] = level
+    commands = np.broadcast_to(path[None, :, None], (2, len(path), 2)).copy()
     things = [Thing("thing", 0.025, 0.005, F_ALPHA)]
     return Setup(Servo(GAIN, -9.0), things, np.array([0, 0]), np.array([0.0, OFFSET]), np.array([1, 1]), commands)
 
 
 @cache
-def rig(name: str = "", size: str = "medium", **parameters: float):
+def rig(name: str = "", size: str = "medium", pace: int = 1, **parameters: float):
     """The little grasp, without noise, with one effect."""
     chosen = {name: parameters or size} if name else {}
-    return simulate(little_setup(), build_effects(chosen), contact="penalty", noise="none")
+    return simulate(little_setup(pace), build_effects(chosen), contact="penalty", noise="none")
 
 
 def test_null_effects_change_no_bit() -> None:
@@ -54,7 +58,7 @@ def test_null_effects_change_no_bit() -> None:
 
 @pytest.mark.parametrize("name", sorted(CATALOGUE | VARIANTS | OTHERWISE | OUTSIDE))
 def test_every_effect_shows(name: str) -> None:
-    plain, hidden = rig(), rig(name, "large")
+    plain, hidden = rig(pace=2), rig(name, "large", pace=2)
     assert np.isfinite([hidden.q, hidden.f]).all()
     largest = max(np.max(abs(hidden.q - plain.q)) / POSITION_STD_M, np.max(abs(hidden.f - plain.f)) / FORCE_STD_N)
     assert largest > 3
@@ -148,7 +152,7 @@ def test_symptoms_of_the_sensors() -> None:
     plain = rig()
     for name in CATALOGUE:
         if name.startswith("force_") and name != "force_limit":
-            np.testing.assert_array_equal(rig(name, "large").q, plain.q)
+            np.testing.assert_array_equal(rig(name, "large", pace=2).q, rig(pace=2).q)
     np.testing.assert_allclose(rig("force_delay", latency=0.08).f[:, 2:], plain.f[:, :-2], atol=1e-12)
     rising = plain.f > np.roll(plain.f, 1, axis=1) + 0.01
     assert np.all(rig("force_lag").f[rising] < plain.f[rising])
@@ -182,19 +186,24 @@ def test_noises(name: str) -> None:
     assert (np.abs(drawn).max() > 7) == (name in ("heavy", "outliers"))
 
 
-@pytest.mark.parametrize("name", sorted(SPOILED))
-def test_a_spoiled_set_differs_in_what_is_written_alone(name: str, tmp_path: Path) -> None:
-    read = {}
-    for spoiled in ("", name):
-        folder = tmp_path / (spoiled or "whole")
-        record(folder, {}, 3, grasps=6, contact="penalty", samples=40, spoiled=spoiled)
-        read[spoiled] = {
-            file: list(csv.DictReader((folder / file).read_text().splitlines()))
-            for file in ("grasps.csv", "samples.csv")
-        }
+@pytest.fixture(scope="module")
+def written(tmp_path_factory) -> Callable[[str], dict[str, list[dict[str, str]]]]:
+    """What a set holds that was spoiled so, by file."""
 
+    @cache
+    def read(spoiled: str) -> dict[str, list[dict[str, str]]]:
+        folder = tmp_path_factory.mktemp("spoiled") / "set"
+        record(folder, {}, 3, grasps=6, contact="penalty", samples=40, spoiled=spoiled)
+        files = ("grasps.csv", "samples.csv")
+        return {file: list(csv.DictReader((folder / file).read_text().splitlines())) for file in files}
+
+    return read
+
+
+@pytest.mark.parametrize("name", sorted(SPOILED))
+def test_a_spoiled_set_differs_in_what_is_written_alone(name: str, written) -> None:
     def columns_that_differ(file: str) -> set[str]:
-        pairs = zip(read[""][file], read[name][file], strict=True)
+        pairs = zip(written("")[file], written(name)[file], strict=True)
         return {column for whole, other in pairs for column in whole if whole[column] != other[column]}
 
     expected = {
