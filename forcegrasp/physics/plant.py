@@ -87,7 +87,7 @@ class Plant(ModelFields):
     def outside_force(self) -> np.ndarray:
         """What acts on the motors' joints from outside, N or N·m, ``(n, motors)``; positive opens.
 
-        Gravity, springs, a load and what presses against the pads; not friction, and not what effects push.
+        Gravity, springs, a load and what presses against the pads; not friction, nor what else effects push.
         """
         weight = self.batch.bind("qfrc_spring") - self.batch.bind("qfrc_bias")
         return weight[:, self._motor_v] * self._signs + self._to_motors(self.press_n) + self._load[:, None]

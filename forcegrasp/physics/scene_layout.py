@@ -115,8 +115,7 @@ class SceneLayout:
     @functools.cached_property
     def _at_rest(self) -> tuple[mujoco.MjModel, mujoco.MjData]:
         """A copy of the scene, in which distances are measured."""
-        model = copy.copy(self.model)
-        return model, mujoco.MjData(model)
+        return (model := copy.copy(self.model)), mujoco.MjData(model)
 
     def _moved_by(self, motor: int) -> np.ndarray:
         return (self._mover == motor) & (self.travel != 0)
