@@ -20,12 +20,12 @@ from forcegrasp.identify.problem import Problem
 from forcegrasp.identify.progress import silent
 from forcegrasp.measure import MeasuredGrasp, MeasurementSet
 from forcegrasp.models.model_file import Fitted, FoundEffect, Model
-from forcegrasp.physics.gripper_file import load_gripper
 from forcegrasp.replay.replay import Replay
+from tests.light_set import light_gripper
 
-TIAGO = load_gripper("tiago")
+GRIPPER = light_gripper()
 SIGMA = np.array([2.7e-5, 2.7e-5, 0.013, 0.013])
-TRUTH = {"position_gain": 118.0, "velocity_gain": -7.4, "rho_m": 0.005, "force_scale": 2.0}
+TRUTH = {"position_gain": 118.0, "velocity_gain": -7.4, "rho_m": 0.003, "force_scale": 2.0}
 RADIUS = 0.022
 
 
@@ -51,16 +51,16 @@ def measured(
     """Eight grasps with noise, simulated by the model itself, whose parameters are TRUTH but for the changes."""
     bare = [planned(f"g{i}", things if i % 2 else "cup", 0.003 + 0.0004 * i) for i in range(8)]
     play = [EffectSetting(get_effect("backlash"), "play", np.array([play_m]))] if play_m else []
-    problem = Problem(TIAGO, bare, play)
+    problem = Problem(GRIPPER, bare, play)
     truth = TRUTH | changes | {"gap_m": play_m}
     case = problem.case(np.array([e.coordinate(truth[e.parameter]) for e in problem.entries]))
-    signals = predict(Replay(TIAGO, problem.grasps), [case])[0]
+    signals = predict(Replay(GRIPPER, problem.grasps), [case])[0]
     signals = signals + SIGMA * np.random.default_rng(seed).standard_normal(signals.shape)
     full = tuple(
         dataclasses.replace(g, position_m=signals[i, :, :2], force_n=signals[i, :, 2:]) for i, g in enumerate(bare)
     )
     one = MeasurementSet(Path(name), name, "tiago", "", "", SIGMA[0], SIGMA[2], full, name)
-    return Loaded(one, TIAGO, [])
+    return Loaded(one, GRIPPER, [])
 
 
 @pytest.fixture(scope="module")
@@ -70,14 +70,14 @@ def parts() -> list[Loaded[MeasurementSet]]:
 
 @pytest.fixture(scope="module")
 def three(parts) -> BetweenSets:
-    return compare_sets(parts, Model(TIAGO, {}), silent)
+    return compare_sets(parts, Model(GRIPPER, {}), silent)
 
 
 def without(found: BetweenSets, patch: pytest.MonkeyPatch, parts, left: int) -> BetweenSets:
     """The same of all sets but one, whose fits are known."""
     fits = {one.name: one for one in found.sets}
     patch.setattr(between_sets, "_fit", lambda part, model, progress: fits[part.measured.name])
-    return compare_sets([one for k, one in enumerate(parts) if k != left], Model(TIAGO, {}), silent)
+    return compare_sets([one for k, one in enumerate(parts) if k != left], Model(GRIPPER, {}), silent)
 
 
 def test_of_two_sets_the_gain_that_differs_is_named_and_nothing_else(three, parts, monkeypatch):
@@ -117,14 +117,14 @@ def test_three_sets_have_a_spread_and_their_shared_value_includes_it(three):
 
 
 def test_a_value_has_the_interval_that_a_fit_of_its_set_gives(three, parts):
-    target, _, base = fit_set.apply_model(parts[0], Model(TIAGO, {}), silent, refit=True)
+    target, _, base = fit_set.apply_model(parts[0], Model(GRIPPER, {}), silent, refit=True)
     expected = intervals(base.fit, standard_errors(base.fit, numerical_error(base.fit, target)))
     for one, (value, low, high) in zip(three.parameters, expected, strict=False):
         assert one.values["a"] == Fitted(pytest.approx(value), pytest.approx(low), pytest.approx(high), one.unit)
 
 
 def test_what_one_set_alone_has_is_not_compared(parts):
-    found = compare_sets([parts[0], measured("d", 4, things="ball")], Model(TIAGO, {}), silent)
+    found = compare_sets([parts[0], measured("d", 4, things="ball")], Model(GRIPPER, {}), silent)
     assert {one.name for one in found.parameters} == {
         "position_gain", "velocity_gain", "rho_m of cup", "force_scale of cup",
     }  # fmt: skip
@@ -133,7 +133,7 @@ def test_what_one_set_alone_has_is_not_compared(parts):
 def test_an_effect_of_the_model_is_compared_as_well(parts):
     play = FoundEffect(get_effect("backlash"), "play", {"gap_m": Fitted(5e-4, 4e-4, 6e-4, "m")})
     pair = [measured("e", 5, play_m=4e-4), measured("f", 6, play_m=8e-4)]
-    found = compare_sets(pair, Model(TIAGO, {}, effects=(play,)), silent)
+    found = compare_sets(pair, Model(GRIPPER, {}, effects=(play,)), silent)
     (gap,) = found.of(Agreement.DIFFERS)
     assert (gap.name, gap.unit) == ("backlash.gap_m", "m")
     assert gap.values["e"].low < 4e-4 < gap.values["e"].high
