@@ -55,8 +55,8 @@ def evaluated(folder: Path, **values: Any) -> dict[str, Any]:
 
 @pytest.fixture(scope="module")
 def learned(plain_training, run_path) -> dict[str, list[str]]:
-    """A policy that sees every reading, which the hand-written controllers do not, and something to hold it against."""
-    return {"policies": [str(run_path), "close"], "baseline": "close"}
+    """A policy that sees every reading, which the hand-written controllers do not."""
+    return {"policies": [str(run_path)]}
 
 
 @pytest.fixture(scope="module")
@@ -75,11 +75,18 @@ def test_the_same_evaluation_finds_the_same(tmp_path, plain_evaluation, learned)
 
 
 @pytest.mark.parametrize(
-    "name", [n for n in EVALUATE_CASES if n not in ("gripper", "out", "detail", "physics.threads", *ELSEWHERE)]
+    "name", [n for n in EVALUATE_CASES if n not in ("gripper", "out", "detail", "baseline", "physics.threads", *ELSEWHERE)]
 )
 def test_option_of_evaluate(name, tmp_path, plain_evaluation, learned):
     different = evaluated(tmp_path, **learned | {name: EVALUATE_CASES[name]})
     assert different != plain_evaluation
+
+
+def test_baseline_of_evaluate_is_what_others_are_held_against(tmp_path, learned):
+    both = {"policies": [*learned["policies"], "close"]}
+    names = ("close", EVALUATE_CASES["baseline"])
+    one, other = (evaluated(tmp_path / name, **both, baseline=name) for name in names)
+    assert one != other
 
 
 def test_gripper_of_evaluate_is_simulated_and_moves_no_policy_of_another(tmp_path, learned):

@@ -23,22 +23,22 @@ from forcegrasp.runs.run_dir import RunDir
 from forcegrasp.train.loop import train
 
 # As small as can be, yet the fingers arrive, wait for each other and press, and the object moves.
-TINY_GRASP = {"grasp.steps": 45, "physics.tier": "fast", "physics.threads": 1}
+TINY_GRASP = {"grasp.steps": 30, "physics.tier": "fast", "physics.threads": 1}
 TINY_TRAINING = TINY_GRASP | {
-    "ppo.total_frames": 180,
+    "ppo.total_frames": 120,
     "ppo.grasps": 2,
     "ppo.epochs": 2,
-    "ppo.minibatch": 45,
+    "ppo.minibatch": 30,
     "ppo.hidden": [8],
     "ppo.initial_action": -1.0,
     "ppo.log_std": -1.0,
     "ppo.value_weight": 10.0,  # lest its gradient stays below the largest norm
-    "sac.total_frames": 180,
+    "sac.total_frames": 120,
     "sac.grasps": 2,
     "sac.hidden": [8],
     "sac.initial_action": -1.0,
     "sac.log_std": -1.0,
-    "sac.buffer": 150,
+    "sac.buffer": 100,
     "sac.updates": 3,
     "sac.minibatch": 16,
     "curriculum.end_fraction": 1.0,
@@ -64,7 +64,7 @@ SHARED_CASES: dict[str, Any] = {
     "grasp.deformation_m": 0.008,
     "grasp.goal_force_min_n": 0.1,
     "grasp.goal_force_max": 0.8,
-    "grasp.steps": 44,
+    "grasp.steps": 29,
     "sensors.position_std_m": 0.001,
     "sensors.force_std_n": 0.1,
     "sensors.contact_threshold_n": 0.2,
