@@ -11,6 +11,7 @@ import pytest
 from forcegrasp.diagnosis import add_effect, advice, diagnose_set
 from forcegrasp.identify import comparison, fit_set, loading
 from forcegrasp.identify import noise_floor as floor
+from forcegrasp.reports import results
 from tests.made_up import made_up as made_up  # a fixture
 
 TABLE_META = "format: forcegrasp-measurements/1\nkind: final_force\ngripper: tiago\nsource: a test\nlicense: none\n"
@@ -52,5 +53,6 @@ def work(made_up, monkeypatch, tmp_path) -> SimpleNamespace:
         monkeypatch.setattr(home, name, returns(name, value))
     monkeypatch.setattr(advice, "advise", lambda diagnosis: made_up.advice)
     monkeypatch.setattr("forcegrasp.api.functions.advise", lambda diagnosis: made_up.advice)
-    monkeypatch.setattr(floor, "numerical_error", lambda fit, target: [])
+    for home in (floor, results):
+        monkeypatch.setattr(home, "numerical_error", lambda fit, target: [])
     return SimpleNamespace(calls=calls, made_up=made_up)
