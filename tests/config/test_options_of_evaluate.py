@@ -75,7 +75,8 @@ def test_the_same_evaluation_finds_the_same(tmp_path, plain_evaluation, learned)
 
 
 @pytest.mark.parametrize(
-    "name", [n for n in EVALUATE_CASES if n not in ("gripper", "out", "detail", "baseline", "physics.threads", *ELSEWHERE)]
+    "name",
+    [n for n in EVALUATE_CASES if n not in ("gripper", "out", "detail", "baseline", "physics.threads", *ELSEWHERE)],
 )
 def test_option_of_evaluate(name, tmp_path, plain_evaluation, learned):
     different = evaluated(tmp_path, **learned | {name: EVALUATE_CASES[name]})

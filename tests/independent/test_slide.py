@@ -18,7 +18,7 @@ from .slide import EFFECTS, POSITION_STD_M, SAMPLE_S, Log, record, simulate
 def slide(name: str = "", size: str = "large", **parameters: float) -> Log:
     """Two recordings without noise, the first with loads from outside, with one effect."""
     chosen = {name: parameters or size} if name else {}
-    return simulate(build_effects(chosen), 1, recordings=4, samples=600, noise=False)
+    return simulate(build_effects(chosen), 1, recordings=2, samples=400, noise=False)
 
 
 def test_null_effects_change_no_bit() -> None:
