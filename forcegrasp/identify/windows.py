@@ -20,7 +20,7 @@ LEAST_SAMPLES = 40
 GAP, GAP_S = 5, 0.1
 #: The first part of a window is simulated but does not count: what is not known of its start (the memory of effects,
 #: errors of position and velocity) fades meanwhile. Seconds.
-WARM_UP_S = 0.2
+WARM_UP_S = 0.4
 # Samples, and seconds at least, that a start's position and velocity are estimated from, by a parabola through them.
 _AROUND, _AROUND_S = 4, 0.02
 # A window starts at the best of so many samples around its turn. Its clock may be off by so many seconds: where a servo

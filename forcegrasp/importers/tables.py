@@ -32,6 +32,7 @@ class Table:
     numbers: dict[str, np.ndarray]  #: numbers, true and false, or dates and times in s; NaN where a cell is empty
     texts: dict[str, list[str]] = field(default_factory=dict)  #: columns that hold anything else, as they stand there
     notes: tuple[str, ...] = ()  #: what was guessed or left out
+    lines: tuple[int, ...] = ()  #: where rows stand in the file, as an editor counts; empty if it has no lines
 
     @property
     def rows(self) -> int:
@@ -46,7 +47,7 @@ class Table:
         """Which cell of a column of text is no number."""
         cells = self.texts[name]
         row = next((i for i, cell in enumerate(cells) if _number(cell, "") is None), 0)
-        return f"{name} (row {row + 2} has {show(cells[row], 30)})"
+        return f"{name} (row {self.lines[row] if self.lines else row + 1} has {show(cells[row], 30)})"
 
 
 def read_columns(file: Path) -> Table:
@@ -63,22 +64,26 @@ def read_columns(file: Path) -> Table:
     except OSError as error:
         raise MeasurementError(f"{file}: can't be read: {error}") from error
     text, notes = _decoded(content, file)
-    text = text.partition("\n")[2] if text.startswith("sep=") else text  # a word of one spreadsheet to itself
+    above = text.startswith("sep=")  # a word of one spreadsheet to itself
+    text = text.partition("\n")[2] if above else text
     first = next((line for line in text.splitlines() if line.strip() and not line.startswith("#")), "")
     # a semicolon weighs twice, for the commas beside it are those of numbers; and spaces stand beside any other
     there = [separator for separator in _SEPARATORS if separator in first.strip()]
     separator = max(there, key=lambda s: (s != " ", first.count(s) * (2 if s == ";" else 1)), default=",")
     try:
         lines = csv.reader(io.StringIO(text, newline=None), delimiter=separator, skipinitialspace=True)
-        rows = [row for row in lines if any(cell.strip() for cell in row)]
+        numbered = [(lines.line_num + above, row) for row in lines if any(cell.strip() for cell in row)]
     except csv.Error as error:
         raise MeasurementError(f"{file}: can't be read: {error}") from error
-    hidden = [row for row in rows if row[0].startswith("#")]
-    rows = [row[:-1] if separator == " " and not row[-1] else row for row in rows if not row[0].startswith("#")]
+    hidden = [row for _, row in numbered if row[0].startswith("#")]
+    numbered = [(line, row) for line, row in numbered if not row[0].startswith("#")]
+    rows = [row[:-1] if separator == " " and not row[-1] else row for _, row in numbered]
+    at = [line for line, _ in numbered]
     if hidden and rows and all(_number(cell, separator) is not None for cell in rows[0]):
-        above = [cell for cell in (hidden[-1][0].lstrip("#"), *hidden[-1][1:]) if cell.strip()]
-        if len(above) == len(rows[0]):  # as numpy.savetxt writes it
-            rows.insert(0, above)
+        names = [cell for cell in (hidden[-1][0].lstrip("#"), *hidden[-1][1:]) if cell.strip()]
+        if len(names) == len(rows[0]):  # as numpy.savetxt writes it
+            rows.insert(0, names)
+            at.insert(0, 0)
     if len(rows) < 3:
         raise OtherFileError(f"{file}: needs a header and at least two rows")
     header = [name.strip() for name in rows[0]]
@@ -87,11 +92,11 @@ def read_columns(file: Path) -> Table:
     if len(rows[-1]) < len(header):
         notes.append(f"{file.name}: left out the last line, which was cut short")
         rows.pop()
-    for number, row in enumerate(rows[1:], start=2):
+    for line, row in zip(at[1:], rows[1:], strict=False):
         while len(row) > len(header) and not row[-1].strip():
             row.pop()  # a separator at the end of each line
         if len(row) != len(header):
-            raise MeasurementError(f"{file}, row {number}: {counted(len(row), 'cell')} under {len(header)} names")
+            raise MeasurementError(f"{file}, row {line}: {counted(len(row), 'cell')} under {len(header)} names")
     if twice := sorted({name for name in header if name and header.count(name) > 1}):
         raise MeasurementError(f"{file}: {', '.join(twice)}: two columns have this name; rename one")
     numbers, texts = {}, {}
@@ -101,7 +106,7 @@ def read_columns(file: Path) -> Table:
             texts[name] = list(cells)
         else:
             numbers[name] = values
-    return Table(numbers, texts, tuple(notes))
+    return Table(numbers, texts, tuple(notes), tuple(at[1 : len(rows)]))
 
 
 def read_parquet(file: Path, only: Collection[str] | None = None) -> pl.DataFrame:

@@ -242,7 +242,7 @@ def test_a_table_as_a_spreadsheet_writes_it_and_one_that_was_cut_short(tmp_path)
     )  # fmt: skip
     (tmp_path / "map.yaml").write_text("time: t\njoints: a\ncommand: state\nposition: pos")
     refused(
-        r"no numbers in column state \(row 2 has 'on'\)", [tmp_path / "log.csv"], "", str(tmp_path / "map.yaml"), []
+        r"no numbers in column state \(row 3 has 'on'\)", [tmp_path / "log.csv"], "", str(tmp_path / "map.yaml"), []
     )
 
 

@@ -128,3 +128,13 @@ def test_all_columns_that_are_wrong_are_told_at_once(tmp_path):
     (tmp_path / "log.csv").write_text("t,goal,pos\ns,rad,rad\n" + lines("{t},{c},{p}"))
     with pytest.raises(MeasurementError, match=r"no numbers in column t \(row 2 has 's'\), goal .*, pos .*"):
         read(tmp_path / "log.csv")
+
+
+def test_a_wrong_row_is_named_as_an_editor_counts_lines(tmp_path):
+    above = "sep=,\n# of Monday\nt,goal,pos\n\n"
+    (tmp_path / "log.csv").write_text(above + "s,rad,rad\n" + lines("{t},{c},{p}"))
+    with pytest.raises(MeasurementError, match=r"no numbers in column t \(row 5 has 's'\)"):
+        read(tmp_path / "log.csv")
+    (tmp_path / "log.csv").write_text(above + "0,1\n" + lines("{t},{c},{p}"))
+    with pytest.raises(MeasurementError, match=r"log.csv, row 5: 2 cells under 3 names"):
+        read(tmp_path / "log.csv")
