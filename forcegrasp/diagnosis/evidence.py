@@ -45,6 +45,7 @@ def is_significant(candidate: Candidate, least_gain: float, least_share: float =
     """
     return (
         candidate.p_family <= ALARM
+        and candidate.is_resolved
         and (is_beyond_chance(candidate.evidence, LEAST_RISE) or _shows_in_some(candidate))
         and candidate.largest_fall >= least_gain
         and candidate.share >= least_share
@@ -75,7 +76,8 @@ def indistinguishable(winner: Candidate, other: Candidate) -> bool:
     alike = parallel and other.heldout_gain > _ALIKE * winner.heldout_gain
     simpler = len(other.effect.parameters) < len(winner.effect.parameters)
     nearly = simpler and other.heldout_gain > _NEARLY * winner.heldout_gain
-    if other.share < min(LEAST_SHARE, _HALF * winner.share):  # it may be there besides, and not instead
+    # it may be there besides, and not instead
+    if other.share < min(LEAST_SHARE, _HALF * winner.share) or not other.is_resolved:
         return False
     if other.fit.cost > _FITS_WORSE * winner.fit.cost:
         return False

@@ -63,6 +63,14 @@ class Candidate(ShortRepr):
         return self.gains if self.of_recordings is None else self.of_recordings
 
     @property
+    def is_resolved(self) -> bool:
+        """Whether it is more than what integrators differ by; where the drive samples at each step, it always is."""
+        gripper, least = self.fit.problem.gripper, self.effect.least_steps
+        if not least or gripper.steps_as_its_drive:
+            return True
+        return bool(self.setting.values[0] >= least * gripper.compile().opt.timestep)
+
+    @property
     def heldout_gain(self) -> float:
         """Change of the held-out log-likelihood, all grasps together."""
         return float(np.nansum(self.gains))

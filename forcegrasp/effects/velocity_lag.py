@@ -30,6 +30,8 @@ class VelocityLag(Effect):
         " less effort for it, where effort is read"
     )
     parameters = (Parameter("lag_s", "how late the velocity is, τ", "s", 0.0, 0.1, 0.01, trials=(0.002, 0.008)),)
+    # MuJoCo's implicit integrator acts on the velocity at the end of a step, others on that at its start
+    least_steps = 2.0
     order = 9  # inside the loop, after all that happens to the command
 
     def init(self, which: np.ndarray) -> State:

@@ -29,9 +29,8 @@ def numerical_error(fit: Fit, target: Target) -> tuple[np.ndarray, ...]:
     samples as its drive does: with half a step it would be another drive, and no finer simulation of the same one.
     """
     gripper, grasps, case = fit.problem.gripper, fit.problem.grasps, [fit.problem.case(fit.vector)]
-    sampled = gripper.compile().opt.timestep > 0.99 * gripper.period_s
     others = (
-        Replay(gripper, grasps, step_factor=1.0 if sampled else 0.5, strict=True),
+        Replay(gripper, grasps, step_factor=1.0 if gripper.steps_as_its_drive else 0.5, strict=True),
         Replay(gripper, grasps, other_collisions=True, strict=True),
     )
     return tuple(

@@ -18,9 +18,11 @@ LONGEST_S, SHORTEST_S, LEAST_WINDOWS = 1.0, 0.3, 12
 LEAST_SAMPLES = 40
 #: Nothing is simulated across a gap of so many times the usual time between samples, and so many seconds at least.
 GAP, GAP_S = 5, 0.1
-#: The first part of a window is simulated but does not count: what is not known of its start (the memory of effects,
-#: errors of position and velocity) fades meanwhile. Seconds.
+#: The first part of a window is simulated but does not count: what is not known of its start (errors of position and
+#: velocity, how bristles are bent) fades meanwhile. Seconds.
 WARM_UP_S = 0.4
+#: Effects remember what was commanded so long before a window: a ramp to an earlier command may take that long.
+REMEMBERED_S = 3.0
 # Samples, and seconds at least, that a start's position and velocity are estimated from, by a parabola through them.
 _AROUND, _AROUND_S = 4, 0.02
 # A window starts at the best of so many samples around its turn. Its clock may be off by so many seconds: where a servo
@@ -86,8 +88,11 @@ def _windows(recording: MeasuredGrasp, part: slice, length: float, skew: BasePar
         counts = (since >= warm_up) & (np.arange(low, high) < last)
         if counts.sum() > _AROUND:
             window, name = _cut_out(one, slice(low, int(high))), f"{one.name} {began + time[low]:.1f} s"
-            start = _state(one, low, usual)
-            found.append(dataclasses.replace(window, name=name, time_s=since, start=start, counts=counts))
+            start, earlier = _state(one, low, usual), slice(int(np.searchsorted(time, time[low] - REMEMBERED_S)), low)
+            before = time[earlier] - time[low], one.command_m[earlier]
+            found.append(
+                dataclasses.replace(window, name=name, time_s=since, start=start, counts=counts, before=before)
+            )
     return found
 
 

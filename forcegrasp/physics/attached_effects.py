@@ -75,6 +75,14 @@ class AttachedEffects:
         steps = range(commands.shape[1])
         return np.stack([self.command(commands[:, step], fresh[:, step]) for step in steps], axis=1)
 
+    def recall(self, commands: np.ndarray, fresh: np.ndarray) -> None:
+        """Gives those whose memory is of commands alone what was commanded before the start, as :meth:`commands`."""
+        known = [effect for effect in self._command if effect.is_known_beforehand]
+        for step in range(commands.shape[1] if known else 0):
+            command = commands[:, step].copy()
+            for effect in known:
+                command[effect.rows] = effect.command(command[effect.rows], fresh[effect.rows, step])
+
     @property
     def limit_motors(self) -> bool:
         """Whether any limits what the motors can give from step to step."""

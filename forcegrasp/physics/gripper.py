@@ -226,6 +226,11 @@ class Gripper(ShortRepr):
         gains = [model.actuator(motor.actuator).biasprm[2] for motor in self.motors]
         return ("actuator_biasprm", 2) in written or any(gains)
 
+    @functools.cached_property
+    def steps_as_its_drive(self) -> bool:
+        """Whether the scene steps at the control period, as its drive samples: half a step would be another drive."""
+        return self.compile().opt.timestep > 0.99 * self.period_s
+
     @property
     def shape(self) -> str:
         """What the scene's object is: "cylinder", "sphere" or "box"; empty of a mechanism that grasps nothing."""

@@ -121,6 +121,7 @@ class Replay:
         starts_at = [g.start or (start_position(g, gripper.stroke), np.zeros(len(gripper.motors))) for g in self.grasps]
         #: where the motors stand at the first sample, m or rad, and how fast they move, ``(grasps, motors)``
         self.start_m, self._start_velocity = (np.stack([pair[i] for pair in starts_at]) for i in (0, 1))
+        self._earlier = _earlier(self.grasps, self.dt) if any(g.before is not None for g in self.grasps) else None
         self._disturbed = any(g.load is not None or g.enabled is not None for g in self.grasps)
         if self._disturbed:
             ones = [np.ones(len(g.time_s)) for g in self.grasps]
@@ -170,6 +171,10 @@ class Replay:
         if velocity is not None and START_VELOCITY in base:
             velocity = velocity + base[START_VELOCITY][:, None]
         plant.reset(ids, offset, self.start_m[grasp], velocity)
+        if self._earlier is not None:
+            commands, fresh = (values[grasp] for values in self._earlier)
+            at_rest = self.start_m[grasp][:, None] if self.gripper.command == "position" else 0.0
+            plant.effects.recall(np.where(np.isnan(commands), at_rest, commands), fresh)
         position, force = (np.empty((n, self._steps, width)) for width in (plant.motors, plant.channels))
         objects = np.empty((n, self._steps))
         position[:, 0], force[:, 0], objects[:, 0] = plant.position, plant.transduced_force, plant.object_position
@@ -267,6 +272,24 @@ class _Instants:
             return before
         share = self.share.reshape(*self.share.shape, *(1,) * (before.ndim - 2))
         return before + share * (values[each, self.before + 1] - before)
+
+
+def _earlier(grasps: Sequence[MeasuredGrasp], dt: float) -> tuple[np.ndarray, np.ndarray]:
+    """What was commanded in the steps before the first sample ``(grasps, steps, motors)``, and which were new ones.
+
+    NaN before the first command that is known.
+    """
+    before = [(np.empty(0), g.command_m[:0]) if g.before is None else g.before for g in grasps]
+    steps = max(math.ceil(-time[0] / dt) if len(time) else 0 for time, _ in before)
+    commands = np.full((len(grasps), steps, grasps[0].command_m.shape[1]), np.nan)
+    fresh = np.zeros(commands.shape[:2], bool)
+    for index, (time, command) in enumerate(before):
+        if len(time):
+            first = steps + np.rint(time / dt).astype(int)
+            fresh[index, first] = True
+            latest = np.searchsorted(first, np.arange(steps), side="right") - 1
+            commands[index, latest >= 0] = command[latest[latest >= 0]]
+    return commands, fresh
 
 
 def _fitting_factor(grasps: Sequence[MeasuredGrasp], timestep: float) -> float:

@@ -35,6 +35,21 @@ def candidate(made_up, **changed: Any):
 # --- one step ------------------------------------------------------------------------------------------------------
 
 
+def test_a_lag_of_which_the_integrator_makes_as_much_does_not_convince(made_up, monkeypatch):
+    def lag(seconds: float):
+        return EffectSetting(get_effect("velocity_lag"), "difference", np.array([seconds]))
+
+    gripper = made_up.base.fit.problem.gripper
+    assert not gripper.steps_as_its_drive
+    two_steps = 2 * gripper.compile().opt.timestep
+    assert is_significant(candidate(made_up, setting=lag(1.01 * two_steps)), 0.02)
+    assert not is_significant(candidate(made_up, setting=lag(0.99 * two_steps)), 0.02)
+    assert not indistinguishable(candidate(made_up), candidate(made_up, setting=lag(0.99 * two_steps)))
+    # a drive that samples at each step differs from the integrator by its own steps
+    monkeypatch.setitem(vars(gripper), "steps_as_its_drive", True)
+    assert is_significant(candidate(made_up, setting=lag(0.99 * two_steps)), 0.02)
+
+
 @pytest.mark.parametrize(
     ("changed", "taken"),
     [
