@@ -30,6 +30,7 @@ class Backlash(Effect):
     )
     variants = ("play", "loose", "command")
     known_beforehand = ("command",)
+    follows_motion = True
     variant_needs = {"play": "pads", "loose": "pads", "command": "position loop"}  # noqa: RUF012 never changed
 
     def init(self, which: np.ndarray) -> State:

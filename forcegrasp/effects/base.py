@@ -87,6 +87,7 @@ class Effect:
     alone: ClassVar[str] = ""
     #: Variants that change commands by what is commanded alone, whatever happens, so that it can be known beforehand.
     known_beforehand: ClassVar[tuple[str, ...]] = ()
+    follows_motion: ClassVar[bool] = False  #: acts by a memory of positions alone, so that measured ones give it
     after_noise: ClassVar[bool] = False  #: acts on readings with their noise, as rounding does
     of_set: ClassVar[bool] = False  #: not of the gripper: what the measurement set says is wrong
     needs_object: ClassVar[bool] = False  #: shows only where fingers press on something

@@ -35,6 +35,7 @@ class Presliding(Effect):
     )  # fmt: skip
     contains = (Nested("coulomb_friction", at={"displacement_m": 0.0}, same={"force_n": "force_n"}),)
     order = 5
+    follows_motion = True
 
     def init(self, which: np.ndarray) -> State:
         position = self.position[which]

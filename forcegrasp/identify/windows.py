@@ -8,6 +8,7 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.signal import savgol_filter
 
 from forcegrasp.measure.schema import MeasuredGrasp
 from forcegrasp.physics.gripper_parts import BaseParameter
@@ -19,9 +20,9 @@ LEAST_SAMPLES = 40
 #: Nothing is simulated across a gap of so many times the usual time between samples, and so many seconds at least.
 GAP, GAP_S = 5, 0.1
 #: The first part of a window is simulated but does not count: what is not known of its start (errors of position and
-#: velocity, how bristles are bent) fades meanwhile. Seconds.
+#: velocity, what elastic parts store) fades meanwhile. Seconds.
 WARM_UP_S = 0.4
-#: Effects remember what was commanded so long before a window: a ramp to an earlier command may take that long.
+#: Effects remember commands and motion of so long before a window: a ramp to an earlier command may take that long.
 REMEMBERED_S = 3.0
 # Samples, and seconds at least, that a start's position and velocity are estimated from, by a parabola through them.
 _AROUND, _AROUND_S = 4, 0.02
@@ -76,7 +77,7 @@ def _windows(recording: MeasuredGrasp, part: slice, length: float, skew: BasePar
     time, began = one.time_s - one.time_s[0], float(one.time_s[0] - recording.time_s[0])
     if len(time) <= 2 * _AROUND:
         return []
-    warm_up = min(WARM_UP_S, length / 2)
+    warm_up, smooth = min(WARM_UP_S, length / 2), _smoothed(one)
     count = max(1, math.ceil((time[-1] - warm_up) / length - 0.5))
     lows = [0, *(_start_near(one, index * length, length / 4) for index in range(1, count)), len(time)]
     usual, most = (skew.nominal, max(0.0, skew.high)) if skew else (0.0, 0.0)
@@ -89,11 +90,16 @@ def _windows(recording: MeasuredGrasp, part: slice, length: float, skew: BasePar
         if counts.sum() > _AROUND:
             window, name = _cut_out(one, slice(low, int(high))), f"{one.name} {began + time[low]:.1f} s"
             start, earlier = _state(one, low, usual), slice(int(np.searchsorted(time, time[low] - REMEMBERED_S)), low)
-            before = time[earlier] - time[low], one.command_m[earlier]
+            before = time[earlier] - time[low], one.command_m[earlier], smooth[earlier]
             found.append(
                 dataclasses.replace(window, name=name, time_s=since, start=start, counts=counts, before=before)
             )
     return found
+
+
+def _smoothed(one: MeasuredGrasp) -> np.ndarray:
+    """Positions with less noise, by a parabola through the samples around each, m or rad, ``(T, motors)``."""
+    return savgol_filter(one.position_m, 2 * _reach(one) + 1, 2, axis=0)
 
 
 def _start_near(one: MeasuredGrasp, middle: float, reach: float) -> int:
@@ -137,10 +143,15 @@ def _state(one: MeasuredGrasp, index: int, skew: float) -> tuple[np.ndarray, np.
     return position, velocity
 
 
+def _reach(one: MeasuredGrasp) -> int:
+    """How many samples on either side tell of the state at one."""
+    step = float(np.median(np.diff(one.time_s)))
+    return min(max(_AROUND, round(_AROUND_S / step)), (len(one.time_s) - 1) // 2)
+
+
 def _parabola(one: MeasuredGrasp, index: int) -> tuple[np.ndarray, np.ndarray]:
     """A parabola through the samples around one, ``(3, motors)``, and the rms that it leaves, ``(motors,)``."""
-    step = float(np.median(np.diff(one.time_s)))
-    around = max(_AROUND, round(_AROUND_S / step))
+    around = _reach(one)
     low, high = max(0, index - around), min(len(one.time_s), index + around + 1)
     powers = np.vander(one.time_s[low:high] - one.time_s[index], 3, increasing=True)
     curves = np.linalg.lstsq(powers, one.position_m[low:high], rcond=None)[0]

@@ -104,8 +104,9 @@ class MeasuredGrasp(ShortRepr):
     #: Of a part of a recording: where the motors stood and how fast they moved at its start, and what of it counts.
     start: tuple[np.ndarray, np.ndarray] | None = field(default=None, compare=False)
     counts: np.ndarray | None = field(default=None, compare=False)  #: ``(T,)``
-    #: Of a part of a recording: what was commanded before it, and when: ``(P,)`` and ``(P, motors)``.
-    before: tuple[np.ndarray, np.ndarray] | None = field(default=None, compare=False)
+    #: Of a part of a recording, the samples before it: when ``(P,)``, what was commanded, and where the motors were,
+    #: ``(P, motors)`` each.
+    before: tuple[np.ndarray, np.ndarray, np.ndarray] | None = field(default=None, compare=False)
     #: How much later than ``time_s`` positions and forces were read; not in any file, but found within a tolerance.
     late_s: tuple[float, float] = field(default=(0.0, 0.0), compare=False)
 

@@ -84,6 +84,11 @@ class AttachedEffects:
                 command[effect.rows] = effect.command(command[effect.rows], fresh[effect.rows, step])
 
     @property
+    def follow_motion(self) -> list[PlantEffect]:
+        """Those whose memory is of the motors' positions alone."""
+        return [effect for effect in self._act if effect.follows_motion]
+
+    @property
     def limit_motors(self) -> bool:
         """Whether any limits what the motors can give from step to step."""
         return bool(self._range)

@@ -220,6 +220,19 @@ class Plant(ModelFields):
             self._read()
             fresh = stale
 
+    def recall_motion(self, positions: np.ndarray) -> None:
+        """Gives effects whose memory is of motion alone that of motion before the start.
+
+        Args:
+          positions: of the motors, step by step, m or rad, ``(n, steps, motors)``.
+        """
+        now, following = self.position, self.effects.follow_motion
+        for step in range(positions.shape[1] if following else 0):
+            self.position = positions[:, step]
+            for effect in following:
+                effect.act()
+        self.position = now
+
     def disturb(self, load: np.ndarray, enabled: np.ndarray) -> None:
         """Says what acts on the motors from outside until the next call.
 

@@ -25,6 +25,7 @@ class PlantEffect(Protocol):
     """Acts on some rows of a plant; :class:`forcegrasp.effects.base.Effect` says what each hook takes and returns."""
 
     after_noise: ClassVar[bool]
+    follows_motion: ClassVar[bool]
     rows: np.ndarray
 
     @property

@@ -172,9 +172,11 @@ class Replay:
             velocity = velocity + base[START_VELOCITY][:, None]
         plant.reset(ids, offset, self.start_m[grasp], velocity)
         if self._earlier is not None:
-            commands, fresh = (values[grasp] for values in self._earlier)
-            at_rest = self.start_m[grasp][:, None] if self.gripper.command == "position" else 0.0
-            plant.effects.recall(np.where(np.isnan(commands), at_rest, commands), fresh)
+            commands, fresh, moved = (values[grasp] for values in self._earlier)
+            at_rest = self.start_m[grasp][:, None]
+            first = at_rest if self.gripper.command == "position" else 0.0
+            plant.effects.recall(np.where(np.isnan(commands), first, commands), fresh)
+            plant.recall_motion(np.where(np.isnan(moved), at_rest, moved))
         position, force = (np.empty((n, self._steps, width)) for width in (plant.motors, plant.channels))
         objects = np.empty((n, self._steps))
         position[:, 0], force[:, 0], objects[:, 0] = plant.position, plant.transduced_force, plant.object_position
@@ -274,22 +276,24 @@ class _Instants:
         return before + share * (values[each, self.before + 1] - before)
 
 
-def _earlier(grasps: Sequence[MeasuredGrasp], dt: float) -> tuple[np.ndarray, np.ndarray]:
-    """What was commanded in the steps before the first sample ``(grasps, steps, motors)``, and which were new ones.
+def _earlier(grasps: Sequence[MeasuredGrasp], dt: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """What was commanded in the steps before the first sample ``(grasps, steps, motors)``, which were new ones, motion.
 
-    NaN before the first command that is known.
+    Commands and positions are NaN before the first ones that are known.
     """
-    before = [(np.empty(0), g.command_m[:0]) if g.before is None else g.before for g in grasps]
-    steps = max(math.ceil(-time[0] / dt) if len(time) else 0 for time, _ in before)
-    commands = np.full((len(grasps), steps, grasps[0].command_m.shape[1]), np.nan)
+    before = [(np.empty(0), g.command_m[:0], g.position_m[:0]) if g.before is None else g.before for g in grasps]
+    steps = max(math.ceil(-time[0] / dt) if len(time) else 0 for time, _, _ in before)
+    commands, moved = np.full((2, len(grasps), steps, grasps[0].command_m.shape[1]), np.nan)
     fresh = np.zeros(commands.shape[:2], bool)
-    for index, (time, command) in enumerate(before):
+    for index, (time, command, position) in enumerate(before):
         if len(time):
+            for motor, values in enumerate(position.T):
+                moved[index, :, motor] = np.interp(np.arange(-steps, 0) * dt, time, values, left=np.nan)
             first = steps + np.rint(time / dt).astype(int)
             fresh[index, first] = True
             latest = np.searchsorted(first, np.arange(steps), side="right") - 1
             commands[index, latest >= 0] = command[latest[latest >= 0]]
-    return commands, fresh
+    return commands, fresh, moved
 
 
 def _fitting_factor(grasps: Sequence[MeasuredGrasp], timestep: float) -> float:

@@ -1,6 +1,8 @@
-"""What was commanded before a window is known: effects whose memory is of commands alone begin with it."""
+"""What happened before a window is known: effects whose memory is of commands or of motion alone begin with it."""
 
 from __future__ import annotations
+
+import dataclasses
 
 import numpy as np
 import pytest
@@ -35,7 +37,25 @@ def test_what_is_recalled_is_what_was_seen(effects):
     assert later.commands(commands[:, 120:], fresh[:, 120:]).tobytes() == whole[:, 120:].tobytes()
 
 
-def window(before: tuple[np.ndarray, np.ndarray] | None) -> MeasuredGrasp:
+FOLLOWING = [(e, v) for e in effects_of(JAW).values() if e.follows_motion for v in e.variants]
+
+
+@pytest.mark.parametrize("effect", FOLLOWING, ids=str)
+def test_motion_that_is_recalled_is_motion_that_was_made(effect):
+    made, recalled = attached(0.02, effect), attached(0.02, effect)
+    path = np.cumsum(np.random.default_rng(0).normal(0, 0.01, (2, 200, 1)), axis=1)
+    for step in range(200):
+        made.position = path[:, step]
+        made.effects.contribute(made._contributed)
+    recalled.recall_motion(path)
+    assert not recalled.position.any()  # it stands where it stood
+    (one,), (other,) = made.effects, recalled.effects
+    assert {name: values.tolist() for name, values in one.state.items()} == {
+        name: values.tolist() for name, values in other.state.items()
+    }
+
+
+def window(before: tuple[np.ndarray, np.ndarray, np.ndarray] | None) -> MeasuredGrasp:
     time, there = np.arange(20) * 0.02, np.zeros((20, 1))
     return MeasuredGrasp(
         "one", "", "one", None, None, None, time, there + 0.5, there, np.empty((20, 0)), None,
@@ -45,11 +65,22 @@ def window(before: tuple[np.ndarray, np.ndarray] | None) -> MeasuredGrasp:
 
 def test_a_command_on_its_way_when_a_window_begins_arrives_in_it():
     times = np.arange(-10, 0) * 0.02
-    earlier = times, np.where(times < -0.05, 0.0, 0.5)[:, None]
+    earlier = times, np.where(times < -0.05, 0.0, 0.5)[:, None], np.zeros((10, 1))
     late = effect_of("command_delay", JAW)
     delay = EffectOn(late, "", np.full((3, 1), 0.1), np.arange(3))
     # the last row's commands before are unknown: it is taken to have rested
-    motion = Replay(JAW, [window(earlier), window((times[:0], np.empty((0, 1)))), window(None)])
+    motion = Replay(JAW, [window(earlier), window((times[:0], np.empty((0, 1)), np.empty((0, 1)))), window(None)])
     moved = motion.simulate(np.arange(3), {}, [delay]).position[:, :, 0] > 1e-4
     first = moved.argmax(axis=1) * motion.dt
     np.testing.assert_allclose(first, [0.06, 0.1, 0.1], atol=0.008)
+
+
+def test_bristles_are_bent_as_they_were_before_a_window():
+    times = np.arange(-10, 0) * 0.02
+    still = np.zeros((10, 1))
+    back = times, still, np.linspace(-0.5, 0.0, 10)[:, None]  # it came from there, and the bristles push it back
+    bristles = EffectOn(effect_of("presliding", JAW), "", np.tile([0.1, 0.02], (2, 1)), np.arange(2))
+    held = [dataclasses.replace(window(before), command_m=np.zeros((20, 1))) for before in (back, None)]
+    moved = Replay(JAW, held).simulate(np.arange(2), {}, [bristles]).position[:, :, 0]
+    assert moved[0].min() < -1e-4
+    assert not moved[1].any()
