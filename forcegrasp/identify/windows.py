@@ -99,7 +99,7 @@ def _windows(recording: MeasuredGrasp, part: slice, length: float, skew: BasePar
 
 def _smoothed(one: MeasuredGrasp) -> np.ndarray:
     """Positions with less noise, by a parabola through the samples around each, m or rad, ``(T, motors)``."""
-    return savgol_filter(one.position_m, 2 * _reach(one) + 1, 2, axis=0)
+    return np.asarray(savgol_filter(one.position_m, 2 * _reach(one) + 1, 2, axis=0))
 
 
 def _start_near(one: MeasuredGrasp, middle: float, reach: float) -> int:
