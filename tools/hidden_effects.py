@@ -2,8 +2,8 @@
 
     python tools/hidden_effects.py run [--only REGEX] [--jobs 2]   diagnoses what has no result yet; may be stopped
     python tools/hidden_effects.py run --renew                     also what other code than the present has measured
-    python tools/hidden_effects.py report                          writes docs/hidden-effects.md from the results
-    python tools/hidden_effects.py check                           fails if that page is of other code than the present
+    python tools/hidden_effects.py report                          writes docs/hidden-effects*.md from the results
+    python tools/hidden_effects.py check                           fails if a page is of other code than the present
 
 The recorder is tests/independent: it shares no code with the effects under test. Sets come in random order, so that a
 part of them is a fair sample of all. A set takes about a minute of one core.
@@ -25,7 +25,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
-PAGE = ROOT / "docs" / "hidden-effects.md"
+PAGES = tuple(ROOT / "docs" / f"{name}.md" for name in ("hidden-effects", "hidden-effects-of-servos"))
 RESULTS = ROOT / "runs" / "hidden_effects.jsonl"
 SIZES = ("small", "medium", "large")
 PAIRS = (
@@ -264,12 +264,13 @@ def load_results() -> list[dict]:
 
 
 def check() -> int:
-    """Exit status: 1 if the page says that it measured other code than the present."""
+    """Exit status: 1 if a page says that it measured other code than the present."""
     from tools.measured_code import PACKAGES, digest, outdated
 
     now = digest()
-    for line in (found := outdated(PAGE.read_text(), now)):
-        print(f"{PAGE.relative_to(ROOT)}: {line}")
+    found = [(page, line) for page in PAGES for line in outdated(page.read_text(), now)]
+    for page, line in found:
+        print(f"{page.relative_to(ROOT)}: {line}")
     if found:
         print(f"Now it is digest {now}: forcegrasp/{', '.join(PACKAGES)} changed since. Measure anew, for hours:")
         print("python tools/hidden_effects.py run --renew, then report; until then: --skip hidden-effects")

@@ -1,4 +1,4 @@
-"""Writes docs/hidden-effects.md and its figures from the results of tools/hidden_effects.py."""
+"""Writes the pages of docs/ on hidden effects, and their figures, from the results of tools/hidden_effects.py."""
 
 from __future__ import annotations
 
@@ -20,19 +20,26 @@ SIZES = ("small", "medium", "large")
 
 
 def write(rows: list[dict], jobs: list, right_names: Callable) -> None:
-    """Writes the page and its figures."""
+    """Writes the page of grippers, with its figures, and that of servos; not one of which there is no result."""
     right = {job.name: right_names(job) for job in jobs}
     rows = [row for row in rows if row["name"] in right]
     for row in rows:
         row["judged"] = judge(row, right[row["name"]])
         row["right"] = sorted(right[row["name"]])
+    servos = [r for r in rows if r["group"].startswith("servo")]
+    grippers = [r for r in rows if r not in servos]
+    planned = sum(job.group.startswith("servo") for job in jobs)
+    for name, found, text, count in (
+        ("hidden-effects", grippers, _page, len(jobs) - planned),
+        ("hidden-effects-of-servos", servos, _servo_page, planned),
+    ):
+        if found:
+            (DOCS / f"{name}.md").write_text(text(found, count))
+            print(f"wrote docs/{name}.md from {len(found)} of {count} sets")
     (DOCS / "figures").mkdir(parents=True, exist_ok=True)
     for draw, groups in ((_matrix, ("one", "other reading", "law", "outside", "none")), (_power, ("one",))):
-        if chosen := [r for r in rows if r["group"] in groups]:
+        if chosen := [r for r in grippers if r["group"] in groups]:
             draw(chosen)
-    servo = sum(job.group.startswith("servo") for job in jobs)
-    (DOCS / "hidden-effects.md").write_text(_page(rows, len(jobs) - servo, servo))
-    print(f"wrote {DOCS / 'hidden-effects.md'} from {len(rows)} of {len(jobs)} sets")
 
 
 def _share(rows: list[dict], *judged: str) -> str:
@@ -64,17 +71,21 @@ def _several_lines(what: str, rows: list[dict]) -> list[str]:
     ]
 
 
-def _servo_lines(rows: list[dict], planned: int) -> list[str]:
-    """The same of logs of a servo, as far as there are results."""
+def _servo_page(rows: list[dict], planned: int) -> str:
+    """The same of logs of a servo."""
     none, one, two = ([r for r in rows if r["group"] == f"servo {kind}"] for kind in ("none", "one", "two"))
-    if not none + one + two:
-        return []
-    return [
-        "## Logs of a servo",
+    lines = [
+        "# How often an effect hidden in a servo's log is found",
         "",
         "A slide without fingers or object (`tests/independent/slide.py`, its own integration and effects): six",
-        "recordings of 8 s, with loads from outside, gains that are drawn, and 50 µm of noise.",
-        f"Results of {len(none + one + two)} sets ({planned} in the whole campaign).",
+        "recordings of 8 s, with loads from outside, gains that are drawn, and 50 µm of noise. `forcegrasp diagnose`",
+        "was given no hints. Of grippers: [how often a hidden effect is found](hidden-effects.md).",
+        "",
+        "    python tools/hidden_effects.py run --only '^servo'   # half a minute a set",
+        "    python tools/hidden_effects.py report                # this page",
+        "",
+        *sentences(rows),
+        f"Results of {len(rows)} sets ({planned} in the whole campaign). Rates have 95 % intervals (Wilson).",
         "",
         "| | result |",
         "|---|---|",
@@ -90,13 +101,35 @@ def _servo_lines(rows: list[dict], planned: int) -> list[str]:
         f"| … error left at most 1.1 × the floor | {_at_floor(two)} |",
         f"| nothing hidden: called explained | {_share(none, 'first')} |",
         f"| nothing hidden: an effect named (false alarm) | {_share(none, 'wrong')} |",
+        f"| further effects named besides those that are hidden | {_besides(one + two)} |",
         "",
+        *_where_it_went_wrong(rows),
     ]  # fmt: skip
+    return "\n".join(lines) + "\n"
 
 
-def _page(rows: list[dict], planned: int, planned_servo: int) -> str:
-    grasped = [r for r in rows if not r["group"].startswith("servo")]
+def _besides(rows: list[dict]) -> str:
+    """In how many sets something is named that is not there."""
+    return _rate([bool(false_names(r, set(r["right"]))) for r in rows])
 
+
+def _where_it_went_wrong(rows: list[dict]) -> list[str]:
+    """A table of the sets of which not all was right first."""
+    lines = [
+        "## Where it went wrong",
+        "",
+        "| set | verdict | named | error before → after | left |",
+        "|---|---|---|---|---|",
+    ]
+    for r in rows:
+        if r["judged"] != "first":
+            named = ", ".join(r.get("effects", [])) or "–"
+            errors = f"{r['error_before']:.2f} → {r['error_after']:.2f}" if "error_after" in r else r.get("error", "")
+            lines.append(f"| {r['name']} | {r['verdict']} | {named} | {errors} | {r.get('left', '')} |")
+    return lines
+
+
+def _page(rows: list[dict], planned: int) -> str:
     def of(group: str, **wanted) -> list[dict]:
         return [r for r in rows if r["group"] == group and all(r[k] == v for k, v in wanted.items())]
 
@@ -105,7 +138,7 @@ def _page(rows: list[dict], planned: int, planned_servo: int) -> str:
     fitted = [r for r in rows if r["group"] in ("one", "none") and r["judged"] == "first"]
     inside, counted = _coverage(fitted)
     ratios = [r["error_after"] / r["floor"] for r in one if r["judged"] == "first"]
-    seconds = [r["processor_s"] for r in grasped if "processor_s" in r]
+    seconds = [r["processor_s"] for r in rows if "processor_s" in r]
     steps = [steps_of(r) for r in one if r["judged"] == "first"]
     more = sum(len(found) > 1 for found in steps)
     lines = [
@@ -120,8 +153,8 @@ def _page(rows: list[dict], planned: int, planned_servo: int) -> str:
         "    python tools/hidden_effects.py report   # this page",
         "",
         *sentences(rows),
-        f"Results of {len(grasped)} sets ({planned} in the whole campaign).",
-        "Rates have 95 % intervals (Wilson).",
+        f"Results of {len(rows)} sets ({planned} in the whole campaign). Rates have 95 % intervals (Wilson).",
+        "Of servos: [a page of their own](hidden-effects-of-servos.md).",
         "",
         "| | result |",
         "|---|---|",
@@ -167,17 +200,8 @@ def _page(rows: list[dict], planned: int, planned_servo: int) -> str:
         "How often each effect is found, by size. Sizes are those of `tests/independent/catalogue.py`; a small one",
         "moves some signal by about 3 σ somewhere.",
         "",
-        *_servo_lines(rows, planned_servo),
-        "## Where it went wrong",
-        "",
-        "| set | verdict | named | error before → after | left |",
-        "|---|---|---|---|---|",
+        *_where_it_went_wrong(rows),
     ]
-    for r in rows:
-        if r["judged"] != "first":
-            named = ", ".join(r.get("effects", [])) or "–"
-            errors = f"{r['error_before']:.2f} → {r['error_after']:.2f}" if "error_after" in r else r.get("error", "")
-            lines.append(f"| {r['name']} | {r['verdict']} | {named} | {errors} | {r.get('left', '')} |")
     return "\n".join(line for line in lines if line is not None) + "\n"
 
 

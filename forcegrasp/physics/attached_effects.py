@@ -25,6 +25,8 @@ class AttachedEffects:
             [effect for effect in effects if hook in effect.hooks()]
             for hook in ("command", "motor_range", "act", "interaction")
         )
+        self._of_commands = [effect for effect in self._command if effect.is_known_beforehand]
+        self._of_motion = [effect for effect in self._act if effect.follows_motion]
         self.readings = ReadingEffects(effects)
         #: Whether any acts on what happens in a step, and not only on the model or by what is commanded.
         self.act_in_steps = any(
@@ -75,18 +77,21 @@ class AttachedEffects:
         steps = range(commands.shape[1])
         return np.stack([self.command(commands[:, step], fresh[:, step]) for step in steps], axis=1)
 
-    def recall(self, commands: np.ndarray, fresh: np.ndarray) -> None:
-        """Gives those whose memory is of commands alone what was commanded before the start, as :meth:`commands`."""
-        known = [effect for effect in self._command if effect.is_known_beforehand]
-        for step in range(commands.shape[1] if known else 0):
-            command = commands[:, step].copy()
-            for effect in known:
-                command[effect.rows] = effect.command(command[effect.rows], fresh[effect.rows, step])
-
     @property
-    def follow_motion(self) -> list[PlantEffect]:
-        """Those whose memory is of the motors' positions alone."""
-        return [effect for effect in self._act if effect.follows_motion]
+    def remember(self) -> bool:
+        """Whether any has a memory of commands alone, or of motion alone."""
+        return bool(self._of_commands or self._of_motion)
+
+    def recall(self, command: np.ndarray, fresh: np.ndarray) -> None:
+        """Lets those of a memory of commands alone, or of motion, see a step before the start, as :meth:`command`.
+
+        The plant's motors are where they were.
+        """
+        command = np.array(command, float)
+        for effect in self._of_commands:
+            command[effect.rows] = effect.command(command[effect.rows], fresh[effect.rows])
+        for effect in self._of_motion:
+            effect.act()
 
     @property
     def limit_motors(self) -> bool:

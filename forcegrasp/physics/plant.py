@@ -220,17 +220,16 @@ class Plant(ModelFields):
             self._read()
             fresh = stale
 
-    def recall_motion(self, positions: np.ndarray) -> None:
-        """Gives effects whose memory is of motion alone that of motion before the start.
+    def recall(self, command: np.ndarray, fresh: np.ndarray, position: np.ndarray) -> None:
+        """Lets effects see a physics step before the start, so that they remember it; the motors stay where they are.
 
         Args:
-          positions: of the motors, step by step, m or rad, ``(n, steps, motors)``.
+          command: commanded positions or efforts, ``(n, motors)``.
+          fresh: whether it was a new one, ``(n,)``.
+          position: of the motors, m or rad, ``(n, motors)``.
         """
-        now, following = self.position, self.effects.follow_motion
-        for step in range(positions.shape[1] if following else 0):
-            self.position = positions[:, step]
-            for effect in following:
-                effect.act()
+        now, self.position = self.position, position
+        self.effects.recall(command, fresh)
         self.position = now
 
     def disturb(self, load: np.ndarray, enabled: np.ndarray) -> None:

@@ -121,7 +121,9 @@ class Replay:
         starts_at = [g.start or (start_position(g, gripper.stroke), np.zeros(len(gripper.motors))) for g in self.grasps]
         #: where the motors stand at the first sample, m or rad, and how fast they move, ``(grasps, motors)``
         self.start_m, self._start_velocity = (np.stack([pair[i] for pair in starts_at]) for i in (0, 1))
-        self._earlier = _earlier(self.grasps, self.dt) if any(g.before is not None for g in self.grasps) else None
+        known = any(g.before is not None for g in self.grasps)
+        at_rest = self.start_m if gripper.command == "position" else np.zeros_like(self.start_m)
+        self._earlier = _earlier(self.grasps, self.dt, at_rest, self.start_m) if known else None
         self._disturbed = any(g.load is not None or g.enabled is not None for g in self.grasps)
         if self._disturbed:
             ones = [np.ones(len(g.time_s)) for g in self.grasps]
@@ -171,12 +173,9 @@ class Replay:
         if velocity is not None and START_VELOCITY in base:
             velocity = velocity + base[START_VELOCITY][:, None]
         plant.reset(ids, offset, self.start_m[grasp], velocity)
-        if self._earlier is not None:
-            commands, fresh, moved = (values[grasp] for values in self._earlier)
-            at_rest = self.start_m[grasp][:, None]
-            first = at_rest if self.gripper.command == "position" else 0.0
-            plant.effects.recall(np.where(np.isnan(commands), first, commands), fresh)
-            plant.recall_motion(np.where(np.isnan(moved), at_rest, moved))
+        if self._earlier is not None and plant.effects.remember:
+            for step in range(self._earlier[0].shape[1]):
+                plant.recall(*(values[grasp, step] for values in self._earlier))
         position, force = (np.empty((n, self._steps, width)) for width in (plant.motors, plant.channels))
         objects = np.empty((n, self._steps))
         position[:, 0], force[:, 0], objects[:, 0] = plant.position, plant.transduced_force, plant.object_position
@@ -276,19 +275,29 @@ class _Instants:
         return before + share * (values[each, self.before + 1] - before)
 
 
-def _earlier(grasps: Sequence[MeasuredGrasp], dt: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """What was commanded in the steps before the first sample ``(grasps, steps, motors)``, which were new ones, motion.
+def _earlier(
+    grasps: Sequence[MeasuredGrasp], dt: float, at_rest: np.ndarray, start: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """What was commanded in the steps before the first sample, which were new commands, and where the motors were.
 
-    Commands and positions are NaN before the first ones that are known.
+    Args:
+      grasps: all, or none of them with samples before.
+      dt: physics step, seconds.
+      at_rest: what was commanded before the first command that is known, ``(grasps, motors)``.
+      start: where the motors stood before the first position that is known, ``(grasps, motors)``.
+
+    Returns:
+      ``(grasps, steps, motors)``, ``(grasps, steps)`` and ``(grasps, steps, motors)``.
     """
     before = [(np.empty(0), g.command_m[:0], g.position_m[:0]) if g.before is None else g.before for g in grasps]
     steps = max(math.ceil(-time[0] / dt) if len(time) else 0 for time, _, _ in before)
-    commands, moved = np.full((2, len(grasps), steps, grasps[0].command_m.shape[1]), np.nan)
+    commands, moved = (np.repeat(values[:, None], steps, axis=1) for values in (at_rest, start))
     fresh = np.zeros(commands.shape[:2], bool)
     for index, (time, command, position) in enumerate(before):
         if len(time):
             for motor, values in enumerate(position.T):
-                moved[index, :, motor] = np.interp(np.arange(-steps, 0) * dt, time, values, left=np.nan)
+                known = np.arange(-steps, 0) * dt >= time[0]
+                moved[index, known, motor] = np.interp(np.arange(-steps, 0)[known] * dt, time, values)
             first = steps + np.rint(time / dt).astype(int)
             fresh[index, first] = True
             latest = np.searchsorted(first, np.arange(steps), side="right") - 1

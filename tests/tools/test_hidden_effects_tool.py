@@ -32,12 +32,13 @@ CODE = {"commit": "0123456789abcdef+", "digest": "aaaabbbbcccc"}
 
 @pytest.fixture
 def page(tmp_path, monkeypatch):
-    """``page(rows, jobs)``: the page as it is written."""
+    """``page(rows, jobs, of)``: the page of "grippers" or "servos" as it is written; empty if it is not."""
     monkeypatch.setattr(hidden_effects_report, "DOCS", tmp_path)
 
-    def written(rows: list[dict], jobs: list[Job]) -> str:
+    def written(rows: list[dict], jobs: list[Job], of: str = "servos") -> str:
         hidden_effects_report.write(rows, jobs, lambda job: set(job.hidden))
-        return (tmp_path / "hidden-effects.md").read_text()
+        file = tmp_path / ("hidden-effects-of-servos.md" if of == "servos" else "hidden-effects.md")
+        return file.read_text() if file.exists() else ""
 
     return written
 
@@ -50,7 +51,7 @@ def test_servos_have_rates_of_their_own(page):
         row(TWO[0], "effect", ("command_delay", "stiction")), row(TWO[1], "effect", ("stiction",), 1.5),
     ]  # fmt: skip
     text = page(rows, [*NONE, *ONE, *TWO])
-    servos = text.partition("## Logs of a servo")[2].partition("\n## ")[0]
+    assert not page(rows, [*NONE, *ONE, *TWO], "grippers")
     for line in (
         '| one effect hidden: right one first, or in a right "one of" set | 2 of 4 (50%; 15–85 %) |',
         "| … strictly first | 1 of 4 (25%; 5–70 %) |",
@@ -63,17 +64,18 @@ def test_servos_have_rates_of_their_own(page):
         "| … error left at most 1.1 × the floor | 1 of 2 (50%; 9–91 %) |",
         "| nothing hidden: called explained | 3 of 4 (75%; 30–95 %) |",
         "| nothing hidden: an effect named (false alarm) | 1 of 4 (25%; 5–70 %) |",
+        "| further effects named besides those that are hidden | 2 of 6 (33%; 10–70 %) |",
     ):
-        assert line in servos
-    assert "Results of 10 sets (10 in the whole campaign)." in servos
-    assert "Results of 0 sets (0 in the whole campaign)." in text
+        assert line in text
+    assert "Results of 10 sets (10 in the whole campaign)." in text
     assert text.count("| servo_stiction_medium_s2 | effect | backlash |") == 1
 
 
-def test_a_page_without_servos_says_nothing_of_them(page):
+def test_without_a_result_of_servos_their_page_stays_as_it_is(page):
     job = Job("one", ("backlash",), "medium", 1)
-    text = page([row(job, "effect", ("backlash",))], [job, *NONE])
-    assert "Logs of a servo" not in text
+    rows, jobs = [row(job, "effect", ("backlash",))], [job, *NONE]
+    assert not page(rows, jobs)
+    text = page(rows, jobs, "grippers")
     assert "Results of 1 sets (1 in the whole campaign)." in text
     assert "| … strictly first | 1 of 1 (100%; 21–100 %) |" in text
 
@@ -113,7 +115,7 @@ def test_the_digest_is_of_each_line_of_the_packages_and_of_no_others(tmp_path):
 
 def test_the_check_fails_where_the_page_is_of_other_code(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(hidden_effects, "ROOT", tmp_path)
-    monkeypatch.setattr(hidden_effects, "PAGE", tmp_path / "page.md")
+    monkeypatch.setattr(hidden_effects, "PAGES", (tmp_path / "page.md",))
     monkeypatch.setattr(sys, "argv", ["hidden_effects.py", "check"])
     (tmp_path / "page.md").write_text(measured_code.sentences([measured_code.stamp()])[0])
     assert hidden_effects.main() == 0
