@@ -298,7 +298,7 @@ def _earlier(
             for motor, values in enumerate(position.T):
                 known = np.arange(-steps, 0) * dt >= time[0]
                 moved[index, known, motor] = np.interp(np.arange(-steps, 0)[known] * dt, time, values)
-            first = steps + np.rint(time / dt).astype(int)
+            first = np.minimum(steps + np.rint(time / dt).astype(int), steps - 1)
             fresh[index, first] = True
             latest = np.searchsorted(first, np.arange(steps), side="right") - 1
             commands[index, latest >= 0] = command[latest[latest >= 0]]

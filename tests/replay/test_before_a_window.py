@@ -87,3 +87,14 @@ def test_bristles_are_bent_as_they_were_before_a_window():
     moved = Replay(JAW, held).simulate(np.arange(2), {}, [bristles]).position[:, :, 0]
     assert moved[0].min() < -1e-4
     assert not moved[1].any()
+
+
+def test_samples_may_be_nearer_to_each_other_than_steps():
+    jaw = Replay(JAW, [window(None)])
+    times = np.arange(-40, 0) * jaw.dt / 4
+    earlier = times, np.full((40, 1), 0.5), np.zeros((40, 1))
+    delay = EffectOn(effect_of("command_delay", JAW), "", np.full((1, 1), 4 * jaw.dt), np.arange(1))
+    at_once = EffectOn(effect_of("command_delay", JAW), "", np.zeros((1, 1)), np.arange(1))
+    recalled = Replay(JAW, [window(earlier)])
+    late, plain = (recalled.simulate(np.arange(1), {}, [one]).position for one in (delay, at_once))
+    assert late.tobytes() == plain.tobytes()  # all that was on its way had been commanded before
