@@ -75,7 +75,7 @@ def indistinguishable(winner: Candidate, other: Candidate) -> bool:
     parallel = abs(float(winner.signature @ other.signature)) > _PARALLEL
     alike = parallel and other.heldout_gain > _ALIKE * winner.heldout_gain
     simpler = len(other.effect.parameters) < len(winner.effect.parameters)
-    nearly = simpler and other.heldout_gain > _NEARLY * winner.heldout_gain
+    nearly = simpler and nearly_as_much(other.heldout_gain, winner.heldout_gain)
     # it may be there besides, and not instead
     if other.share < min(LEAST_SHARE, _HALF * winner.share) or not other.is_resolved:
         return False
@@ -117,8 +117,13 @@ def add_nothing(candidates: Sequence[Candidate]) -> set[str]:
         for c in candidates
         for nested in c.effect.contains
         if (simple := found.get(nested.effect)) is not None
-        and (not _leads(c, simple) or simple.heldout_gain > _NEARLY * c.heldout_gain)
+        and (not _leads(c, simple) or nearly_as_much(simple.heldout_gain, c.heldout_gain))
     }
+
+
+def nearly_as_much(gain: float, other: float) -> bool:
+    """Whether an effect gains so nearly what a richer one gains that what that has besides is not worth naming."""
+    return gain > _NEARLY * other
 
 
 def _leads(winner: Candidate, other: Candidate, least: float = 0.0) -> bool:

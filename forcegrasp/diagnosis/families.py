@@ -41,13 +41,23 @@ def falls_back(fit: Fit, nested: Nested) -> bool:
     last = len(fit.problem.effects) - 1
     effect = fit.problem.effects[last].effect
     first = fit.problem.first_entry(last)
-    errors = np.sqrt(np.diag(fit.covariance())) * max(1.0, float(np.sqrt(np.mean((fit.weight * fit.residual) ** 2))))
+    errors = np.sqrt(np.diag(fit.covariance())) * np.sqrt(_scale(fit))
     for name, value in nested.at.items():
         index = first + effect.index(name)
         entry = fit.problem.entries[index]
         if abs(fit.vector[index] - entry.coordinate(value)) > max(_STANDARD_ERRORS * errors[index], 1e-3):
             return False
     return True
+
+
+def fits_as_well(simple: Fit, fit: Fit) -> bool:
+    """Whether a fit with the simpler effect leaves no more than falling back to it may cost."""
+    return simple.cost <= (1 + _WORSE) * fit.cost + _STANDARD_ERRORS**2 * _scale(fit)
+
+
+def _scale(fit: Fit) -> float:
+    """By what the model's own errors make squared standard errors larger than noise alone does."""
+    return max(1.0, float(np.mean((fit.weight * fit.residual) ** 2)))
 
 
 def simpler(setting: EffectSetting, nested: Nested, gripper: Gripper) -> EffectSetting:

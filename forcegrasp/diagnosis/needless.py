@@ -5,8 +5,10 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 
-from forcegrasp.diagnosis.evidence import LEAST_RISE, is_beyond_chance
-from forcegrasp.diagnosis.families import falls_back, refit_as, refit_without, roughly_without, simpler, stalled
+import numpy as np
+
+from forcegrasp.diagnosis.evidence import LEAST_RISE, is_beyond_chance, nearly_as_much
+from forcegrasp.diagnosis.families import falls_back, fits_as_well, refit_as, refit_without, roughly_without, simpler
 from forcegrasp.diagnosis.result import Step
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.identify.fit import Fit
@@ -50,10 +52,58 @@ def _as_simple_as_it_is(study: Study, fit: Fit) -> Fit:
     for nested in last.effect.contains:
         if falls_back(fit, nested):
             simple = refit_as(simpler(last, nested, fit.problem.gripper), fit, last.effect.name, study)
-            if not stalled(simple, fit):
+            if fits_as_well(simple, fit):
                 study.progress(f"{last.effect.name} is no more than {nested.effect} now")
                 return simple
     return fit
+
+
+def simplify(study: Study, steps: Sequence[Step], fit: Fit, given: int) -> tuple[list[Step], Fit]:
+    """The steps with simpler effects in place of those that contain them, where these no longer gain more; and the fit.
+
+    What only a richer effect has may have stood for another one that was found after it.
+
+    Args:
+      study: the measurements.
+      steps: that found the effects.
+      fit: with all effects.
+      given: as for :func:`drop_needless`.
+    """
+    left = list(steps)
+    for step in [step for step in steps if step.effects and step.candidates][:-1]:
+        settings = {one.effect.name: one for one in fit.problem.case(fit.vector).effects[given:]}
+        known = settings.get(step.effects[0])
+        if known is None:
+            continue
+        for nested in known.effect.contains:
+            study.progress(f"fitting with {nested.effect} in place of {known.effect.name}")
+            less = refit_as(simpler(known, nested, fit.problem.gripper), fit, known.effect.name, study)
+            without = study.heldout(refit_without(known.effect.name, fit, study))
+            gain, of_richer = (float(np.nansum(study.gains(without, study.heldout(one)))) for one in (less, fit))
+            if nearly_as_much(gain, of_richer):
+                study.progress(f"{nested.effect} is enough")
+                left[left.index(step)], fit = _with_simpler(step, nested.effect, less), less
+                break
+    return (left if left == list(steps) else _chained(left, study.error(study.heldout(fit)))), fit
+
+
+def _chained(steps: Sequence[Step], error: float) -> list[Step]:
+    """The steps, each of which begins with the error that the one before it leaves; the last effect leaves this one."""
+    found = max(i for i, step in enumerate(steps) if step.effects)
+    after = [step.error_after if i < found else error for i, step in enumerate(steps)]
+    before = [steps[0].error_before, *after]
+    return [
+        dataclasses.replace(s, error_before=b, error_after=a) for s, b, a in zip(steps, before, after, strict=False)
+    ]
+
+
+def _with_simpler(step: Step, name: str, fit: Fit) -> Step:
+    """A step that found this effect, which is the last of a fit, in place of one that contains it."""
+    tried = next((c for c in step.candidates if c.effect.name == name), step.candidates[0])
+    first = dataclasses.replace(tried, setting=fit.problem.case(fit.vector).effects[-1])
+    others = [c for c in step.candidates if c is not tried]
+    names = (name, *(n for n in step.effects[1:] if n != name))
+    return dataclasses.replace(step, effects=names, candidates=(first, *others), error_after=tried.error_after)
 
 
 def drop_all_needless(study: Study, steps: Sequence[Step], fit: Fit, given: int) -> tuple[list[Step], Fit]:

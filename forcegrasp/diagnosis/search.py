@@ -11,7 +11,7 @@ from forcegrasp.diagnosis import families
 from forcegrasp.diagnosis.evidence import LEAST_SHARE_TOGETHER, with_close_rivals
 from forcegrasp.diagnosis.exchange import exchange
 from forcegrasp.diagnosis.few import with_few
-from forcegrasp.diagnosis.needless import drop_needless
+from forcegrasp.diagnosis.needless import drop_needless, simplify
 from forcegrasp.diagnosis.noise_check import Noise, unexpected_noise
 from forcegrasp.diagnosis.odd_grasps import odd_grasps
 from forcegrasp.diagnosis.result import Diagnosis, Step, kept_steps, settle_ties
@@ -97,6 +97,7 @@ def diagnose(
         steps.append(step)
         if not _left(study, fit)[0]:
             break
+    steps, fit = simplify(study, steps, fit, len(base.fit.problem.effects))
     if believed is not None and not _convincing(believed[2], believed[1], study, fit):
         steps, fit, study = believed
         target = study.target

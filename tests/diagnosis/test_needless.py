@@ -8,7 +8,7 @@ import functools
 import numpy as np
 import pytest
 
-from forcegrasp.diagnosis.needless import drop_all_needless, drop_needless
+from forcegrasp.diagnosis.needless import drop_all_needless, drop_needless, simplify
 from forcegrasp.diagnosis.result import Candidate, Step, kept_steps
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.effects.for_gripper import effect_of
@@ -86,3 +86,18 @@ def test_a_step_takes_the_place_of_one_effect_at_most(found):
     (last,) = step.candidates
     step = dataclasses.replace(step, candidates=(dataclasses.replace(last, replaces="stiction"),))
     assert drop_needless(study, step, fit, 0) == (step, fit)
+
+
+def test_what_only_a_richer_effect_has_goes_where_another_found_later_makes_up_for_it(found):
+    study, step, fit = found("stiction", "motor_offset")
+    first = dataclasses.replace(found("stiction")[1], error_before=9.0)
+    nothing = dataclasses.replace(step, effects=(), error_before=step.error_after)
+    steps, less = simplify(study, [first, step, nothing], fit, 0)
+    assert [one.effects for one in steps] == [("coulomb_friction",), ("motor_offset",), ()]
+    assert {one.effect.name for one in less.problem.effects} == {"coulomb_friction", "motor_offset"}
+    assert steps[0].candidates[0].setting.values == pytest.approx([0.08], rel=0.1)
+    error = study.error(study.heldout(less))
+    assert [one.error_before for one in steps] == [9.0, steps[0].error_after, error]
+    assert [one.error_after for one in steps[1:]] == [error, error]
+    assert simplify(study, [first, step], fit, 1) == ([first, step], fit)  # it was given
+    assert simplify(study, [first], found("stiction")[2], 0)[0] == [first]  # nothing was found after it
