@@ -82,6 +82,11 @@ class AttachedEffects:
         """Whether any has a memory of commands alone, or of motion alone."""
         return bool(self._of_commands or self._of_motion)
 
+    def forget(self) -> None:
+        """Starts the memory of those that :meth:`recall` anew, where the plant's motors are said to be."""
+        for effect in {*self._of_commands, *self._of_motion}:
+            effect.reset(np.arange(len(effect.rows)))
+
     def recall(self, command: np.ndarray, fresh: np.ndarray) -> None:
         """Lets those of a memory of commands alone, or of motion, see a step before the start, as :meth:`command`.
 

@@ -220,16 +220,21 @@ class Plant(ModelFields):
             self._read()
             fresh = stale
 
-    def recall(self, command: np.ndarray, fresh: np.ndarray, position: np.ndarray) -> None:
-        """Lets effects see a physics step before the start, so that they remember it; the motors stay where they are.
+    def recall(self, commands: np.ndarray, fresh: np.ndarray, positions: np.ndarray, rows: np.ndarray) -> None:
+        """Lets effects see what was before the start, so that they remember it; the motors stay where they are.
 
         Args:
-          command: commanded positions or efforts, ``(n, motors)``.
-          fresh: whether it was a new one, ``(n,)``.
-          position: of the motors, m or rad, ``(n, motors)``.
+          commands: commanded positions or efforts in each physics step until the start, ``(m, steps, motors)``.
+          fresh: which of them were new ones, ``(m, steps)``.
+          positions: of the motors, m or rad, ``(m, steps, motors)``.
+          rows: which of these each row had before, ``(n,)``.
         """
-        now, self.position = self.position, position
-        self.effects.recall(command, fresh)
+        now = self.position
+        for step in range(commands.shape[1] if self.effects.remember else 0):
+            self.position = positions[rows, step]
+            if step == 0:
+                self.effects.forget()
+            self.effects.recall(commands[rows, step], fresh[rows, step])
         self.position = now
 
     def disturb(self, load: np.ndarray, enabled: np.ndarray) -> None:

@@ -173,9 +173,8 @@ class Replay:
         if velocity is not None and START_VELOCITY in base:
             velocity = velocity + base[START_VELOCITY][:, None]
         plant.reset(ids, offset, self.start_m[grasp], velocity)
-        if self._earlier is not None and plant.effects.remember:
-            for step in range(self._earlier[0].shape[1]):
-                plant.recall(*(values[grasp, step] for values in self._earlier))
+        if self._earlier is not None:
+            plant.recall(*self._earlier, grasp)
         position, force = (np.empty((n, self._steps, width)) for width in (plant.motors, plant.channels))
         objects = np.empty((n, self._steps))
         position[:, 0], force[:, 0], objects[:, 0] = plant.position, plant.transduced_force, plant.object_position

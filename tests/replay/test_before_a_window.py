@@ -33,8 +33,7 @@ def test_what_is_recalled_is_what_was_seen(effects):
     fresh = np.tile(np.arange(200) % 9 == 0, (2, 1))
     whole = attached(dt, *effects).effects.commands(commands, fresh)
     later = attached(dt, *effects)
-    for step in range(120):
-        later.recall(commands[:, step], fresh[:, step], later.position)
+    later.recall(commands[:, :120], fresh[:, :120], np.zeros((2, 120, 1)), ROWS)
     assert later.effects.commands(commands[:, 120:], fresh[:, 120:]).tobytes() == whole[:, 120:].tobytes()
 
 
@@ -47,10 +46,12 @@ FOLLOWING = [
 def test_motion_that_is_recalled_is_motion_that_was_made(effect):
     made, recalled = attached(0.02, effect), attached(0.02, effect)
     path = np.cumsum(np.random.default_rng(0).normal(0, 0.01, (2, 200, 1)), axis=1)
+    made.position = path[:, 0]
+    made.effects.reset(ROWS)
     for step in range(200):
         made.position = path[:, step]
         made.effects.contribute(made._contributed)
-        recalled.recall(path[:, step], np.ones(2, bool), path[:, step])
+    recalled.recall(path, np.ones((2, 200), bool), path, ROWS)
     assert not recalled.position.any()  # it stands where it stood
     (one,), (other,) = made.effects, recalled.effects
     assert {name: values.tolist() for name, values in one.state.items()} == {
