@@ -42,16 +42,17 @@ FOLLOWING = [
 ]
 
 
+@pytest.mark.parametrize("steps", [2, 200])  # a short one still remembers where it began
 @pytest.mark.parametrize("effect", FOLLOWING, ids=str)
-def test_motion_that_is_recalled_is_motion_that_was_made(effect):
+def test_motion_that_is_recalled_is_motion_that_was_made(effect, steps):
     made, recalled = attached(0.02, effect), attached(0.02, effect)
-    path = np.cumsum(np.random.default_rng(0).normal(0, 0.01, (2, 200, 1)), axis=1)
+    path = 0.3 + np.cumsum(np.random.default_rng(0).normal(0, 0.01, (2, steps, 1)), axis=1)
     made.position = path[:, 0]
     made.effects.reset(ROWS)
-    for step in range(200):
+    for step in range(steps):
         made.position = path[:, step]
         made.effects.contribute(made._contributed)
-    recalled.recall(path, np.ones((2, 200), bool), path, ROWS)
+    recalled.recall(path, np.ones((2, steps), bool), path, ROWS)
     assert not recalled.position.any()  # it stands where it stood
     (one,), (other,) = made.effects, recalled.effects
     assert {name: values.tolist() for name, values in one.state.items()} == {
