@@ -131,11 +131,33 @@ def test_each_policy_and_sweep_is_trained_and_evaluated_with_five_seeds(every):
     for name in [policy.name for policy in POLICIES] + list(SWEEPS):
         command = every[f"train-{name}"].commands[0]
         assert "seed=1,2,3,4,5" in command
-        assert every[f"evaluate-{name}"].needs == (f"train-{name}",)
+        assert every[f"evaluate-{name}"].needs[-1] == f"train-{name}"
     assert every["train-ib"].trained == 5 * 4_500_000
-    assert [every[f"train-{sweep}"].trained // 22_500_000 for sweep in ("ablation", "parts", "printed")] == [4, 5, 3]
+    assert [every[f"train-{sweep}"].trained // 22_500_000 for sweep in ("ablation", "parts", "printed")] == [1, 4, 3]
     assert all(need in every for stage in every.values() for need in stage.needs)
     assert all(name in every for block in blocks.BLOCKS for name in block.stages)
+
+
+def test_what_a_policy_has_trained_stands_in_a_table_of_sweeps_without_a_training_of_its_own(every):
+    softness, curves = every["evaluate-ablation"].commands
+    assert every["evaluate-ablation"].needs == ("train-ib", "train-no_ib", "train-no_rand", "train-ablation")
+    folders = [f"runs/results/{name}" for name in every["evaluate-ablation"].needs]
+    assert f"policies=[{','.join(f'{folder}/*' for folder in folders)},force_pi]" in softness
+    assert list(curves[2:-1]) == folders
+    assert every["evaluate-ablation"].evaluated == 21 * 11 * 50 * 150
+
+
+@pytest.mark.parametrize("policy", ["ib", "no_ib", "no_rand"])
+def test_policies_beside_a_sweep_are_trained_as_its_own_runs_are(policy):
+    from forcegrasp.cli.options import compose
+
+    asked = next(one for one in POLICIES if one.name == policy).options.split()
+    shared = [word for word in SWEEPS["ablation"].options.split() if not word.startswith("experiment=")]
+    sweep = compose("train", [f"experiment={policy}", *shared])
+    if policy == "ib":
+        assert repr(compose("train", asked)) == repr(sweep)
+    else:  # without the inductive bias nothing reads its φ
+        assert repr(compose("train", [*asked, "action.bias_one_contact=0"])) == repr(sweep)
 
 
 def test_trainings_and_evaluations_are_commands_that_there_are(every):
@@ -170,7 +192,7 @@ def test_only_takes_what_is_needed_along_and_skip_leaves_out(every):
         return [stage.name for stage in program.choose(every, only, skip)]
 
     assert names(["ship-ib"], []) == ["train-ib", "evaluate-ib", "ship-ib"]
-    assert names(["parts"], ["train-parts"]) == ["evaluate-parts"]
+    assert names(["printed"], ["train-printed"]) == ["evaluate-printed"]
     assert set(every) - set(names([], ["grippers", "pages"])) == {"grippers"}
     with pytest.raises(ValueError, match="nothing is called ib, no_such; there are"):
         program.choose(every, ["ib"], ["no_such"])
@@ -226,9 +248,10 @@ def results(tmp_path):
     for policy in POLICIES:
         for k in (1, 2, 3, 4, 5):
             put_run(f"train-{policy.name}", f"r_s{k}_{k - 1}", "ib_tuned", k)
-    for sweep, names in (("ablation", ["ib", "no_ib"]), ("parts", ["ib"]), ("printed", ["ib", "no_ib", "no_rand"])):
+    for sweep, names in (("ablation", ["no_curriculum"]), ("parts", ["no_noise"]), ("printed", ["ib", "no_ib"])):
         runs = {f"{name}_s{k}_{k}": 100 + k for name in names for k in (1, 2)}
-        put(sweep, "softness", evaluation(**runs, force_pi=90))
+        beside = {"r_s1_0": 103, "r_s2_1": 104} if SWEEPS[sweep].beside else {}
+        put(sweep, "softness", evaluation(**beside, **runs, force_pi=90))
         (out / f"evaluate-{sweep}" / "curves").mkdir()
         curves = {"groups": {name: {"runs": [{"frames": 4_500_480}]} for name in names}}
         (out / f"evaluate-{sweep}" / "curves" / "curves.json").write_text(json.dumps(curves))
@@ -280,11 +303,12 @@ def test_tables_are_replaced_and_nothing_else_of_a_page(results, repository, eve
     assert f"{stamp}: `python -m tools.results --only paper`, 5 seeds." in page
     assert "![Object movement by softness](figures/paper_displacement.png)" in page
     ablations = after["docs/ablations.md"]
-    assert "| `no_ib` | 101.5 ± 6.4 | 101.5 ± 6.4 | 101.500 ± 6.353 | 101.5 ± 6.4 | 101.0 102.0 |" in ablations
+    assert "| `no_curriculum` | 101.5 ± 6.4 | 101.5 ± 6.4 | 101.500 ± 6.353 | 101.5 ± 6.4 | 101.0 102.0 |" in ablations
+    assert "| `ib_tuned` | 103.5 ± 6.4 | 103.5 ± 6.4 | 103.500 ± 6.353 | 103.5 ± 6.4 | 103.0 104.0 |" in ablations
     assert "| hand-written (`force_pi`) | 90.0 | 90.0 | 90.000 | |" in ablations
-    assert (
-        f"`forcegrasp train -m {SWEEPS['ablation']}`, 2 seeds, 4,500,480 frames; evaluated on the same 2" in ablations
-    )
+    trained = f"`forcegrasp train -m {SWEEPS['ablation'].options}`, 2 seeds each, 4,500,480 frames; evaluated on"
+    assert "`forcegrasp train -m experiment=ib_tuned`, `forcegrasp train -m experiment=no_ib" in ablations
+    assert trained in ablations
     robot = "| `ib` | 102.0 ± 2.0 | 102.0 ± 2.0 | 102.0 ± 2.0 | 102.00 ± 1.96 | 109 ± 13; 1.7 ± 0.9 mm |"
     assert robot in after["docs/transfer.md"]
     assert "| `ib_virtual_robot_measured` | 102 ± 9 | 101 ± 8 | 102 ± 8 |" in after["docs/transfer.md"]

@@ -45,7 +45,7 @@ BLOCKS = (
     Block(_RESULTS, "users-pictures", ("pictures",)),
     Block(_RESULTS, "traces-picture", ("pictures",)),
     Block(_RESULTS, "printed", ("evaluate-printed",), tables.printed),
-    Block(_ABLATIONS, "curves-picture", ("pictures",)),
+    Block(_ABLATIONS, "curves-picture", ("curves-picture",)),
     Block(_ABLATIONS, "ablation", ("evaluate-ablation",), tables.ablation),
     Block(_ABLATIONS, "parts", ("evaluate-parts",), tables.parts),
     Block(_TRANSFER, "transfer", _evaluated(*_ON_ROBOT), tables.transfer),

@@ -1,6 +1,6 @@
 """Copies pictures of the results to where pages show them.
 
-python -m tools.results.pictures RESULTS INTO              box plots, traces and learning curves
+python -m tools.results.pictures RESULTS INTO STAGE        those that a stage has drawn
 python -m tools.results.pictures RESULTS INTO VIDEO NAME   the last picture of a video
 """
 
@@ -26,12 +26,13 @@ PICTURES = {
 }
 
 
-def main(out: Path, into: Path) -> None:
-    """Copies all of them."""
+def main(out: Path, into: Path, stage: str) -> None:
+    """Copies those of a stage."""
     figures = into / "docs" / "figures"
     figures.mkdir(parents=True, exist_ok=True)
     for source, name in PICTURES.items():
-        shutil.copy(out / source, figures / name)
+        if source.startswith(f"{stage}/"):
+            shutil.copy(out / source, figures / name)
 
 
 def last_picture(video: Path, picture: Path) -> None:
@@ -43,8 +44,8 @@ def last_picture(video: Path, picture: Path) -> None:
 
 
 if __name__ == "__main__":
-    results, target, *of_video = (ROOT / word for word in sys.argv[1:])
-    if of_video:
-        last_picture(of_video[0], target / "docs" / "figures" / of_video[1].name)
+    results, target, source, *named = sys.argv[1:]
+    if named:
+        last_picture(ROOT / source, ROOT / target / "docs" / "figures" / named[0])
     else:
-        main(results, target)
+        main(ROOT / results, ROOT / target, source)

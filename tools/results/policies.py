@@ -1,4 +1,4 @@
-"""The policies that come with the package: a line each, from which training, evaluation, card and columns follow."""
+"""The policies that come with the package, and sweeps: a line each, from which training and tables follow."""
 
 from __future__ import annotations
 
@@ -70,11 +70,26 @@ POLICIES = (
         judged_by=MEASURED,
     ),
 )
-#: Sweeps that pages have tables of → options of ``forcegrasp train -m``, but for the seeds.
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """Experiments that a page has a table of.
+
+    Args:
+      options: of ``forcegrasp train -m``, but for the seeds.
+      beside: policies that stand in its table, too; their own seeds do.
+    """
+
+    options: str
+    beside: tuple[str, ...] = ()
+
+
+_AS_SHIPPED = "reward=goal_normalised action.bias_one_contact=0"
 SWEEPS = {
-    "ablation": "sweep=ablation reward=goal_normalised action.bias_one_contact=0",
-    "parts": "sweep=parts reward=goal_normalised action.bias_one_contact=0",
-    "printed": "experiment=ib,no_ib,no_rand ppo.discount=0.99",
+    "ablation": Sweep(f"experiment=no_curriculum {_AS_SHIPPED}", ("ib", "no_ib", "no_rand")),
+    "parts": Sweep(f"experiment=no_noise,no_stacking,no_had_contact,no_last_action {_AS_SHIPPED}", ("ib",)),
+    "printed": Sweep("experiment=ib,no_ib,no_rand ppo.discount=0.99"),
 }
 #: Controllers that stand beside them.
 CONTROLLERS = ("force_pi", "informed")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -25,11 +26,12 @@ def seeds_of(report: dict[str, Any]) -> dict[str, Figures]:
     return {name: figures for name, figures in report["policies"].items() if name not in CONTROLLERS}
 
 
-def by_experiment(report: dict[str, Any], runs: Path) -> dict[str, list[Figures]]:
-    """The seeds of each experiment of a sweep, whose runs lie in that folder."""
+def by_experiment(report: dict[str, Any], folders: Iterable[Path]) -> dict[str, list[Figures]]:
+    """The seeds of each experiment, whose runs lie in one of those folders."""
     groups: dict[str, list[Figures]] = {}
     for name, figures in seeds_of(report).items():
-        groups.setdefault(experiment(runs / name), []).append(figures)
+        run = next(folder / name for folder in folders if (folder / name).is_dir())
+        groups.setdefault(experiment(run), []).append(figures)
     return groups
 
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from functools import cache
 
 from forcegrasp.config import AlgorithmConfig
-from tools.results.policies import CONTROLLERS, POLICIES, SWEEPS, Policy
+from tools.results.policies import CONTROLLERS, POLICIES, SWEEPS, Policy, Sweep
 from tools.results.settings import Settings
 from tools.results.stage import Stage
 
@@ -23,7 +23,7 @@ def stages(settings: Settings) -> dict[str, Stage]:
     every = [
         _virtual_robot(settings),
         *(stage for policy in POLICIES for stage in _of_policy(policy, settings)),
-        *(stage for sweep, options in SWEEPS.items() for stage in _of_sweep(sweep, options, settings)),
+        *(stage for name, sweep in SWEEPS.items() for stage in _of_sweep(name, sweep, settings)),
         _controllers(settings),
         *_pictures(settings),
         *_other_programs(settings),
@@ -126,20 +126,22 @@ def _into(settings: Settings) -> str:
     return settings.shown("pages") if settings.trial else "."
 
 
-def _of_sweep(sweep: str, options: str, settings: Settings) -> Iterator[Stage]:
-    train, evaluate = f"train-{sweep}", f"evaluate-{sweep}"
-    command, trained, frames = _train(train, options, settings)
-    yield Stage(train, f"{settings.seeds} seeds of {options}", (command,), trained=frames)
-    runs = f"policies=[{settings.shown(train)}/*,force_pi]"
+def _of_sweep(name: str, sweep: Sweep, settings: Settings) -> Iterator[Stage]:
+    train, evaluate = f"train-{name}", f"evaluate-{name}"
+    command, trained, frames = _train(train, sweep.options, settings)
+    yield Stage(train, f"{settings.seeds} seeds of {sweep.options}", (command,), trained=frames)
+    trainings = (*(f"train-{policy}" for policy in sweep.beside), train)
+    runs = [settings.shown(training) for training in trainings]
+    listed = ",".join([f"{folder}/*" for folder in runs])
     yield Stage(
         evaluate,
-        f"how well those of {sweep} do, and their learning curves",
+        f"how well those of {name} do, and their learning curves",
         (
-            _evaluate(evaluate, settings, "softness", runs, f"trials={FEW}"),
-            ("forcegrasp", "curves", settings.shown(train), f"out={settings.shown(evaluate, 'curves')}"),
+            _evaluate(evaluate, settings, "softness", f"policies=[{listed},force_pi]", f"trials={FEW}"),
+            ("forcegrasp", "curves", *runs, f"out={settings.shown(evaluate, 'curves')}"),
         ),
-        needs=(train,),
-        evaluated=_episodes(trained + 1, SOFTNESS, FEW, settings),
+        needs=trainings,
+        evaluated=_episodes(trained + settings.seeds * len(sweep.beside) + 1, SOFTNESS, FEW, settings),
     )
 
 
@@ -166,20 +168,22 @@ def _shipped(settings: Settings, *names: str) -> str:
 
 
 def _pictures(settings: Settings) -> Iterator[Stage]:
-    """Those of the policies that were shipped."""
-    draw = ("python", "-m", "tools.results.pictures", settings.shown(), _into(settings))
+    """Those of the policies that were shipped, and of the ablations."""
+    copy = ("python", "-m", "tools.results.pictures", settings.shown(), _into(settings))
     paper, users = ("ib", "no_ib", "no_rand", "force_pi"), ("recommended", "ib", "force_pi", "informed")
     yield Stage(
         "pictures",
-        "box plots, force traces and learning curves of the pages",
+        "box plots and force traces of the pages",
         (
             _evaluate("pictures", settings, "paper", _shipped(settings, *paper), f"trials={TRIALS}"),
             _evaluate("pictures", settings, "users", _shipped(settings, *users), f"trials={TRIALS}"),
-            draw,
+            (*copy, "pictures"),
         ),
-        needs=("ship-recommended", "ship-ib", "ship-no_ib", "ship-no_rand", "evaluate-ablation"),
+        needs=("ship-recommended", "ship-ib", "ship-no_ib", "ship-no_rand"),
         evaluated=_episodes(len(paper) + len(users), SOFTNESS, TRIALS, settings),
     )
+    ablation = "evaluate-ablation"
+    yield Stage("curves-picture", "learning curves of the ablations", ((*copy, ablation),), needs=(ablation,))
     who = _shipped(settings, "ib_virtual_robot", "ib", "force_pi")
     grasp = ("kappa=0.4", "radius_m=0.0158", "offset_m=-0.0037", "goal_force_n=0.76")
     video = settings.shown("render-transfer", "grasp.gif")
@@ -188,7 +192,7 @@ def _pictures(settings: Settings) -> Iterator[Stage]:
         "one grasp on the virtual robot; needs OpenGL",
         (
             ("forcegrasp", "render", who, "model=virtual_robot", *grasp, f"out={video}"),
-            (*draw, video, "transfer_grasp.png"),
+            (*copy, video, "transfer_grasp.png"),
         ),
         needs=("ship-ib_virtual_robot", "ship-ib"),
         code="diagnosis",

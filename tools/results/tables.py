@@ -11,7 +11,7 @@ import numpy as np
 from forcegrasp.evaluate.curve_groups import interval
 from forcegrasp.evaluate.statistics import QUANTILES
 from forcegrasp.evaluate.tables import SHARES
-from tools.results.policies import CONTROLLERS, MEASURED, REWARD, SWEEPS
+from tools.results.policies import CONTROLLERS, MEASURED, POLICIES, REWARD, SWEEPS
 from tools.results.seeds import Figures, by_experiment, read_evaluation, seeds_of
 
 #: Of a table's columns or rows: its name → the figures of each of its seeds; a controller has one.
@@ -150,7 +150,8 @@ def users_softness(out: Path) -> str:
 
 
 def _sweep(out: Path, sweep: str) -> Columns:
-    return by_experiment(read_evaluation(out / f"evaluate-{sweep}" / "softness"), out / f"train-{sweep}")
+    folders = [out / f"train-{name}" for name in (*SWEEPS[sweep].beside, sweep)]
+    return by_experiment(read_evaluation(out / f"evaluate-{sweep}" / "softness"), folders)
 
 
 def ablation(out: Path, sweep: str = "ablation", figures: tuple[str, ...] = (*_OF_SWEEPS, "fast_steps")) -> str:
@@ -163,7 +164,9 @@ def ablation(out: Path, sweep: str = "ablation", figures: tuple[str, ...] = (*_O
     ]
     rows.append(["hand-written (`force_pi`)", *_figures([report["policies"]["force_pi"]], figures), ""])
     seeds = len(next(iter(found.values())))
-    trained = f"`forcegrasp train -m {SWEEPS[sweep]}`, {seeds} seeds, {_frames(out, sweep):,} frames"
+    commands = [policy.options for policy in POLICIES if policy.name in SWEEPS[sweep].beside] + [SWEEPS[sweep].options]
+    trained = ", ".join(f"`forcegrasp train -m {options}`" for options in commands)
+    trained += f", {seeds} seeds each, {_frames(out, sweep):,} frames"
     grasps = f"evaluated on the same {len(report['cells'])} × {report['trials']} grasps of the reference tier"
     header = ["experiment", *(_ROWS[name][0] for name in figures), "each seed's force reward"]
     return f"{trained}; {grasps}. {_SEEDS}:\n\n" + table(header, rows)
