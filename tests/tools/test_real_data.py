@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tools.marked_part import marks
-from tools.real_data import bam_models, dfki_regression, emps_loop, emps_regression
+from tools.real_data import bam_models, dfki_open_loop, dfki_regression, emps_loop, emps_regression
 from tools.real_data.page import WRITER, write_page
 from tools.real_data.study import Error, Parameter, Study, checksums
 from tools.real_data.verbs import Verbs
@@ -62,6 +62,20 @@ def test_the_regression_of_the_pendulum_finds_what_was_put_in():
     truth = {"J": 0.06, "mc": 0.1, "Fv": 0.05, "Fc": 0.18, "offset": -0.08}
     torque = 0.06 * np.gradient(v, time) + 0.1 * 9.81 * np.sin(q) + 0.05 * v + 0.18 * np.arctan(5 * v) - 0.08
     assert dfki_regression.regress(time, q, v, torque, sharpness=5.0) == pytest.approx(truth, rel=0.03)
+
+
+def test_friction_is_found_in_windows_that_a_torque_moves():
+    period, h = 1 / 300, 1 / 3000
+    time = np.arange(0, 4, period)
+    torque, q, v, path = np.sin(7 * time) + 0.5 * np.sin(17 * time), 0.2, 0.0, []
+    for now in torque:
+        path.append(q)
+        for _ in range(10):
+            v += h * (now - 9.81 * 0.3 * np.sin(q) - 0.05 * v - 0.1 * np.arctan(100 * v) + 0.07) / 0.15
+            q += h * v
+    found = dfki_open_loop.fit(time, np.array(path), torque, 0.15, 0.3)
+    assert found.values == pytest.approx((0.05, 0.1, -0.07), abs=0.005)
+    assert found.left_rad < 1e-3
 
 
 def _logs() -> bam_models.Logs:

@@ -5,8 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from scipy.signal import medfilt
 
 from forcegrasp.models.model_file import read_model
+from tools.real_data.dfki_open_loop import fit
 from tools.real_data.dfki_regression import PUBLISHED, regress
 from tools.real_data.judge import add_base, best_model, windows
 from tools.real_data.study import Error, Study, checksums
@@ -47,4 +49,20 @@ def study(data: Path, out: Path) -> Study:
         described = f"{WEIGHED[name]:.4f}" if name in WEIGHED else "–"
         rows.append([name, f"{published:.4f}", f"{again[name]:.4f}", described])
     result.tables["The authors' regression of the measured torque, done again"] = rows
+    time, position, _, torque = columns
+    result.tables["What the measured torque says of friction when it moves the pendulum"] = _moved_by(
+        time, position, torque
+    )
     return result
+
+
+def _moved_by(time: np.ndarray, position: np.ndarray, torque: np.ndarray) -> list[list[str]]:
+    """Friction and offset with the torque as it is, with its spikes cut, and without any; ± two standard errors."""
+    torques = {"as measured": torque, "median of five": medfilt(torque, 5), "none at all": 0 * torque}
+    rows = [["weight and rod", "torque", "Fv", "Fc", "offset", "left [mrad]"]]
+    for which, weight in {"as described": WEIGHED, "as published": PUBLISHED}.items():
+        for name, acting in torques.items():
+            found = fit(time, position, acting, weight["J"], weight["mc"])
+            told = [f"{value:.3f} ± {2 * error:.3f}" for value, error in zip(found.values, found.errors, strict=True)]
+            rows.append([which, name, *told, f"{1e3 * found.left_rad:.1f}"])
+    return rows
