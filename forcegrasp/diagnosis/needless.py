@@ -73,18 +73,23 @@ def simplify(study: Study, steps: Sequence[Step], fit: Fit, given: int) -> tuple
     for step in [step for step in steps if step.effects and step.candidates][:-1]:
         settings = {one.effect.name: one for one in fit.problem.case(fit.vector).effects[given:]}
         known = settings.get(step.effects[0])
-        if known is None:
+        if known is None or not known.effect.contains:
             continue
+        without = study.heldout(refit_without(known.effect.name, fit, study))
+        of_richer = _gain(study, without, fit)
         for nested in known.effect.contains:
             study.progress(f"fitting with {nested.effect} in place of {known.effect.name}")
             less = refit_as(simpler(known, nested, fit.problem.gripper), fit, known.effect.name, study)
-            without = study.heldout(refit_without(known.effect.name, fit, study))
-            gain, of_richer = (float(np.nansum(study.gains(without, study.heldout(one)))) for one in (less, fit))
-            if nearly_as_much(gain, of_richer):
+            if nearly_as_much(_gain(study, without, less), of_richer):
                 study.progress(f"{nested.effect} is enough")
                 left[left.index(step)], fit = _with_simpler(step, nested.effect, less), less
                 break
     return (left if left == list(steps) else _chained(left, study.error(study.heldout(fit)))), fit
+
+
+def _gain(study: Study, without: np.ndarray, fit: Fit) -> float:
+    """By how much a fit is better on what is held out than one without an effect, whose residuals those are."""
+    return float(np.nansum(study.gains(without, study.heldout(fit))))
 
 
 def _chained(steps: Sequence[Step], error: float) -> list[Step]:
