@@ -136,6 +136,7 @@ class PPO(Algorithm):
     def learn(self, batch: TensorDictBase) -> dict[str, float]:
         """The passes over a batch that is prepared, minibatch by minibatch; returns what :meth:`update` does."""
         frames, size = self.samples(batch)
+        nets = [list(net.parameters()) for net in (self.policy, self.value)]
         sums: dict[str, Tensor] = {}
         updates = 0
         for _ in range(self.config.epochs):
@@ -144,8 +145,8 @@ class PPO(Algorithm):
                 objective, told = self._losses(frames[ids])
                 self.optimizer.zero_grad(set_to_none=True)
                 objective.backward()
-                for net in (self.policy, self.value):
-                    nn.utils.clip_grad_norm_(net.parameters(), self.config.max_grad_norm)
+                for parameters in nets:
+                    nn.utils.clip_grad_norm_(parameters, self.config.max_grad_norm)
                 self.optimizer.step()
                 updates += 1
                 sums = {name: sums.get(name, 0) + value.detach() for name, value in told.items()}
