@@ -9,8 +9,8 @@ from forcegrasp.errors import writing
 from forcegrasp.policies import shipped_policies
 
 NOTES = f"""
-  'policies=[A,B]' run directories of forcegrasp train; policies that come with the package:
-                   {", ".join(shipped_policies()) or "none"};
+  'policies=[A,B]' run directories of forcegrasp train (FOLDER/*: all in a folder); policies that come with the
+                   package: {", ".join(shipped_policies()) or "none"};
                    or controllers: force_pi (Lach et al. 2022), informed (a fixed rule), close, nothing
   plan=paper       the paper's simulation experiment; objects: its six objects in the training simulator;
                    virtual_robot: the same on a gripper with effects that the training simulator does not have;

@@ -36,7 +36,7 @@ def load_policies(names: list[str], asked: str = "") -> list[EvaluatedPolicy]:
     All of them move one gripper: the one that is asked for; else that of the first trained policy; else the paper's.
 
     Args:
-      names: of controllers or shipped policies, or run directories.
+      names: of controllers or shipped policies, or run directories; ``FOLDER/*`` are all runs in a folder.
       asked: name or description of the gripper.
 
     Raises:
@@ -44,6 +44,7 @@ def load_policies(names: list[str], asked: str = "") -> list[EvaluatedPolicy]:
     """
     if not all(names):
         raise ConfigError(f"policies={names}: a name is empty")
+    names = [run for name in names for run in _runs(name)]
     paths = {name: Path(name).resolve() for name in names}
     trained = {name: _trained(name, path) for name, path in paths.items() if name not in CONTROLLERS}
     gripper = load_gripper(asked or next((config.gripper for _, config in trained.values()), DEFAULT_GRIPPER))
@@ -68,6 +69,17 @@ def load_policies(names: list[str], asked: str = "") -> list[EvaluatedPolicy]:
     if len(paths) < len(names):
         raise ConfigError(f"policies={names}: one is named twice")
     return list(loaded.values())
+
+
+def _runs(name: str) -> list[str]:
+    """The name; of ``FOLDER/*`` those of all runs in the folder."""
+    if not name.endswith("/*"):
+        return [name]
+    folder = Path(name.removesuffix("/*"))
+    runs = sorted(str(config.parent) for config in folder.glob("*/config.yaml"))
+    if not runs:
+        raise ConfigError(f"policies: {name}: there is no run in {folder}; a run is what forcegrasp train wrote")
+    return runs
 
 
 def _trained(name: str, path: Path) -> tuple[TensorDictModuleBase, TrainConfig]:

@@ -228,6 +228,18 @@ def test_runs_of_one_name_in_two_folders_are_compared(tmp_path):
     assert len(set(names)) == 2
 
 
+def test_all_runs_of_a_sweep(tmp_path):
+    for run in ("sweep/ib_s2_1", "sweep/ib_s1_0", "other/ib_s3"):
+        untrained_run(tmp_path / run)
+    (tmp_path / "sweep" / "curves").mkdir()
+    names = [c.name for c in load_policies([f"{tmp_path}/sweep/*", "force_pi"])]
+    assert names == ["ib_s1_0", "ib_s2_1", "force_pi"]
+    with pytest.raises(ConfigError, match="named twice"):
+        load_policies([f"{tmp_path}/sweep/*", f"{tmp_path}/sweep/ib_s1_0"])
+    with pytest.raises(ConfigError, match="there is no run in"):
+        load_policies([f"{tmp_path}/sweep/curves/*"])
+
+
 def test_the_baseline_is_what_the_others_are_held_against(compared, tmp_path, undrawn):
     report, _, printed = compared
     better = report["policies"]["close"]["force_reward_normalised"]["improvement"]

@@ -108,17 +108,6 @@ def test_a_stage_waits_for_what_it_needs(ran, tmp_path):
     assert (status, said, ran) == (1, ["second: waits for first"], [])
 
 
-def test_names_of_runs_are_found_when_the_command_runs(tmp_path):
-    from tools.results.stage import ready_to_run
-
-    for run in ("ib_s2_1", "ib_s1_0"):
-        (tmp_path / "train" / run).mkdir(parents=True)
-        (tmp_path / "train" / run / "config.yaml").touch()
-    (tmp_path / "train" / "curves").mkdir()
-    words = ready_to_run(("forcegrasp", "evaluate", f"policies=[{tmp_path}/train/*,force_pi]"))
-    assert words[-1] == f"policies=[{tmp_path}/train/ib_s1_0,{tmp_path}/train/ib_s2_1,force_pi]"
-
-
 # The list, and what is told before anything begins
 
 

@@ -7,8 +7,6 @@ import sysconfig
 from dataclasses import dataclass
 from pathlib import Path
 
-from tools.measured_code import ROOT
-
 
 @dataclass(frozen=True)
 class Stage:
@@ -16,8 +14,7 @@ class Stage:
 
     Args:
       makes: what comes out, in a few words.
-      commands: run in the repository, in turn. ``FOLDER/*`` in one stands for the runs of that folder. Those of a
-        training go on with what there is when they are run again.
+      commands: run in the repository, in turn. Those of a training go on with what there is when they are run again.
       needs: stages that must be done before.
       code: the kind of figures, a key of ``CODE``.
       trained: control steps of its trainings.
@@ -37,26 +34,8 @@ class Stage:
     writes_docs: bool = False
 
 
-def runs_in(folder: Path) -> list[Path]:
-    """Runs of a sweep, those of a seed after one another."""
-    return sorted(path.parent for path in folder.glob("*/config.yaml"))
-
-
 def ready_to_run(command: tuple[str, ...]) -> list[str]:
-    """The command with the present Python and its programs, and with names of runs in place of ``FOLDER/*``."""
+    """The command with the present Python and its programs."""
     program, *words = command
     found = sys.executable if program == "python" else str(Path(sysconfig.get_path("scripts")) / program)
-    return [found, *(_with_runs(word) for word in words)]
-
-
-def _with_runs(word: str) -> str:
-    if "/*" not in word:
-        return word
-    key, _, listed = word.partition("=[")
-    named = (
-        ",".join(str(run.relative_to(ROOT) if run.is_relative_to(ROOT) else run) for run in runs_in(ROOT / name[:-2]))
-        if name.endswith("/*")
-        else name
-        for name in listed.removesuffix("]").split(",")
-    )
-    return f"{key}=[{','.join(named)}]"
+    return [found, *words]
