@@ -11,8 +11,8 @@ unexport PYTHONDONTWRITEBYTECODE
 .PHONY: train test check docs setup clean
 
 train: setup
-	$(VENV)/bin/forcegrasp train experiment=recommended budget=quick hydra.run.dir=$(RUN)
-	$(VENV)/bin/forcegrasp evaluate 'policies=[$(RUN),force_pi,informed]' out=$(RUN)/evaluation
+	$(VENV)/bin/forcegrasp train experiment=quick hydra.run.dir=$(RUN)
+	$(VENV)/bin/forcegrasp evaluate 'policies=[$(RUN),force_pi]' out=$(RUN)/evaluation
 
 test: setup
 	$(VENV)/bin/python -m pytest -q -n auto --dist loadfile --no-loadscope-reorder

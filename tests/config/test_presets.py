@@ -170,6 +170,14 @@ def test_recommended_differs_from_ib_in_what_its_file_says():
     }
 
 
+def test_quick_differs_from_recommended_in_how_often_it_learns_from_a_frame():
+    assert changed(train("experiment=recommended"), train("experiment=quick")) == {
+        "ppo.total_frames": 480_000,
+        "ppo.epochs": 4,
+        "ppo.learning_rate": 0.001,
+    }
+
+
 def test_recurrent_differs_from_recommended_in_the_memory_and_what_it_wants():
     assert changed(train("experiment=recommended"), train("experiment=recurrent")) == {
         "observation.frames": 1,
