@@ -12,7 +12,7 @@ unexport PYTHONDONTWRITEBYTECODE
 
 train: setup
 	$(VENV)/bin/forcegrasp train experiment=quick hydra.run.dir=$(RUN)
-	$(VENV)/bin/forcegrasp evaluate 'policies=[$(RUN),force_pi]' out=$(RUN)/evaluation
+	$(VENV)/bin/forcegrasp evaluate 'policies=[$(RUN),force_pi]' trials=30 out=$(RUN)/evaluation
 
 test: setup
 	$(VENV)/bin/python -m pytest -q -n auto --dist loadfile --no-loadscope-reorder

@@ -210,6 +210,23 @@ def evaluation(**means: float) -> dict:
     return {**told, "policies": policies}
 
 
+def on_robots(**means: float) -> dict:
+    """As that of plan=robots: the test half stands in the table, against the baseline, by the forces that act."""
+
+    def figures(mean: float) -> dict:
+        halves = {"development": mean - 50, "test": mean}
+        of = {half: {"mean": m, "low": m - 3, "high": m + 5, "lowest": m - 40} for half, m in halves.items()}
+        return dict.fromkeys((*tables._ROWS, MEASURED), of)
+
+    one = {"one": "catalogue", "other": "force_pi", "metric": REWARD, "half": "test"}
+    one |= {"mean": 10.04, "low": 8.0, "high": 12.0, "worst": -15.2, "worst_robot": 3, "beyond_margin": 1}
+    others = [one | {key: value, "mean": 99} for key, value in
+              (("half", "development"), ("metric", MEASURED), ("other", "informed"))]  # fmt: skip
+    halves = {"development": [0, 2], "test": [1, 3]}
+    policies = {name: figures(mean) for name, mean in means.items()}
+    return {"baseline": "force_pi", "halves": halves, "differences": [one, *others], "policies": policies}
+
+
 @pytest.fixture
 def results(tmp_path):
     """A folder of results: every stage ended, each policy with the rewards 100, 101 … of its seeds."""
@@ -234,6 +251,8 @@ def results(tmp_path):
         put("controllers", where, evaluation(force_pi=90, informed=120))
         for policy in POLICIES:
             put(policy.name, where, evaluation(**{f"r_s{k}_{k - 1}": 99 + k for k in (1, 2, 3, 4, 5)}, force_pi=90))
+    (out / "robots" / "evaluation").mkdir(parents=True)
+    (out / "robots" / "evaluation" / "evaluation.json").write_text(json.dumps(on_robots(catalogue=82.04, force_pi=72)))
     for policy in POLICIES:
         for k in (1, 2, 3, 4, 5):
             put_run(f"train-{policy.name}", f"r_s{k}_{k - 1}", "ib_tuned", k)
@@ -301,6 +320,13 @@ def test_tables_are_replaced_and_nothing_else_of_a_page(results, repository, eve
     robot = "| `ib` | 102.0 ± 2.0 | 102.0 ± 2.0 | 102.0 ± 2.0 | 102.00 ± 1.96 | 109 ± 13; 1.7 ± 0.9 mm |"
     assert robot in after["docs/transfer.md"]
     assert "| `ib_virtual_robot_measured` | 102 ± 9 | 101 ± 8 | 102 ± 8 |" in after["docs/transfer.md"]
+    robots = after["docs/robots.md"]
+    catalogue = (
+        "| `catalogue` | 82.0 ± 4.0 | 82.0 ± 4.0 | 82.04 | 82.0 | 82.0 | 42 | +10.0 ± 2.0 | -15 (robot 3) | 1 of 2 |"
+    )
+    assert catalogue in robots
+    assert "| `force_pi` | 72.0 ± 4.0 |" in robots
+    assert "`python -m tools.results --only robots`, the policies of the package." in robots
     again = texts(repository)
     pages.write_pages(Settings(out=results), Notes(results), every, said.append)
     assert texts(repository) == again
@@ -338,8 +364,10 @@ def test_what_a_trial_ships_is_not_what_comes_with_the_package(every):
     assert any(word.startswith("policies=[runs/results/pages/forcegrasp/policies/ib,") for word in trial)
 
 
-def test_check_has_a_line_for_each_table_and_card_of_other_code(results, repository, every):
-    found = pages.check(repository)
+def test_check_has_a_line_for_each_table_and_card_of_other_code(results, repository, every, monkeypatch):
+    with monkeypatch.context() as later:
+        later.setattr(pages, "digests", lambda: {"training": "of tomorrow"})
+        found = pages.check(repository)
     assert len(found) == len(blocks.BLOCKS) + len(POLICIES)
     assert not [line for line in found if "its marks are not on the page" in line]
     pages.write_pages(Settings(out=results), Notes(results), every, lambda text: None)

@@ -21,12 +21,14 @@ class Block:
       name: in the mark; it may stand on several pages.
       stages: whose results it shows.
       text: makes it from the folder of results; None for pictures, whose lines stay.
+      of_package: it shows the policies of the package, not all seeds.
     """
 
     page: str
     name: str
     stages: tuple[str, ...]
     text: Callable[[Path], str] | None = None
+    of_package: bool = False
 
 
 def _evaluated(*names: str) -> tuple[str, ...]:
@@ -38,19 +40,20 @@ _ON_ROBOT = tuple(policy.name for policy in POLICIES if policy.name != "recommen
 BLOCKS = (
     Block(_RESULTS, "paper", _evaluated("ib", "no_ib", "no_rand"), tables.paper),
     Block(_RESULTS, "paper-softness", _evaluated("ib", "no_ib", "no_rand"), tables.paper_softness),
-    Block(_RESULTS, "paper-pictures", ("pictures",)),
-    Block(_RESULTS, "force-reward-picture", ("pictures",)),
+    Block(_RESULTS, "paper-pictures", ("pictures",), of_package=True),
+    Block(_RESULTS, "force-reward-picture", ("pictures",), of_package=True),
     Block(_RESULTS, "users", _evaluated("recommended", "ib"), tables.users),
     Block(_RESULTS, "users-softness", _evaluated("recommended", "ib"), tables.users_softness),
-    Block(_RESULTS, "users-pictures", ("pictures",)),
-    Block(_RESULTS, "traces-picture", ("pictures",)),
+    Block(_RESULTS, "users-pictures", ("pictures",), of_package=True),
+    Block(_RESULTS, "traces-picture", ("pictures",), of_package=True),
     Block(_RESULTS, "printed", ("evaluate-printed",), tables.printed),
     Block(_ABLATIONS, "curves-picture", ("curves-picture",)),
     Block(_ABLATIONS, "ablation", ("evaluate-ablation",), tables.ablation),
     Block(_ABLATIONS, "parts", ("evaluate-parts",), tables.parts),
     Block(_TRANSFER, "transfer", _evaluated(*_ON_ROBOT), tables.transfer),
     Block(_TRANSFER, "transfer-objects", _evaluated(*_ON_ROBOT), tables.transfer_objects),
-    Block(_TRANSFER, "transfer-picture", ("render-transfer",)),
-    Block("docs/quickstart.md", "paper-pictures", ("pictures",)),
-    Block("README.md", "force-reward-picture", ("pictures",)),
+    Block(_TRANSFER, "transfer-picture", ("render-transfer",), of_package=True),
+    Block("docs/robots.md", "robots", ("robots",), tables.robots, of_package=True),
+    Block("docs/quickstart.md", "paper-pictures", ("pictures",), of_package=True),
+    Block("README.md", "force-reward-picture", ("pictures",), of_package=True),
 )

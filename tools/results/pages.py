@@ -29,8 +29,8 @@ def write_pages(settings: Settings, notes: Notes, chosen: Collection[str], say: 
 
 def _with(block: Block, page: str, settings: Settings, made: list[Note]) -> str:
     """The page with this block written anew."""
-    trial = TRIAL if settings.trial else ""
-    said = "\n\n".join(stamps(made, block.name, f", {settings.seeds} seeds{trial}"))
+    who = "the policies of the package" if block.of_package else f"{settings.seeds} seeds"
+    said = "\n\n".join(stamps(made, block.name, f", {who}{TRIAL if settings.trial else ''}"))
 
     def written(found: re.Match[str]) -> str:
         text = block.text(settings.out) if block.text else without_sentences(found[2])

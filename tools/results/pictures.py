@@ -23,6 +23,7 @@ PICTURES = {
     "pictures/users/traces_recommended.png": "traces_recommended.png",
     "pictures/users/traces_ib.png": "traces.png",
     "evaluate-ablation/curves/curves.png": "ablation_curves.png",
+    "robots/evaluation/robots.png": "robots.png",
 }
 
 

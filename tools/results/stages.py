@@ -18,6 +18,10 @@ DEVELOPMENT = 2000
 _NO_PICTURES = ("log.video_every=0", "log.figures_every=0")
 
 
+#: Those of the policies in the package that pages compare.
+_OF_PACKAGE = ("ship-recommended", "ship-ib", "ship-no_ib", "ship-no_rand")
+
+
 def stages(settings: Settings) -> dict[str, Stage]:
     """Stages by name."""
     every = [
@@ -179,8 +183,21 @@ def _pictures(settings: Settings) -> Iterator[Stage]:
             _evaluate("pictures", settings, "users", _shipped(settings, *users), f"trials={TRIALS}"),
             (*copy, "pictures"),
         ),
-        needs=("ship-recommended", "ship-ib", "ship-no_ib", "ship-no_rand"),
+        needs=_OF_PACKAGE,
         evaluated=_episodes(len(paper) + len(users), SOFTNESS, TRIALS, settings),
+    )
+    on_robots = _shipped(
+        settings, "catalogue", *(name for name in paper if name != "force_pi"), "recommended", *CONTROLLERS
+    )
+    yield Stage(
+        "robots",
+        "policies on a hundred robots that nobody measured",
+        (
+            _evaluate("robots", settings, "evaluation", "plan=robots", "physics=fast", on_robots),
+            (*copy, "robots"),
+        ),
+        needs=_OF_PACKAGE,
+        hours=0.1,
     )
     ablation = "evaluate-ablation"
     yield Stage("curves-picture", "learning curves of the ablations", ((*copy, ablation),), needs=(ablation,))

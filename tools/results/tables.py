@@ -216,6 +216,43 @@ def transfer(out: Path) -> str:
     return f"Normalised force reward of 150. {_SEEDS}:\n\n" + table(header, rows)
 
 
+def robots(out: Path) -> str:
+    """The test half of the robots that nobody measured, and each policy against the baseline."""
+    report = read_evaluation(out / "robots" / "evaluation")
+    baseline, count = report["baseline"], len(report["halves"]["test"])
+    less = {
+        one["one"]: one
+        for one in report["differences"]
+        if (one["other"], one["metric"], one["half"]) == (baseline, REWARD, "test")
+    }
+
+    def against(name: str) -> list[str]:
+        if (one := less.get(name)) is None:
+            return [""] * 3
+        worst = f"{one['worst']:.0f} (robot {one['worst_robot']})"
+        return [f"{one['mean']:+.1f} ± {_half(one):.1f}", worst, f"{one['beyond_margin']} of {count}"]
+
+    def row(name: str) -> list[str]:
+        of = {figure: values["test"] for figure, values in report["policies"][name].items()}
+        means = (f"{of[figure]['mean']:.{digits}f}" for figure, digits in zip(moved_and_shares, (2, 1, 1), strict=True))
+        rewards = (f"{of[one]['mean']:.1f} ± {_half(of[one]):.1f}" for one in (REWARD, MEASURED))
+        return [f"`{name}`", *rewards, *means, f"{of[REWARD]['lowest']:.0f}", *against(name)]
+
+    moved_and_shares = ("displacement_total_mm", *SHARES)
+    header = [
+        *("", "force reward", "measured forces", "moved [mm]", "crushed [%]", "lost [%]", "worst robot"),
+        *(f"less `{baseline}`", "at worst", "> 3 points worse on"),
+    ]
+    told = f"Test half, {count} robots; ± is half of the 95 % interval over robots. The last three columns hold each"
+    rows = map(row, report["policies"])
+    return f"{told} policy against `{baseline}`, robot by robot:\n\n" + table(header, rows)
+
+
+def _half(of: dict[str, float]) -> float:
+    """Of an interval."""
+    return (of["high"] - of["low"]) / 2
+
+
 def transfer_objects(out: Path) -> str:
     """By object on the virtual robot, as in the paper's Table 1."""
     found = columns(out, [name for name in _ON_ROBOT if name != "ib_virtual_robot"], "robot")
