@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterable, Sequence
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
 
 from forcegrasp.evaluate.curve_groups import interval
+from forcegrasp.evaluate.robot_report import LEGEND, robot_sheets
 from forcegrasp.evaluate.statistics import QUANTILES
-from forcegrasp.evaluate.tables import SHARES
+from forcegrasp.evaluate.tables import SHARES, markdown
 from tools.results.policies import CONTROLLERS, MEASURED, POLICIES, REWARD, SWEEPS
 from tools.results.seeds import Figures, by_experiment, read_evaluation, seeds_of
 
@@ -218,39 +220,8 @@ def transfer(out: Path) -> str:
 
 def robots(out: Path) -> str:
     """The test half of the robots that nobody measured, and each policy against the baseline."""
-    report = read_evaluation(out / "robots" / "evaluation")
-    baseline, count = report["baseline"], len(report["halves"]["test"])
-    less = {
-        one["one"]: one
-        for one in report["differences"]
-        if (one["other"], one["metric"], one["half"]) == (baseline, REWARD, "test")
-    }
-
-    def against(name: str) -> list[str]:
-        if (one := less.get(name)) is None:
-            return [""] * 3
-        worst = f"{one['worst']:.0f} (robot {one['worst_robot']})"
-        return [f"{one['mean']:+.1f} ± {_half(one):.1f}", worst, f"{one['beyond_margin']} of {count}"]
-
-    def row(name: str) -> list[str]:
-        of = {figure: values["test"] for figure, values in report["policies"][name].items()}
-        means = (f"{of[figure]['mean']:.{digits}f}" for figure, digits in zip(moved_and_shares, (2, 1, 1), strict=True))
-        rewards = (f"{of[one]['mean']:.1f} ± {_half(of[one]):.1f}" for one in (REWARD, MEASURED))
-        return [f"`{name}`", *rewards, *means, f"{of[REWARD]['lowest']:.0f}", *against(name)]
-
-    moved_and_shares = ("displacement_total_mm", *SHARES)
-    header = [
-        *("", "force reward", "measured forces", "moved [mm]", "crushed [%]", "lost [%]", "worst robot"),
-        *(f"less `{baseline}`", "at worst", "> 3 points worse on"),
-    ]
-    told = f"Test half, {count} robots; ± is half of the 95 % interval over robots. The last three columns hold each"
-    rows = map(row, report["policies"])
-    return f"{told} policy against `{baseline}`, robot by robot:\n\n" + table(header, rows)
-
-
-def _half(of: dict[str, float]) -> float:
-    """Of an interval."""
-    return (of["high"] - of["low"]) / 2
+    sheets = islice(robot_sheets(read_evaluation(out / "robots" / "evaluation")), 2)
+    return f"{LEGEND}\n\n{markdown(sheets).strip()}"
 
 
 def transfer_objects(out: Path) -> str:
