@@ -154,6 +154,11 @@ class Diagnosis(ShortRepr):
         return tuple(step.effects[0] for step in kept_steps(self.steps))
 
     @property
+    def fault_is_rival(self) -> bool:
+        """Whether the set may be wrong instead, and these data can't tell."""
+        return self.fault is not None and self.fault.name in self.effects[1:]
+
+    @property
     def explained(self) -> float:
         """Share of the held-out mean square beyond the noise that the effects found explain."""
         noise = self.error_after if self.noise is not None and not self.left else 1.0

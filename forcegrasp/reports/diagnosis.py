@@ -119,8 +119,7 @@ def _step_json(step: Step, diagnosis: Diagnosis) -> dict[str, Any]:
 def answer(diagnosis: Diagnosis) -> str:
     """The verdict in words."""
     of_model, of_set = _of_model(diagnosis), fault_words(diagnosis)
-    rival = diagnosis.fault is not None and diagnosis.fault.name in diagnosis.effects[1:]
-    return " ".join(filter(None, (of_model, of_set) if rival else (of_set, of_model)))
+    return " ".join(filter(None, (of_model, of_set) if diagnosis.fault_is_rival else (of_set, of_model)))
 
 
 def _missed_objects(d: Diagnosis) -> str:

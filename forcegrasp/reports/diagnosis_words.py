@@ -57,7 +57,7 @@ def fault_words(diagnosis: Diagnosis) -> str:
     if diagnosis.fault.moved is not None and diagnosis.fault.name not in diagnosis.effects:
         as_given = f"as given the error is {diagnosis.error_before:.2f} × noise"
         return f"What the set gives was moved within its tolerance: {diagnosis.fault.words}; {as_given}."
-    if diagnosis.fault.name in diagnosis.effects[1:]:
+    if diagnosis.fault_is_rival:
         return f"Or the set is wrong, and nothing is missing: {named}; these data can't tell which."
     return f"The set seems to be wrong: {named}. What follows is of the set with that put right."
 

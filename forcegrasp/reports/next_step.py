@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+from collections.abc import Sequence
 from pathlib import Path
 
 from forcegrasp.assets import DEFAULT_GRIPPER
@@ -58,8 +59,12 @@ def after_diagnosis(
     with_all = f"the model that has {listed(d.preferred)}"
     if d.verdict is Verdict.ONE_OF:
         preferred = Command(f"until then take {first}, which is preferred", added.line)
-        joined = _line("diagnose", f"data=[{str(data).strip('[]')},next]") if advice is not None else again
-        return [Command(_to_tell_apart(d, advice), joined), *([] if effect_of(first, gripper).of_set else [preferred])]
+        tied = next((step.effects for step in kept_steps(d.steps) if len(step.effects) > 1), ())
+        joined = _line("diagnose", f"data=[{str(data).strip('[]')},next]") if advice is not None and tied else again
+        return [
+            Command(_to_tell_apart(d, tied, advice), joined),
+            *([] if effect_of(first, gripper).of_set else [preferred]),
+        ]
     if is_not_all(d):
         look = Command(f"look at what {with_all} leaves", _line("compare", f"data={data}", f"model={found}"))
         more = besides(d)
@@ -84,10 +89,14 @@ def next_grasp_words(measured: MeasurementSet, diagnosis: Path) -> str:
     return "its commands, a row at each control period; play them, and log the readings as a set such as next"
 
 
-def _to_tell_apart(diagnosis: Diagnosis, advice: Advice | None) -> str:
-    step = next(step for step in kept_steps(diagnosis.steps) if len(step.effects) > 1)
-    rivals = [effect_of(name, diagnosis.target.gripper) for name in step.effects]
+def _to_tell_apart(diagnosis: Diagnosis, tied: Sequence[str], advice: Advice | None) -> str:
+    """What tells rivals apart: those of a step, ``tied``, and what may be wrong with the set instead of the model."""
+    rivals, fault = [effect_of(name, diagnosis.target.gripper) for name in tied], diagnosis.fault
     faults = "".join(f"check {e.name} in the set ({e.separates}); " for e in rivals if e.of_set)
+    if fault is not None and diagnosis.fault_is_rival:
+        faults += f"check {fault.name} in the set ({fault.check}); "
+    if not tied:
+        return f"{faults}put right what is wrong there, and diagnose again"
     if advice is not None:
         said = advice.sentence().replace("record next:", "record", 1)
         return f"{faults}{said}. Make a set of it, such as next, and diagnose both"

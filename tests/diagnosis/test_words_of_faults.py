@@ -14,6 +14,7 @@ from forcegrasp.identify.problem import Problem
 from forcegrasp.identify.verdict import Verdict
 from forcegrasp.reports.diagnosis import answer, diagnosis_json, lines
 from forcegrasp.reports.diagnosis_words import row_sentence
+from forcegrasp.reports.next_step import after_diagnosis
 
 
 @pytest.fixture
@@ -29,6 +30,17 @@ def test_a_fault_that_an_effect_could_be_is_told_last(made_up, fault):
     assert text.startswith("The model lacks force_bias")
     told = "Or the set is wrong, and nothing is missing: time_scale (stamps are too long; to check: the clock);"
     assert told in text
+
+
+@pytest.mark.parametrize("advised", [True, False])
+def test_where_only_the_set_is_in_doubt_it_is_checked_and_no_grasp_is_asked_for(made_up, fault, advised):
+    rivals = dataclasses.replace(
+        made_up.diagnosis("effect"), verdict=Verdict.ONE_OF, effects=("force_bias", "time_scale"), fault=fault
+    )
+    first, other = after_diagnosis(rivals, made_up.advice if advised else None, "set", "base.yaml", "found.yaml")
+    assert first.purpose == "check time_scale in the set (the clock); put right what is wrong there, and diagnose again"
+    assert first.line == "forcegrasp diagnose data=set"
+    assert other.purpose == "until then take force_bias, which is preferred"
 
 
 def test_a_fault_besides_an_effect_is_told_first(made_up, fault):
