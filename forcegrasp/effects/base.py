@@ -239,6 +239,14 @@ class Effect:
         return np.array(list(itertools.product(*(p.trials for p in cls.parameters))))
 
     @classmethod
+    def at_whole_steps(cls, values: np.ndarray, dt: float) -> tuple[np.ndarray, np.ndarray | float]:
+        """Values with which it acts at whole physics steps ``dt``, and by how many seconds that is late, ``(rows,)``.
+
+        Of what shifts all that happens in time, and nothing else, as a delay of commands does.
+        """
+        return values, 0.0
+
+    @classmethod
     def hooks(cls) -> set[str]:
         """Names of the hooks that this effect overrides."""
         names = ("change_model", "command", "motor_range", "act", "interaction", "read_force", "read_position")

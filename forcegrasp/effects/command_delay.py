@@ -26,5 +26,10 @@ class CommandDelay(Effect):
         steps = self["delay_s"][which, 0] / self.dt
         return delay_line(self.resting_command[which], steps, self.longest("delay_s") / self.dt)
 
+    @classmethod
+    def at_whole_steps(cls, values: np.ndarray, dt: float) -> tuple[np.ndarray, np.ndarray | float]:
+        whole = dt * np.ceil(np.round(values / dt, 6))  # 0.004 / 0.002 may be more than 2
+        return whole, (whole - values)[:, 0]
+
     def command(self, command: np.ndarray, fresh: np.ndarray) -> np.ndarray:
         return delayed(self.state, command)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -47,6 +47,7 @@ class Motion(ShortRepr):
     position: np.ndarray  #: of the motors, m or rad, ``(n, steps, motors)``
     force: np.ndarray  #: what the force readings transduce, before f_α, newtons, ``(n, steps, channels)``
     object_position: np.ndarray  #: metres, ``(n, steps)``
+    late_s: np.ndarray  #: by how much later all this happened than it should have: it is read so much later, ``(n,)``
 
 
 @dataclass(frozen=True, repr=False)
@@ -64,7 +65,8 @@ class Replay:
     A command acts from the physics step at its time stamp until the next command's; a reading is the state at its time
     stamp, before that command acts. Of grasps it is that of the nearest physics step, and the step is made to divide
     the time between two samples; of a servo, which may be sampled faster than that, it lies between two. So do readings
-    that are taken later than their time stamps, or earlier.
+    that are taken later than their time stamps, or earlier. Of grasps, a command that is delayed acts at the next whole
+    step, and all is read so much later: a motor at its limit gives for a part of a command as much as for the whole.
 
     Args:
       gripper: what is simulated.
@@ -99,9 +101,8 @@ class Replay:
         self.sample_steps = np.stack([np.pad(start, (0, samples - len(start)), "edge") for start in starts])
         self._instants = self.sample_steps  # when each sample is taken, in steps
         latest_s = max(gripper.latest_reading_s, *(max(g.late_s) for g in self.grasps))
-        self._steps += math.ceil(latest_s / self.dt)
+        self._steps += math.ceil(latest_s / self.dt) + 1
         if gripper.is_servo:
-            self._steps += 1
             real = [(g.time_s - g.time_s[0]) / self.dt for g in self.grasps]
             self._instants = np.stack([np.pad(r, (0, samples - len(r)), "edge") for r in real])
         #: which samples there are, ``(grasps, samples)``
@@ -136,9 +137,8 @@ class Replay:
 
     def remember(self, key: bytes, motion: Motion, rows: np.ndarray) -> None:
         """Keeps these rows of a motion under a name; the ones kept longest ago are forgotten."""
-        names = ("grasp", "position", "force", "object_position")
         self.remembered.pop(key, None)  # it goes to the end
-        self.remembered[key] = Motion(*(getattr(motion, name)[rows] for name in names))
+        self.remembered[key] = Motion(*(getattr(motion, field.name)[rows] for field in fields(Motion)))
         for oldest in list(self.remembered)[:-_REMEMBERED]:
             del self.remembered[oldest]
 
@@ -165,6 +165,9 @@ class Replay:
                 chunk = {name: value[part] for name, value in base.items()}
                 parts.append(self.simulate(grasp[part], chunk, [_cut(e, part) for e in effects]))
             return join(parts)
+        late_s = np.zeros(n)
+        if not self.gripper.is_servo:
+            effects = [self._at_whole_steps(e, late_s) for e in effects]
         plant = Plant(self.gripper, n, self.tier, THREADS, self._step_factor, self._other_collisions)
         plant.attach([(e.effect(e.values, self.dt, e.variant), e.rows) for e in effects if len(e.rows)])
         ids = np.arange(n)
@@ -200,7 +203,13 @@ class Replay:
             if self._strict:
                 raise PhysicsError(self.diverged)
             position[bad] = force[bad] = NOWHERE
-        return Motion(grasp, position, force, objects)
+        return Motion(grasp, position, force, objects, late_s)
+
+    def _at_whole_steps(self, one: EffectOn, late_s: np.ndarray) -> EffectOn:
+        """An effect that acts at physics steps; adds to ``late_s`` of its rows by how much that is too late."""
+        values, late = one.effect.at_whole_steps(one.values, self.dt)
+        late_s[one.rows] += late
+        return EffectOn(*one.kind, values, one.rows)
 
     def read(
         self,
@@ -221,12 +230,13 @@ class Replay:
           skew_s: how much later than its command each row's samples were read, ``(n,)``; at its time stamp by default.
           force_skew_s: the same of the forces, if they were not read with the positions.
         """
-        at = self._when(motion.grasp[rows], skew_s)
-        of_force = at if force_skew_s is None else self._when(motion.grasp[rows], force_skew_s)
+        late_s = motion.late_s[rows]
+        at = self._when(motion.grasp[rows], late_s if skew_s is None else skew_s + late_s)
+        of_force = at if force_skew_s is None else self._when(motion.grasp[rows], force_skew_s + late_s)
         position, objects = at.of(motion.position, rows), at.of(motion.object_position, rows)
         scale = force_scale[:, None, None]
         if not effects:
-            return Readings(position, self._transduced(of_force.of(motion.force, rows) * scale), objects)
+            return Readings(position, of_force.of(motion.force, rows, lambda f: self._transduced(f * scale)), objects)
         force = self._transduced(motion.force[rows] * scale)
         live = ReadingEffects([self._on_readings(effect) for effect in effects])
         true_position = motion.position[rows] if live.change_position else motion.position[:0]
@@ -237,9 +247,9 @@ class Replay:
             position = at.of(true_position, count)
         return Readings(position, of_force.of(force, count), objects)
 
-    def _when(self, grasp: np.ndarray, skew_s: np.ndarray | None) -> _Instants:
+    def _when(self, grasp: np.ndarray, skew_s: np.ndarray) -> _Instants:
         """When the samples of these grasps are read."""
-        later = np.zeros(len(grasp)) if skew_s is None else skew_s / self.dt
+        later = skew_s / self.dt
         if self._instants is self.sample_steps and not later.any():
             return _Instants(self.sample_steps[grasp])
         instants = np.clip(self._instants[grasp] + later[:, None], 0, self._steps - 1)
@@ -264,14 +274,16 @@ class _Instants:
     before: np.ndarray  #: the last physics step until then, ``(n, samples)``
     share: np.ndarray | None = None  #: of the step after it that has passed; None for none
 
-    def of(self, values: np.ndarray, rows: np.ndarray) -> np.ndarray:
-        """What is read of these rows of values ``(m, steps, ...)``: ``(n, samples, ...)``."""
+    def of(
+        self, values: np.ndarray, rows: np.ndarray, seen: Callable[[np.ndarray], np.ndarray] = lambda v: v
+    ) -> np.ndarray:
+        """What is read of these rows of what sensors see of values ``(m, steps, ...)``: ``(n, samples, ...)``."""
         each = np.asarray(rows)[:, None]
-        before = values[each, self.before]
+        before = seen(values[each, self.before])
         if self.share is None:
             return before
         share = self.share.reshape(*self.share.shape, *(1,) * (before.ndim - 2))
-        return before + share * (values[each, self.before + 1] - before)
+        return before + share * (seen(values[each, self.before + 1]) - before)
 
 
 def _earlier(
@@ -317,8 +329,7 @@ def join(motions: Sequence[Motion]) -> Motion:
     """The rows of several motions, one after the other."""
     if len(motions) == 1:
         return motions[0]
-    names = ("grasp", "position", "force", "object_position")
-    return Motion(*(np.concatenate([getattr(m, name) for m in motions]) for name in names))
+    return Motion(*(np.concatenate([getattr(m, field.name) for m in motions]) for field in fields(Motion)))
 
 
 def start_position(grasp: MeasuredGrasp, stroke: float) -> np.ndarray:

@@ -63,6 +63,11 @@ def by_hand(
     return np.array(seen)
 
 
+def of_whole_steps(effect: type[Effect], simulator: Replay) -> np.ndarray:
+    """Typical values, times as whole steps: a plant has no parts of a step, but what a replay puts off to readings."""
+    return effect.at_whole_steps(effect.typical_values()[None], simulator.dt)[0][0]
+
+
 def replayed(simulator: Replay, rows: np.ndarray, *effects: EffectOn, base: dict | None = None) -> np.ndarray:
     """The same by replay, ``(rows, samples, 5)``."""
     numbers = {name: np.full(len(rows), value) for name, value in BASE.items()} | (base or {})
@@ -118,10 +123,28 @@ def test_late_readings_are_those_of_the_motion_at_that_time(late_s):
 @pytest.mark.parametrize(("effect", "variant"), CASES)
 def test_effects_act_as_they_do_live(effect, variant):
     """Sensors are read after the simulation, those of the command see what is new: all as on a plant."""
-    one, values = grasp(TIMES["jitter"]), effect.typical_values()
+    one = grasp(TIMES["jitter"])
     simulator = Replay(TIAGO, [one], "fast", encoders_known=False)
+    values = of_whole_steps(effect, simulator)
     on = EffectOn(effect, variant, values[None], np.array([0]))
     assert replayed(simulator, np.array([0]), on)[0].tobytes() == by_hand(one, (effect, variant, values)).tobytes()
+
+
+@pytest.mark.parametrize("delay_s", [0.005, 0.0513])
+@pytest.mark.parametrize("tier", ["fast", "reference"])
+def test_a_delay_of_a_part_of_a_step_is_as_exact_as_none_though_motors_are_at_their_limit(tier, delay_s):
+    """To a command of half the way, a motor at its limit gives as much as to one of the whole way."""
+    stepped = np.where(REGULAR < 0.1, OPEN_M, np.where(REGULAR < 0.5, 0.005, OPEN_M))
+    one = dataclasses.replace(grasp(REGULAR), command_m=np.repeat(stepped[:, None], 2, axis=1))
+
+    def off(delay_s: float) -> float:
+        """Rms by which the motors stand elsewhere than with steps of 0.1 ms, of which the delay is a multiple."""
+        delay = EffectOn(get_effect("command_delay"), "", np.array([[delay_s]]), np.array([0]))
+        coarse, fine = Replay(TIAGO, [one], tier), Replay(TIAGO, [one], "reference", step_factor=0.05)
+        seen = [replayed(simulator, np.array([0]), delay)[0, :, :2] for simulator in (coarse, fine)]
+        return float(np.sqrt(np.mean((seen[0] - seen[1]) ** 2)))
+
+    assert off(delay_s) < 1.1 * off(0.0)
 
 
 @pytest.mark.parametrize(("effect", "variant"), CASES)
@@ -142,9 +165,10 @@ def test_what_follows_from_commands_needs_no_stop_at_each_step(effect, variant, 
 def test_several_effects_act_in_their_order():
     one = grasp(REGULAR)
     chosen = [get_effect(n) for n in ("quantisation", "force_bias", "force_lag", "backlash", "command_delay")]
-    on = [EffectOn(e, "", e.typical_values()[None], np.array([0])) for e in chosen]
-    seen = replayed(Replay(TIAGO, [one], "fast", encoders_known=False), np.array([0]), *on)[0]
-    assert seen.tobytes() == by_hand(one, *((e, "", e.typical_values()) for e in chosen)).tobytes()
+    simulator = Replay(TIAGO, [one], "fast", encoders_known=False)
+    on = [EffectOn(e, "", of_whole_steps(e, simulator)[None], np.array([0])) for e in chosen]
+    seen = replayed(simulator, np.array([0]), *on)[0]
+    assert seen.tobytes() == by_hand(one, *((e, "", of_whole_steps(e, simulator)) for e in chosen)).tobytes()
 
 
 @pytest.mark.parametrize("sample", [3, 9])
