@@ -95,8 +95,9 @@ def diagnose(
             target, study = weighed, dataclasses.replace(study, target=weighed)
         step, fit = drop_needless(study, step, fit, len(base.fit.problem.effects))
         steps.append(step)
-        if not _left(study, fit)[0]:
-            break
+        left, noise = _left(study, fit)
+        if not left and (noise is None or not noise.stronger):
+            break  # what seems to be stronger noise may hide an effect: only that none is found tells
     steps, fit = simplify(study, steps, fit, len(base.fit.problem.effects))
     if believed is not None and not _convincing(believed[2], believed[1], study, fit):
         steps, fit, study = believed

@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 
 from forcegrasp.diagnosis.exchange import are_alike, exchange
+from forcegrasp.diagnosis.noise_check import Noise
 from forcegrasp.diagnosis.result import Step, kept_steps
 from forcegrasp.diagnosis.screen import Screen
 from forcegrasp.diagnosis.search import diagnose
+from forcegrasp.diagnosis.step import look_further
 from forcegrasp.effects import catalogue, get_effect
 from forcegrasp.effects.for_gripper import effect_of, effects_of
 from forcegrasp.identify.fit_set import fit_model
@@ -95,3 +97,23 @@ def test_a_search_that_ends_with_more_than_noise_looks_for_exchanges_and_goes_on
     assert calls
     assert "coulomb_friction" in diagnosis.preferred
     assert "position_deadband" not in diagnosis.preferred
+
+
+@pytest.mark.parametrize(("times", "looks"), [(1.5, 2), (0.7, 1)])
+def test_the_search_goes_on_where_noise_seems_to_be_stronger_than_said(rubbing, monkeypatch, times, looks):
+    """An effect that is missing may look like such noise, and then it would never be looked for."""
+    _, target, simulators, base = rubbing
+    signals = np.ones(target.signals.shape[-1])
+    noise = Noise(times * signals, times * signals, signals > 0, 0 * signals)
+    monkeypatch.setattr("forcegrasp.diagnosis.search._left", lambda *_: ("", noise))
+    looked = []
+
+    def recorded(*arguments) -> Step:
+        looked.append(arguments)
+        return look_further(*arguments)
+
+    monkeypatch.setattr("forcegrasp.diagnosis.search.look_further", recorded)
+    chosen = [effect_of(name, target.gripper) for name in ("coulomb_friction", "motor_offset")]
+    diagnosis = diagnose(target, base, simulators, chosen, np.random.default_rng(0))
+    assert diagnosis.preferred[0] == "coulomb_friction"
+    assert len(looked) == looks
