@@ -24,7 +24,7 @@ def exchange(
     """A step that puts another effect in the place of one that was found; None if none does better.
 
     Each effect was chosen while those found later were missing, and one that is missing can make a look-alike of the
-    truth fit better. So each is looked for again, with all others in the model.
+    truth fit better. So each is looked for again, with all others in the model, among those that look alike.
 
     Args:
       study: the measurements.
@@ -37,7 +37,8 @@ def exchange(
     held, known = study.heldout(fit), {one.effect.name: one.effect for one in fit.problem.effects}
     names = [step.effects[0] for step in kept_steps(steps) if step.effects[0] in known and not step.is_counted]
     for name in names if len(names) > 1 else ():  # the only one was chosen with all there is in the model
-        alike = [e for e in effects if are_alike(e, known[name])]
+        # a mistake of the set may look like anything
+        alike = [e for e in effects if e.of_set or are_alike(e, known[name])]
         if not alike:
             continue
         study.progress(f"looking for what may stand in place of {name}")

@@ -68,6 +68,23 @@ def test_the_only_effect_was_chosen_with_all_there_is_in_the_model(found, monkey
     assert exchanged(found, "position_deadband", only_last=True)[0] is None
 
 
+@pytest.mark.parametrize(("other", "tried"), [("object_size", True), ("coulomb_friction", True), ("force_lag", False)])
+def test_look_alikes_are_tried_and_mistakes_of_the_set(found, monkeypatch, other, tried):
+    """A mistake may look like anything: radii that were too large were called friction."""
+    asked = []
+
+    def nothing(study, fit, screen, effects, rng) -> Step:
+        asked.extend(effects)
+        return Step((), (), (), 1.0, 1.0)
+
+    monkeypatch.setattr("forcegrasp.diagnosis.exchange.look_further", nothing)
+    study, step, fit = found("actuator_lag", "position_deadband")
+    steps = [dataclasses.replace(step, effects=("position_deadband",)), step]
+    one = get_effect(other)
+    assert exchange(study, fit, Screen([one], study), [one], steps, np.random.default_rng(0)) is None
+    assert (one in asked) == tried
+
+
 def test_alike_are_look_alikes_either_way_and_effects_of_one_kind():
     rate, force, friction = (get_effect(n) for n in ("rate_limit", "force_limit", "coulomb_friction"))
     assert are_alike(rate, force)
