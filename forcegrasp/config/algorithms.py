@@ -45,7 +45,7 @@ class PPOConfig(AlgorithmConfig):
     memory: int = option(
         0, "units of the policy's memory, a GRU over the whole grasp (recurrent PPO); 0: no memory", low=0, high=10_000
     )
-    epochs: int = option(2, "passes over each batch; the authors had 10", low=1, high=1000)
+    epochs: int = option(4, "passes over each batch; the authors had 10", low=1, high=1000)
     minibatch: int = option(
         512, "frames per gradient step; the authors had 64. With a memory, in whole grasps", low=1, high=10**9
     )

@@ -167,6 +167,7 @@ def test_recommended_differs_from_ib_in_what_its_file_says():
         "curriculum.enabled": False,
         "ppo.grasps": 128,
         "ppo.minibatch": 256,
+        "ppo.epochs": 2,
         "ppo.hidden": [100, 100],
         "ppo.log_std": -2.0,
         "ppo.squeeze_together": True,
