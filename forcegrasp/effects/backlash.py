@@ -5,6 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from forcegrasp.effects.base import Contribution, Effect, Parameter, State
+from forcegrasp.effects.touch import depth_in_object, pad_reach, untouched
+
+# A motor that is slower than this makes no difference to a contact's damping.
+_CREEP_M_S = 2e-5
 
 
 class Backlash(Effect):
@@ -34,7 +38,18 @@ class Backlash(Effect):
     variant_needs = {"play": "pads", "loose": "pads", "command": "position loop"}  # noqa: RUF012 never changed
 
     def init(self, which: np.ndarray) -> State:
-        return {"pad": self.position[which]}
+        memory = {"pad": self.position[which]}
+        if self.variant != "play":
+            return memory
+        apart = self.plant.clearance(self.rows[which])
+        return memory | {
+            "behind": apart - apart.min(axis=2, keepdims=True),  # pads behind the foremost of their side
+            "surface": untouched(which),
+            "reach": pad_reach(self)[which],
+            "motor": self.position[which],
+            "passing": np.zeros((len(which), 2)),  # speed of motors whose pads stood still in the last step
+            "further": np.zeros((len(which), 2)),
+        }
 
     def command(self, command: np.ndarray, fresh: np.ndarray) -> np.ndarray:
         return self._follow(command) if self.variant == "command" else command
@@ -42,13 +57,39 @@ class Backlash(Effect):
     def act(self) -> Contribution:
         if self.variant == "command":
             return Contribution()
-        motor = self.position
+        motor, before = self.position, self.state["pad"]
         pad = self._follow(motor)
-        if self.variant == "loose":
-            self.state["pad"] = pad = np.where(self.plant.presses(self.rows), motor + self["gap_m"] / 2, pad)
+        shift = self.plant.to_sides(pad - motor)
+        if self.variant == "play":
+            return Contribution(pad_shift_m=shift, contact_shift_m=self._for_pads_that_stand(pad == before, shift))
+        self.state["pad"] = pad = np.where(self.plant.presses(self.rows), motor + self["gap_m"] / 2, pad)
         return Contribution(pad_shift_m=self.plant.to_sides(pad - motor))
 
     def _follow(self, motor: np.ndarray) -> np.ndarray:
         half = self["gap_m"] / 2
         self.state["pad"] = pad = np.where(half == 0, motor, np.clip(self.state["pad"], motor - half, motor + half))
         return pad
+
+    def _for_pads_that_stand(self, stand: np.ndarray, shift: np.ndarray) -> np.ndarray:
+        """Shift by which contacts press as on pads that stand while their motors move, metres, ``(rows, 2)``.
+
+        MuJoCo damps them by the speed of the bodies that the pads are on, those of the motors.
+
+        Args:
+          stand: which motors' pads, ``(rows, motors)``.
+          shift: of the pads, metres, ``(rows, 2)``.
+        """
+        state, dt, motor, reach = self.state, self.dt, self.position, pad_reach(self)
+        passing = self.plant.to_sides(np.where(stand, motor - state["motor"], 0.0)) / dt
+        pushed = np.where((passing != 0) & (state["passing"] != 0), (passing - state["passing"]) / dt, 0.0)
+        depth = depth_in_object(self, self.pad_force) - shift
+        closing = (state["reach"] - reach) / dt
+        further = np.zeros_like(shift)
+        row, _ = at = np.nonzero((np.abs(passing) > _CREEP_M_S) & (depth > 0))
+        if len(row):
+            law, near = self.plant.contact_law(self.rows[row], state["behind"][at]), depth[at] - state["further"][at]
+            force = law.force(depth[at], law.damping * (closing + passing)[at])
+            found = law.depth(force, law.damping * closing[at] - pushed[at], np.where(near > 0, near, depth[at]))
+            further[at] = depth[at] - found
+        state.update(motor=motor, passing=passing, reach=reach, further=further)
+        return further

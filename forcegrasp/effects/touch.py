@@ -27,7 +27,9 @@ def depth_in_object(effect: Effect, force: np.ndarray) -> np.ndarray:
     if felt.any():
         new = np.flatnonzero(felt.any(axis=1))
         met = surface.copy()
-        met[new] = (reach - effect.plant.pad_shift_m[effect.rows])[new] - effect.plant.clearance(effect.rows[new])
+        met[new] = (reach - effect.plant.pad_shift_m[effect.rows])[new] - effect.plant.clearance(effect.rows[new]).min(
+            axis=-1
+        )
         effect.state["surface"] = surface = np.where(felt, met, surface)
     return surface - reach
 

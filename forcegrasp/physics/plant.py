@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 
 from forcegrasp.physics.attached_effects import AttachedEffects
+from forcegrasp.physics.contact_law import ContactLaw
 from forcegrasp.physics.gripper import OF_READINGS, START_VELOCITY, Gripper
 from forcegrasp.physics.model_fields import ModelFields
 from forcegrasp.physics.protocols import PlantEffect
@@ -47,10 +48,10 @@ class Plant(ModelFields):
         self.force_scale = np.ones(n)  #: f_α, factor from the force sensors to the reading, ``(n,)``
         #: What effects contribute to a step, all together: see :class:`~forcegrasp.physics.protocols.Contribution`.
         self.friction, self.damping, self.motor_push = np.zeros((3, n, self.motors))
-        self.pad_shift_m, self.finger_push_n = np.zeros((2, n, 2))
+        self.pad_shift_m, self.finger_push_n, self._contact_shift_m = np.zeros((3, n, 2))
         self.object_push_n = np.zeros(n)
         pushes = self.finger_push_n, self.object_push_n, self.damping, self.motor_push
-        self._contributed = (self.friction, self.pad_shift_m, *pushes)
+        self._contributed = (self.friction, self.pad_shift_m, *pushes, self._contact_shift_m)
         self.position = np.zeros((n, self.motors))  #: of the motors (left, right, or the one), m or rad; 0 is closed
         #: Sum of each finger's contact forces at the last physics step, before f_α, newtons, ``(n, 2)``.
         self.pad_force = np.zeros((n, 2))
@@ -103,11 +104,20 @@ class Plant(ModelFields):
         return self._object_of(self._qpos)
 
     def clearance(self, rows: np.ndarray) -> np.ndarray:
-        """Distance between each side's pads and the object, metres, ``(len(rows), 2)``; negative inside it.
+        """Distance between the object and each of a side's pads, metres, ``(len(rows), 2, pads)``; negative inside it.
 
-        Of pads that no effect shifts.
+        Of pads that no effect shifts; infinite of pads that the other side has more of.
         """
-        return np.array([self.distances(self.field("geom_size")[row], self._qpos[row]) for row in rows])
+        found = [self.distances(self.field("geom_size")[row], self._qpos[row]) for row in rows]
+        return np.array(found).reshape(len(rows), 2, max(map(len, self._pad_geoms)))
+
+    def contact_law(self, rows: np.ndarray, behind: np.ndarray) -> ContactLaw:
+        """How hard objects press back on pads that lie so much behind the foremost, metres, ``(len(rows), pads)``.
+
+        Where the object's softness alone decides.
+        """
+        geom = self.object_geoms[0]
+        return ContactLaw(self.field("geom_solref")[rows, geom], self.field("geom_solimp")[rows, geom], behind)
 
     def presses(self, rows: np.ndarray) -> np.ndarray:
         """Which motors' pads an object pushes against, ``(len(rows), motors)``."""
@@ -173,7 +183,7 @@ class Plant(ModelFields):
         self._enabled[ids] = self._at_start[ids] = True
         self.batch.forward(ids)
         self.position = self._motors_of(self._qpos)
-        self.pad_shift_m[ids] = 0
+        self.pad_shift_m[ids] = self._contact_shift_m[ids] = 0
         self.effects.reset(ids)
         self._read_anew(ids)
 
@@ -335,8 +345,9 @@ class Plant(ModelFields):
     def _write_pad_shift(self) -> None:
         if not self.pad_shift_m.any() and "geom_pos" not in self._fields:
             return
+        shifts = self.pad_shift_m + self._contact_shift_m
         for side, pads in enumerate(self._pads):
-            shift = self.pad_shift_m[:, side : side + 1] * self._outward(side)
+            shift = shifts[:, side : side + 1] * self._outward(side)
             for field, (indices, places) in pads.moved.items():
                 self.field(field)[:, indices] = places + shift[:, None]
 

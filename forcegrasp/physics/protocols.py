@@ -19,6 +19,8 @@ class Contribution(NamedTuple):
     object_push_n: np.ndarray | None = None  #: force on the object along the grasp axis, ``(rows,)``
     damping: np.ndarray | None = None  #: viscous friction of the motors, N·s/m or N·m·s/rad, ``(rows, motors)``
     motor_push: np.ndarray | None = None  #: force on the motors besides their own, N or N·m, ``(rows, motors)``
+    #: How much further MuJoCo's contacts have to find the pads, to press as pads at another speed do, ``(rows, 2)``.
+    contact_shift_m: np.ndarray | None = None
 
 
 class PlantEffect(Protocol):

@@ -100,7 +100,9 @@ class SceneLayout:
         return [pad_geoms(self.model, finger.body) for finger in self.gripper.fingers]
 
     def distances(self, sizes: np.ndarray, qpos: np.ndarray) -> np.ndarray:
-        """Distance between each side's pads and the object, metres, ``(2,)``; negative inside it.
+        """Distance between the object and each side's pads, metres, ``(2, pads)``; negative inside it.
+
+        Infinite of pads that the other side has more of.
 
         Args:
           sizes: of all geoms, ``(ngeom, 3)``.
@@ -110,7 +112,10 @@ class SceneLayout:
         model.geom_size[:], data.qpos[:] = sizes, qpos
         mujoco.mj_kinematics(model, data)
         solid = [int(g) for g in self.object_geoms if model.geom_contype[g] or model.geom_conaffinity[g]]
-        return np.array([least_distance(model, data, pads, solid) for pads in self._pad_geoms])
+        found = np.full((2, max(map(len, self._pad_geoms))), np.inf)
+        for side, pads in enumerate(self._pad_geoms):
+            found[side, : len(pads)] = [least_distance(model, data, [pad], solid) for pad in pads]
+        return found
 
     @functools.cached_property
     def _at_rest(self) -> tuple[mujoco.MjModel, mujoco.MjData]:

@@ -44,6 +44,26 @@ def test_backlash_keeps_the_force_while_the_motor_crosses():
             assert np.all(after.pad_force < 0.8 * before.pad_force)
 
 
+@pytest.mark.parametrize(
+    ("tier", "speed", "loses"), [("reference", 0.004, 0.03), ("reference", 0.02, 0.07), ("fast", 0.004, 0.05)]
+)
+def test_backlash_keeps_the_force_however_fast_the_motor_crosses(tier, speed, loses):
+    """MuJoCo would let it fall by half, and to nothing: it damps contacts by the speed of the motor's body."""
+    gap = 0.001
+    plant = make_plant(1, [(get_effect("backlash"), (gap,), "play", [0])], tier)
+    start(plant, [0], np.zeros(1))
+    for target in (0.0245, 0.023, 0.022, 0.021):
+        plant.advance(np.full((1, 2), target), round(1.6 / plant.dt))
+    before, moved, forces = plant.pad_force[0, 0], [plant.position[0, 0]], []
+    while moved[-1] < moved[0] + 0.8 * gap:
+        target += speed * plant.dt
+        plant.advance(np.full((1, 2), target))
+        forces.append(plant.pad_force[0, 0])
+        moved.append(plant.position[0, 0])
+    assert np.diff(moved).max() > 0.6 * speed * plant.dt
+    np.testing.assert_allclose(forces, before, rtol=loses)
+
+
 def test_backlash_of_the_command_moves_the_encoder_late():
     gap = 0.0006
     plant = settle("backlash", (gap,), 0.0265, variant="command")
@@ -60,7 +80,8 @@ def test_pads_that_moved_inward_still_touch():
     before = settle("backlash", (0.006,), *closed, closed[-1])
     after = settle("backlash", (0.006,), *closed, closed[-1] + 0.0052)
     assert np.all(after.pad_shift_m < -0.002)
-    assert after.pad_force[0] == pytest.approx(before.pad_force[0], rel=0.06)
+    # the object slides a little along the pads meanwhile
+    assert after.pad_force[0] == pytest.approx(before.pad_force[0], rel=0.09)
 
 
 @pytest.mark.parametrize("compliance", [0.0005, 0.002])

@@ -34,7 +34,7 @@ def _depth(feeler: Feeler, position: float, force: float, thing: float = 0.0, in
         pad_position=both,
         pad_shift_m=np.zeros((2, 2)),
         object_position=np.full(2, thing),
-        clearance=lambda rows: np.full((len(rows), 2), -inside),
+        clearance=lambda rows: np.full((len(rows), 2, 3), [-inside, 3e-4, np.inf]),
     )
     return depth_in_object(feeler.attach(plant, np.arange(2)), np.full((2, 2), force))
 
@@ -58,7 +58,7 @@ def test_distance_from_an_object_is_that_of_its_shape(tier):
     plant = Plant(load_gripper("tiago"), 2, tier, threads=1)
     plant.write_radius(np.arange(2), np.array([0.02, 0.025]))
     plant.reset(np.arange(2), np.array([0.001, 0.0]), np.array([[0.03, 0.03], [0.024, 0.026]]))
-    apart = plant.clearance(np.arange(2))
+    apart = plant.clearance(np.arange(2)).min(axis=2)
     np.testing.assert_allclose(apart, [[0.011, 0.009], [-0.001, 0.001]], atol=2e-5)
 
 
