@@ -9,6 +9,9 @@ from forcegrasp.effects.touch import depth_in_object, pad_reach, untouched
 
 # A motor that is slower than this makes no difference to a contact's damping.
 _CREEP_M_S = 2e-5
+# How much deeper contacts are moved at most. Light ones in front of a fast motor would have to be many times as deep:
+# what a step's motor differs from the last one's would press hard there.
+_DEEPEST = 1.5
 
 
 class Backlash(Effect):
@@ -90,6 +93,6 @@ class Backlash(Effect):
             law, near = self.plant.contact_law(self.rows[row], state["behind"][at]), depth[at] - state["further"][at]
             force = law.force(depth[at], law.damping * (closing + passing)[at])
             found = law.depth(force, law.damping * closing[at] - pushed[at], np.where(near > 0, near, depth[at]))
-            further[at] = depth[at] - found
+            further[at] = depth[at] - np.minimum(found, _DEEPEST * depth[at])
         state.update(motor=motor, passing=passing, reach=reach, further=further)
         return further

@@ -10,7 +10,7 @@ import numpy as np
 # What MuJoCo clips impedances to.
 _LEAST, _MOST = 1e-4, 0.9999
 # A depth is sought until a step is as small as this, metres, or for so many steps.
-_SMALL_M, _STEPS = 1e-7, 40
+_SMALL_M, _STEPS = 1e-6, 40
 
 
 @dataclass(frozen=True, eq=False)
