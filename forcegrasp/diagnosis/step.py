@@ -68,10 +68,10 @@ def look_further(
     look = screen.look(study, fit, start.background, effects, start.noise, rng)
     candidates = start.refit(look.worth_a_fit[:_REFITTED], look.null)
     candidates += start.refit_richer(richer, look.null)
-    best: dict[str, Candidate] = {}
+    variants: dict[str, list[Candidate]] = {}
     for candidate in sorted(candidates, key=start.place):
-        best.setdefault(candidate.effect.name, candidate)  # of several variants the best one
-    ordered, redundant = start.refine_on_reference_tier(tuple(best.values()))
+        variants.setdefault(candidate.effect.name, []).append(candidate)
+    ordered, redundant = start.refine_on_reference_tier(list(variants.values()))
     of_many = bool(ordered) and not is_significant(ordered[0], start.least_gain)
     if not ordered or (of_many and not start.may_be_of_many(ordered[0], look.share_together)):
         return Step((), ordered, look.scores, start.error, start.error)
@@ -89,6 +89,11 @@ def look_further(
 def _leaves_more(fit: Fit, target: Target) -> bool:
     """Whether a fit leaves more than noise, but not so much that it is hopeless."""
     return _ALL_FITTED < rms_error(fit, target) < _FAR
+
+
+def _as_good(best: Candidate, others: Sequence[Candidate]) -> list[Candidate]:
+    """Those of the other variants of an effect that rough fits can't tell from the best one."""
+    return [one for one in others if not one.replaces and _NO_BETTER * one.fit.cost < best.fit.cost]
 
 
 class _Start:
@@ -148,11 +153,18 @@ class _Start:
         rough = families.roughly_as_richer(richer, part, name, some)
         return part.cost - rough.cost > MAX_GAIN_FACTOR * LEAST_SHARE * some.target.beyond_noise(part.residual)
 
-    def refine_on_reference_tier(self, ordered: Sequence[Candidate]) -> tuple[tuple[Candidate, ...], set[str]]:
+    def refine_on_reference_tier(
+        self, variants: Sequence[Sequence[Candidate]]
+    ) -> tuple[tuple[Candidate, ...], set[str]]:
         """Fits the best one, and those indistinguishable from it, on the reference tier: rough fits may stop short.
 
         Also returns the names of effects that add nothing to one that they contain.
+
+        Args:
+          variants: candidates of each effect, best first.
         """
+        ordered = [of_effect[0] for of_effect in variants]  # of several variants the best one
+        alike = {best.effect.name: _as_good(best, others) for best, *others in variants}
         near = [c for c in ordered if c is ordered[0] or indistinguishable(ordered[0], c)][:_REFINED]
         contained = {nested.effect for c in near for nested in c.effect.contains}
         near += [c for c in ordered if c.effect.name in contained and c not in near]
@@ -162,8 +174,7 @@ class _Start:
             if c.replaces:  # fitted to the end already
                 refined.append(c)
             elif not any(self._is_enough(simple, rough, c) for simple in refined):
-                self._study.progress(f"fitting {c.effect.name} {c.setting.variant} to the end")
-                refined.append(self._judge(self._to_the_end(c.fit), c.p_family, c.signature))
+                refined.append(self._best_at_the_end([c, *alike[c.effect.name]]))
         refined = self._compare_with_contained(refined)
         names = {c.effect.name for c in refined}
         every = [*refined, *(c for c in ordered if c.effect.name not in names)]
@@ -175,8 +186,7 @@ class _Start:
                 return tuple(every), redundant
             # fitted to the end the others are no better than this rough one: it is to be fitted, too
             names.add(first.effect.name)
-            self._study.progress(f"fitting {first.effect.name} {first.setting.variant} to the end")
-            every[0] = self._judge(self._to_the_end(first.fit), first.p_family, first.signature)
+            every[0] = self._best_at_the_end([first, *alike[first.effect.name]])
 
     def _is_enough(self, simple: Candidate, rough: Mapping[str, Fit], richer: Candidate) -> bool:
         """Whether a richer effect promises nothing beyond one that it contains, which leaves only noise."""
@@ -203,6 +213,15 @@ class _Start:
                     if member is None or fallen.cost < member.fit.cost:
                         found[nested.effect] = self._judge(fallen, c.p_family, c.signature)
         return list(found.values())
+
+    def _best_at_the_end(self, variants: Sequence[Candidate]) -> Candidate:
+        """The best of an effect's variants once they are fitted to the end."""
+        ends: list[tuple[Fit, Candidate]] = []
+        for one in variants:
+            self._study.progress(f"fitting {one.effect.name} {one.setting.variant} to the end")
+            ends.append((self._to_the_end(one.fit), one))
+        fit, best = min(ends, key=lambda end: end[0].cost)
+        return self._judge(fit, best.p_family, best.signature)
 
     def _to_the_end(self, rough: Fit) -> Fit:
         target, simulators = self._study.target, self._study.simulators
