@@ -162,8 +162,34 @@ def test_what_takes_an_effects_place_does_so_though_another_seemed_better_at_fir
     start = _Start(study, made_up.base.fit)
     monkeypatch.setattr(start, "_to_the_end", lambda rough: rough)
     monkeypatch.setattr(start, "_judge", lambda *_: dataclasses.replace(other, gains=np.full(8, 10.0)))
-    ordered, _ = start.refine_on_reference_tier([other, richer])
+    ordered, _ = start.refine_on_reference_tier([[other], [richer]])
     assert [(c.effect.name, c.replaces) for c in ordered] == [("back_emf", "force_limit"), ("rate_limit", "")]
+
+
+def test_variants_that_rough_fits_cannot_tell_apart_are_all_fitted_to_the_end(made_up, monkeypatch):
+    """The one that comes first by a hair may be the worse one on the reference tier."""
+    first, fit = made_up.diagnosis("effect").steps[0].candidates[0], made_up.base.fit
+    backlash = get_effect("backlash")
+    loose, play, command = (
+        dataclasses.replace(
+            first,
+            setting=EffectSetting.typical(backlash, variant),
+            fit=dataclasses.replace(fit, residual=share * fit.residual),
+        )
+        for variant, share in (("loose", 1.0), ("play", 1.001), ("command", 1.02))
+    )
+    nothing = (np.zeros_like(fit.residual),) * 2
+    start, ended = _Start(Study(made_up.target, Simulators(fit.problem), (), nothing), fit), []
+
+    def to_the_end(rough):
+        ended.append(rough)
+        return dataclasses.replace(rough, residual=0.5 * rough.residual) if rough is play.fit else rough
+
+    monkeypatch.setattr(start, "_to_the_end", to_the_end)
+    monkeypatch.setattr(start, "_judge", lambda fit, *_: dataclasses.replace(loose, fit=fit))
+    ordered, _ = start.refine_on_reference_tier([[loose, play, command]])
+    assert [any(one is rough for one in ended) for rough in (loose.fit, play.fit, command.fit)] == [True, True, False]
+    assert [c.fit.cost for c in ordered] == [pytest.approx(0.25 * play.fit.cost)]
 
 
 @pytest.mark.parametrize(

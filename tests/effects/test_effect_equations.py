@@ -44,24 +44,35 @@ def test_backlash_keeps_the_force_while_the_motor_crosses():
             assert np.all(after.pad_force < 0.8 * before.pad_force)
 
 
+def crossing(tier: str, speed: float, *closed: float) -> tuple[float, np.ndarray]:
+    """Force before a motor crosses most of a backlash of 1 mm, and forces while it does, opening so fast."""
+    plant = make_plant(1, [(get_effect("backlash"), (0.001,), "play", [0])], tier)
+    start(plant, [0], np.zeros(1))
+    for target in closed:
+        plant.advance(np.full((1, 2), target), round(1.6 / plant.dt))
+    before, moved, forces, target = plant.pad_force[0, 0], [plant.position[0, 0]], [], closed[-1]
+    while moved[-1] < moved[0] + 0.0008:
+        target += speed * plant.dt
+        plant.advance(np.full((1, 2), target))
+        forces.append(plant.pad_force[0, 0])
+        moved.append(plant.position[0, 0])
+    assert np.diff(moved).max() > 0.15 * speed * plant.dt
+    return before, np.array(forces)
+
+
 @pytest.mark.parametrize(
     ("tier", "speed", "loses"), [("reference", 0.004, 0.03), ("reference", 0.02, 0.07), ("fast", 0.004, 0.05)]
 )
 def test_backlash_keeps_the_force_however_fast_the_motor_crosses(tier, speed, loses):
     """MuJoCo would let it fall by half, and to nothing: it damps contacts by the speed of the motor's body."""
-    gap = 0.001
-    plant = make_plant(1, [(get_effect("backlash"), (gap,), "play", [0])], tier)
-    start(plant, [0], np.zeros(1))
-    for target in (0.0245, 0.023, 0.022, 0.021):
-        plant.advance(np.full((1, 2), target), round(1.6 / plant.dt))
-    before, moved, forces = plant.pad_force[0, 0], [plant.position[0, 0]], []
-    while moved[-1] < moved[0] + 0.8 * gap:
-        target += speed * plant.dt
-        plant.advance(np.full((1, 2), target))
-        forces.append(plant.pad_force[0, 0])
-        moved.append(plant.position[0, 0])
-    assert np.diff(moved).max() > 0.6 * speed * plant.dt
+    before, forces = crossing(tier, speed, 0.0245, 0.023, 0.022, 0.021)
     np.testing.assert_allclose(forces, before, rtol=loses)
+
+
+def test_backlash_does_not_press_harder_where_contacts_are_light_and_the_motor_is_fast():
+    before, forces = crossing("reference", 0.2, 0.0245, 0.0235)
+    assert 0 < before < 0.01
+    assert forces.max() < 1.5 * before
 
 
 def test_backlash_of_the_command_moves_the_encoder_late():
