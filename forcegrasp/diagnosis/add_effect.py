@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from forcegrasp.diagnosis.look_beside import look_beside
 from forcegrasp.diagnosis.refine import refine
 from forcegrasp.diagnosis.signatures import Background, Signatures, trials
 from forcegrasp.diagnosis.study import Study
@@ -61,6 +62,6 @@ def add_effect(loaded: Loaded[MeasurementSet], model: Model, effect: type[Effect
             f"effect={effect.name}: leaves no trace in these data at any size; record grasps that show it"
         )
     nearest = min((r.fit for r in refine(scores, study, before, background)), key=lambda f: f.cost)
-    after = fit_exactly(target, nearest.problem, simulators, nearest.vector)
+    after = look_beside(fit_exactly(target, nearest.problem, simulators, nearest.vector), target, simulators)
     better = model_of(after, target, loaded, numerical_error(after, target))
     return Added(target, before, after, rms(held, target), rms(study.heldout(after), target), better)

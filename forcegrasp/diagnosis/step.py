@@ -18,6 +18,7 @@ from forcegrasp.diagnosis.evidence import (
     is_significant,
     place,
 )
+from forcegrasp.diagnosis.look_beside import look_beside
 from forcegrasp.diagnosis.noise_check import unexpected_noise
 from forcegrasp.diagnosis.other_starts import other_starts
 from forcegrasp.diagnosis.refine import refine
@@ -225,7 +226,7 @@ class _Start:
 
     def _to_the_end(self, rough: Fit) -> Fit:
         target, simulators = self._study.target, self._study.simulators
-        exact = fit_exactly(target, rough.problem, simulators, rough.vector)
+        exact = look_beside(fit_exactly(target, rough.problem, simulators, rough.vector), target, simulators)
         if _leaves_more(exact, target):
             exact = fit_past_few(exact, target, simulators)
         if not _leaves_more(exact, target):

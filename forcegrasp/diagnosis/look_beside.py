@@ -1,0 +1,46 @@
+"""Looks a little beside where a fit ended: what an effect with a memory of motion does jumps with its size."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from forcegrasp.diagnosis.signatures import Background
+from forcegrasp.identify.fit import Fit, Simulators, fit_exactly
+from forcegrasp.identify.predict import predict
+from forcegrasp.identify.target import Target
+
+# Sizes that are looked at, as multiples of the one at which the fit ended.
+_MULTIPLES = (0.9, 0.95, 0.98, 1.02, 1.05, 1.1)
+# A size is better if it promises to lower the cost by so much: two standard errors.
+_WORTH = 4.0
+
+
+def look_beside(fit: Fit, target: Target, simulators: Simulators) -> Fit:
+    """The better of a fit and one from a size beside it, for as long as that is better; only of effects that need it.
+
+    A gap that is crossed a sample later lets go of an object a sample later: the cost has a small valley at each, out
+    of which no slope leads. So sizes beside it are simulated by the model itself, and of what is left that is taken out
+    which the other parameters would make up for, as far as slopes tell.
+
+    Args:
+      fit: of the model itself, with the effect as its last one.
+      target: the measurements.
+      simulators: of the problem's grasps.
+    """
+    while fit.problem.effects[-1].effect.follows_motion:
+        problem = fit.problem
+        index = problem.first_entry(len(problem.effects) - 1)
+        entry = problem.entries[index]
+        starts = np.tile(fit.vector, (len(_MULTIPLES), 1))
+        sizes = np.clip(fit.values[index] * np.array(_MULTIPLES), entry.low, entry.high)
+        starts[:, index] = [entry.coordinate(size) for size in sizes]
+        signals = predict(simulators.exact, [problem.case(start) for start in starts])
+        left = np.stack([(fit.weight * target.residual(one)).ravel() for one in signals], axis=1)
+        costs = np.sum(Background(fit, (), without=index).remove(left) ** 2, axis=0)
+        if costs.min() > fit.cost - _WORTH:
+            break
+        again = fit_exactly(target, problem, simulators, starts[costs.argmin()])
+        if again.cost > fit.cost - _WORTH:
+            break
+        fit = again
+    return fit

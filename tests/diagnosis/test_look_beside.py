@@ -1,0 +1,64 @@
+"""A fit that ended in a small valley beside the best size is led out of it."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from forcegrasp.diagnosis import look_beside as module
+from forcegrasp.diagnosis.look_beside import look_beside
+
+TRUE, READINGS = 8.0, 50
+
+
+def _fit(size: float, follows_motion: bool = True) -> SimpleNamespace:
+    """A fit that is stuck at a size: another parameter shifts all readings alike, which the size does not."""
+    residual = np.linspace(-1, 1, READINGS).reshape(1, READINGS, 1) * 10 * (size - TRUE)
+    return SimpleNamespace(
+        problem=SimpleNamespace(
+            effects=[SimpleNamespace(effect=SimpleNamespace(follows_motion=follows_motion))],
+            first_entry=lambda _: 1,
+            entries=[None, SimpleNamespace(low=0.0, high=10.0, coordinate=lambda value: value)],
+            case=lambda vector: vector,
+        ),
+        vector=np.array([0.0, size]),
+        values=np.array([0.0, size]),
+        weight=np.ones((1, 1, 1)),
+        residual=residual,
+        slopes=np.ones((READINGS, 2)),
+        cost=float(np.sum(residual**2)),
+    )
+
+
+@pytest.fixture
+def looked(monkeypatch) -> list[float]:
+    """Sizes that were simulated."""
+    seen: list[float] = []
+
+    def predict(_, cases):
+        seen.extend(case[1] for case in cases)
+        return np.stack([_fit(case[1]).residual + 3.0 for case in cases])  # the other parameter makes up for the 3
+
+    monkeypatch.setattr(module, "predict", predict)
+    monkeypatch.setattr(module, "fit_exactly", lambda target, problem, simulators, start: _fit(start[1]))
+    return seen
+
+
+def test_it_goes_to_better_sizes_for_as_long_as_there_are_any(looked):
+    found = look_beside(_fit(8.7), SimpleNamespace(residual=lambda signals: signals), SimpleNamespace(exact=None))
+    assert found.values[1] == pytest.approx(TRUE, abs=0.05)
+    assert len(looked) == 3 * 6
+
+
+def test_it_stays_where_no_size_is_better(looked):
+    fit = _fit(8.001)
+    assert look_beside(fit, SimpleNamespace(residual=lambda signals: signals), SimpleNamespace(exact=None)) is fit
+    assert len(looked) == 6
+
+
+def test_effects_that_change_smoothly_cost_nothing(looked):
+    fit = _fit(8.7, follows_motion=False)
+    assert look_beside(fit, SimpleNamespace(), SimpleNamespace()) is fit
+    assert looked == []
