@@ -39,7 +39,7 @@ def look_beside(fit: Fit, target: Target, simulators: Simulators) -> Fit:
         costs = np.sum(Background(fit, (), without=index).remove(left) ** 2, axis=0)
         if costs.min() > fit.cost - _WORTH:
             break
-        again = fit_exactly(target, problem, simulators, starts[costs.argmin()])
+        again = fit_exactly(target, problem, simulators, starts[costs.argmin()], fit.jacobian)
         if again.cost > fit.cost - _WORTH:
             break
         fit = again

@@ -17,6 +17,8 @@ from forcegrasp.short_repr import ShortRepr
 # At its best size an effect promises nearly what a fit will gain, and fitted to few grasps what it gains on all: one
 # with less than this share of the best gain has lost.
 _LOST, _LOST_IF_FITTED = 0.4, 0.7
+#: A rough fit whose cost is no smaller share of another's is no better; rough ones end within a tenth of that.
+NO_BETTER = 0.99
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -51,7 +53,8 @@ def refine(scores: Sequence[Score], study: Study, fit: Fit, background: Backgrou
     if some is study:
         return [Refined(score, one) for (_, score), one in zip(pairs, fits, strict=True)]
     refined = []
-    for i in _in_the_race([part.cost - one.cost for one in fits], _LOST_IF_FITTED):
+    racing = _in_the_race([part.cost - one.cost for one in fits], _LOST_IF_FITTED)
+    for i in (i for i in racing if not _adds_nothing(fits[i], fits)):
         few, setting = fits[i], fits[i].problem.case(fits[i].vector).effects[-1]
         start = fit.moved(part.problem, few.vector[: len(part.problem)])
         study.progress(f"refitting with {setting.effect.name} {setting.variant} on all grasps")
@@ -63,6 +66,12 @@ def _in_the_race(gains: Sequence[float], least: float) -> list[int]:
     """Indices of the gains that are no less than this share of the best; not of those that are not known."""
     best = max((gain for gain in gains if np.isfinite(gain)), default=np.inf)
     return [i for i, gain in enumerate(gains) if gain >= min(best, least * best)]
+
+
+def _adds_nothing(fit: Fit, others: Sequence[Fit]) -> bool:
+    """Whether an effect, the last of a fit, leaves as much as one that it contains; it may take its place later."""
+    contained = {nested.effect for nested in fit.problem.effects[-1].effect.contains}
+    return any(one.problem.effects[-1].effect.name in contained and NO_BETTER * one.cost < fit.cost for one in others)
 
 
 def _fit_from(start: np.ndarray, setting: EffectSetting, study: Study, fit: Fit) -> Fit:

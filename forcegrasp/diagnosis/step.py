@@ -21,7 +21,7 @@ from forcegrasp.diagnosis.evidence import (
 from forcegrasp.diagnosis.look_beside import look_beside
 from forcegrasp.diagnosis.noise_check import unexpected_noise
 from forcegrasp.diagnosis.other_starts import other_starts
-from forcegrasp.diagnosis.refine import refine
+from forcegrasp.diagnosis.refine import NO_BETTER, refine
 from forcegrasp.diagnosis.result import Candidate, Step
 from forcegrasp.diagnosis.screen import MAX_GAIN_FACTOR, Screen
 from forcegrasp.diagnosis.signatures import Background, Score
@@ -40,8 +40,6 @@ LEAST_GAIN, LEAST_GAIN_AT_FLOOR = 0.02, 0.1
 _REFITTED = 5
 # Of these the best ones are fitted to the end.
 _REFINED = 3
-# A rough fit whose cost is no smaller share of another's is no better; rough ones end within a tenth of that.
-_NO_BETTER = 0.99
 # An error of so many times the noise leaves nothing to look for; beyond the other, no start will find it.
 _ALL_FITTED, _FAR = 1.05, 10.0
 
@@ -94,7 +92,7 @@ def _leaves_more(fit: Fit, target: Target) -> bool:
 
 def _as_good(best: Candidate, others: Sequence[Candidate]) -> list[Candidate]:
     """Those of the other variants of an effect that rough fits can't tell from the best one."""
-    return [one for one in others if not one.replaces and _NO_BETTER * one.fit.cost < best.fit.cost]
+    return [one for one in others if not one.replaces and NO_BETTER * one.fit.cost < best.fit.cost]
 
 
 class _Start:
@@ -193,7 +191,7 @@ class _Start:
         """Whether a richer effect promises nothing beyond one that it contains, which leaves only noise."""
         return (
             any(nested.effect == simple.effect.name for nested in richer.effect.contains)
-            and richer.fit.cost > _NO_BETTER * rough[simple.effect.name].cost
+            and richer.fit.cost > NO_BETTER * rough[simple.effect.name].cost
             and not excess(self._study.heldout(simple.fit), self._study.numerical, self._study.target)
         )
 
@@ -226,7 +224,8 @@ class _Start:
 
     def _to_the_end(self, rough: Fit) -> Fit:
         target, simulators = self._study.target, self._study.simulators
-        exact = look_beside(fit_exactly(target, rough.problem, simulators, rough.vector), target, simulators)
+        exact = fit_exactly(target, rough.problem, simulators, rough.vector, rough.jacobian)
+        exact = look_beside(exact, target, simulators)
         if _leaves_more(exact, target):
             exact = fit_past_few(exact, target, simulators)
         if not _leaves_more(exact, target):
@@ -240,7 +239,7 @@ class _Start:
             for start in (part.vector, *other_starts(part, some))
         )
         best = min(others, key=lambda fit: fit.cost, default=own)
-        if best.cost > _NO_BETTER * own.cost:
+        if best.cost > NO_BETTER * own.cost:
             return exact
         again = fit_exactly(target, exact.problem, simulators, exact.moved(best.problem, best.vector))
         return min([exact, again], key=lambda fit: fit.cost)

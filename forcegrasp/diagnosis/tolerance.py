@@ -167,7 +167,8 @@ def wanted_moves(measured: MeasurementSet, target: Target, fit: Fit, worth: floa
     for _ in range(_STEPS - 1):
         grasps = tuple(moved.put(g) for g in measured.grasps)
         problem = Problem(fit.problem.gripper, grasps, fit.problem.effects)
-        fit = fit_once(dataclasses.replace(target, grasps=grasps), problem, Simulators(problem), fit.vector, rounds=1)
+        simulators, of_moved = Simulators(problem), dataclasses.replace(target, grasps=grasps)
+        fit = fit_once(of_moved, problem, simulators, fit.vector, fit.correction, rounds=1)
         before = moved.deviations
         moved, _ = _step(fit, _columns(target, fit, moved.numbers), moved.numbers, None, before)
         if np.abs(moved.deviations - before).max() < _SETTLED:

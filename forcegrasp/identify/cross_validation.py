@@ -7,7 +7,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from forcegrasp.identify.fit import Fit
+from forcegrasp.identify.fit import Fit, cheap_tier
 from forcegrasp.identify.predict import predict
 from forcegrasp.identify.target import Target
 from forcegrasp.measure.schema import MeasuredGrasp
@@ -108,12 +108,17 @@ def _heldout_residual(fit: Fit, target: Target, folds: Sequence[np.ndarray]) -> 
 
 
 def _simulate(fit: Fit, target: Target, doubtful: list[tuple[np.ndarray, np.ndarray]], held: np.ndarray) -> None:
-    """Replaces residuals of folds by simulated ones, of the longest step that lowers the error of the others."""
-    problem, replay = fit.problem, Replay(fit.problem.gripper, fit.problem.grasps)
+    """Replaces residuals of folds by simulated ones, of the longest step that lowers the error of the others.
+
+    The cheap model simulates them: by how much it is off is known where the fit ended, and steps are small.
+    """
+    problem = fit.problem
+    replay = Replay(problem.gripper, problem.grasps, cheap_tier(problem.gripper))
     squares = np.sum((fit.weight * fit.residual) ** 2, axis=(1, 2))
     for scale in _SHARES:
         vectors = [np.clip(fit.vector + scale * step, problem.low, problem.high) for _, step in doubtful]
-        residuals = target.residual(predict(replay, [problem.case(vector) for vector in vectors]))
+        signals = predict(replay, [problem.case(vector) for vector in vectors]) + fit.correction
+        residuals = target.residual(signals)
         left = []
         for (fold, step), residual in zip(doubtful, residuals, strict=True):
             others = np.delete(np.sum((fit.weight * residual) ** 2, axis=(1, 2)), fold)

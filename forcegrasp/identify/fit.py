@@ -24,8 +24,8 @@ STEP, LARGE_STEP = 0.02, 0.06
 # Relative change of the cost at which a fit ends, one that only ranks, and the most evaluations until then.
 _TOLERANCE, _ROUGH, _EVALUATIONS = 1e-4, 1e-3, 15
 # A step that makes the cost rise by this share of what one reading costs ends a fit, or one as small as this, in
-# coordinates: that contacts are rough is all it says.
-_FLAT, _SMALLEST_STEP = 0.1, STEP / 20
+# coordinates, or so many one after the other: that contacts are rough is all they say.
+_FLAT, _SMALLEST_STEP, _FAILED = 0.1, STEP / 20, 2
 # Where a fit ended it goes on if slopes measured there promise to lower the cost by this share of one reading's; but
 # not so many times the noise off, where the model is wrong by more than that.
 _WORTH, _NEAR = 0.5, 2.0
@@ -254,16 +254,19 @@ def _descend_once(
 
     problem = local.problem
     tolerance, flat = (_ROUGH, _ROUGH) if rough else (_TOLERANCE, _FLAT / max(local.target.readings, 1))
-    best, count = (start, np.inf, np.empty(0)), 0
+    best, count, failed = (start, np.inf, np.empty(0)), 0, 0
 
     def residual(part: np.ndarray) -> np.ndarray:
-        nonlocal best, count
+        nonlocal best, count, failed
         vector = whole(part)
         residual = _left(local, vector, shift)
         cost, count = float(residual @ residual), count + 1
         if cost < best[1]:
-            best = vector, cost, local.value(vector)
-        elif cost < (1 + flat) * best[1] or np.abs(vector - best[0]).max() < _SMALLEST_STEP:
+            best, failed = (vector, cost, local.value(vector)), 0
+            return -residual
+        failed += 1
+        small = cost < (1 + flat) * best[1] or np.abs(vector - best[0]).max() < _SMALLEST_STEP
+        if small or (failed == _FAILED and not rough):  # a rough one may be far off, where steps are long
             raise _SettledError
         return -residual
 

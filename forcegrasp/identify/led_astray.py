@@ -43,12 +43,12 @@ def _once(fit: Fit, target: Target, simulators: Simulators) -> Fit:
         return fit
     part = fit.subset(others)
     of_others = Simulators(part.problem, exact=simulators.one_model)
-    alone = fit_exactly(target.subset(others), part.problem, of_others, part.vector)
+    alone = fit_exactly(target.subset(others), part.problem, of_others, part.vector, part.jacobian)
     start = _own_anew(fit, left_out, alone, target, simulators)
     residual = target.residual(predict(simulators.exact, [fit.problem.case(start)])[0])
     if np.sum((fit.weight * residual) ** 2) >= fit.cost:
         return fit
-    again = fit_exactly(target, fit.problem, simulators, start)
+    again = fit_exactly(target, fit.problem, simulators, start, fit.jacobian)
     return min([fit, again], key=lambda one: one.cost)
 
 

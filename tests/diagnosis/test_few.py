@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import dataclasses
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
 
 from forcegrasp.diagnosis import signatures
 from forcegrasp.diagnosis.few import few_grasps, with_few
-from forcegrasp.diagnosis.refine import _in_the_race
+from forcegrasp.diagnosis.refine import _adds_nothing, _in_the_race
 from forcegrasp.diagnosis.screen import Screen
 from forcegrasp.diagnosis.signatures import Background
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.effects import get_effect
+from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.identify.fit import Fit, Simulators
 from forcegrasp.identify.problem import Problem
 from forcegrasp.identify.target import Target
@@ -82,6 +83,18 @@ def test_few_grasps_are_ranked_by_with_the_largest_steps(many):
 )
 def test_what_gains_far_less_on_few_grasps_has_lost(gains, kept):
     assert _in_the_race(gains, 0.7) == kept
+
+
+@pytest.mark.parametrize(
+    ("name", "cost", "lost"), [("stiction", 99.5, True), ("stiction", 98.0, False), ("force_lag", 99.5, False)]
+)
+def test_what_adds_nothing_to_an_effect_that_it_contains_is_not_fitted_on_all(name, cost, lost):
+    simple, one = (
+        cast(Any, SimpleNamespace(cost=cost, problem=SimpleNamespace(effects=[EffectSetting.typical(get_effect(of))])))
+        for of, cost in (("coulomb_friction", 100.0), (name, cost))
+    )
+    assert _adds_nothing(one, [one, simple]) is lost
+    assert not _adds_nothing(simple, [one, simple])
 
 
 def test_few_grasps_stay_until_they_do_not_show_what_is_left(many):

@@ -28,6 +28,7 @@ def _fit(size: float, follows_motion: bool = True) -> SimpleNamespace:
         weight=np.ones((1, 1, 1)),
         residual=residual,
         slopes=np.ones((READINGS, 2)),
+        jacobian=np.ones((1, READINGS, 1, 2)),
         cost=float(np.sum(residual**2)),
     )
 
@@ -42,7 +43,7 @@ def looked(monkeypatch) -> list[float]:
         return np.stack([_fit(case[1]).residual + 3.0 for case in cases])  # the other parameter makes up for the 3
 
     monkeypatch.setattr(module, "predict", predict)
-    monkeypatch.setattr(module, "fit_exactly", lambda target, problem, simulators, start: _fit(start[1]))
+    monkeypatch.setattr(module, "fit_exactly", lambda target, problem, simulators, start, slopes: _fit(start[1]))
     return seen
 
 

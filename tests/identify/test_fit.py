@@ -20,6 +20,7 @@ from forcegrasp.diagnosis.signatures import Background, Score, Signatures, best_
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.effects import get_effect
 from forcegrasp.effects.setting import EffectSetting
+from forcegrasp.identify import cross_validation
 from forcegrasp.identify import fit as fit_module
 from forcegrasp.identify.base_fit import BaseFit, check_gradient, fit_base, rms_error
 from forcegrasp.identify.cross_validation import heldout_residual, make_folds, rms
@@ -365,6 +366,27 @@ def test_a_right_model_leaves_nothing_and_a_wrong_one_does(fitted):
         fit_once(measure(BIAS)[0], fitted.problem, fitted.simulators, fit.vector), measure(BIAS)[0], folds
     )
     assert excess(off, left, target) != ""
+
+
+def test_a_folds_simulated_step_gives_what_the_model_itself_gives(fitted, monkeypatch):
+    """Though the cheap one simulates it: by how much that is off is known where the fit ended."""
+    fit, target, seen = dataclasses.replace(fitted.fit), fitted.target, []
+
+    def watched(replay: Replay, cases: list[Case]) -> np.ndarray:
+        seen.extend(cases)
+        assert replay.tier == "fitting"
+        return predict(replay, cases)
+
+    monkeypatch.setattr(cross_validation, "_COUNTS_NEAR", -1.0)
+    monkeypatch.setattr(cross_validation, "predict", watched)
+    folds = make_folds(target.grasps)
+    held = heldout_residual(fit, target, folds)
+    itself = target.residual(predict(fitted.simulators.exact, seen[: len(folds)]))
+    expected = np.concatenate([one[fold] for one, fold in zip(itself, folds, strict=True)])
+    order = np.concatenate(folds)
+    same = np.abs(held[order] - fit.residual[order]).max(axis=(1, 2)) > 0  # whose step lowered the others' error
+    assert same.any()
+    assert rms((held[order] - expected)[same], target.subset(order[same])) < 0.05
 
 
 # --- a whole diagnosis ---------------------------------------------------------------------------------------------

@@ -20,7 +20,7 @@ def past_few(made_up, monkeypatch):
     def run(fit: Fit, missed: float) -> tuple[Fit, list[int]]:
         asked: list[int] = []
 
-        def fit_exactly(target, problem, simulators, start) -> Fit:
+        def fit_exactly(target, problem, simulators, start, slopes) -> Fit:
             asked.append(len(target.grasps))
             alike = made_up.base.fit.subset(np.arange(len(target.grasps)))
             return dataclasses.replace(alike, problem=problem, vector=start, residual=0 * alike.residual)

@@ -68,7 +68,17 @@ def test_it_does_not_go_on_with_ever_smaller_steps(roughness, rough, monkeypatch
     assert descended(Line(roughness), vector, rough)[1] == 2  # where it is, and one step that leads nowhere
     monkeypatch.setattr(fit, "_SMALLEST_STEP", 0.0)
     monkeypatch.setattr(fit, "_FLAT", -1.0)
-    assert descended(Line(roughness), np.full(2, 0.5), rough)[1] >= count + (not rough)
+    assert descended(Line(roughness), np.full(2, 0.5), rough)[1] > count
+
+
+@pytest.mark.parametrize(("rough", "fewer"), [(False, 2), (True, 0)])
+def test_two_steps_that_fail_one_after_the_other_end_it(rough, fewer, monkeypatch):
+    monkeypatch.setattr(fit, "_SMALLEST_STEP", 0.0)
+    monkeypatch.setattr(fit, "_FLAT", -1.0)
+    vector, count = descended(Line(0.1), np.full(2, 0.5), rough)
+    np.testing.assert_allclose(vector, TRUE, atol=0.005)
+    monkeypatch.setattr(fit, "_FAILED", 99)
+    assert descended(Line(0.1), np.full(2, 0.5), rough)[1] == count + fewer  # rough fits have few steps to begin with
 
 
 @pytest.mark.parametrize("roughness", [0.0, 0.05])
