@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .scene import FINGER_KG, GUIDE_DAMPING, OPEN_M, PAD_FACE_M, ROTOR_KG, STEP_S, Servo
+from .scene import FINGER_KG, GUIDE_DAMPING, OPEN_M, ROTOR_KG, STEP_S, Servo
 
 _OBJECT_KG = 0.4
 _REFERENCE_N, _SINK = 0.15, 0.24  # a pad sinks in by SINK · rho under this force, as in MuJoCo
@@ -36,7 +36,7 @@ class PenaltyPlant:
     def step(self, setpoint: np.ndarray, finger: np.ndarray, press: np.ndarray, table: np.ndarray) -> None:
         """One physics step: forces at the old state, then velocities, then positions."""
         side = np.array([1.0, -1.0])  # the left finger pushes the object towards +y
-        depth = np.maximum(0.0, self._radius - self.q - PAD_FACE_M - side * self.o[:, None])
+        depth = np.maximum(0.0, self._radius - self.q - side * self.o[:, None])
         rate = -self.v - side * self.ov[:, None]
         spring = _REFERENCE_N * (depth / self._sink) ** self._power
         self.touch = spring * np.maximum(0.0, 1.0 + _DAMPING_S_PER_M * rate) + press

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .scene import OPEN_M, PAD_FACE_M, SAMPLE_S, Servo
+from .scene import OPEN_M, SAMPLE_S, Servo
 
 
 @dataclass(frozen=True)
@@ -137,10 +137,9 @@ def _commands(rng: np.random.Generator, plan: str, index: int, radius: float, sa
     if plan not in styles:
         raise ValueError(f"no plan {plan!r}: choose one of {sorted(styles)}")
     moves = styles[plan][index % len(styles[plan])](rng)
-    touch = radius - PAD_FACE_M
     path = [OPEN_M] * int(rng.integers(3, 9))
     for squeeze, speed, pause in moves:
-        target = OPEN_M if squeeze is None else touch - squeeze
+        target = OPEN_M if squeeze is None else radius - squeeze
         way = target - path[-1]
         steps = max(1, int(np.ceil(abs(way) / (speed * SAMPLE_S))))
         path += [*(path[-1] + way * np.arange(1, steps + 1) / steps), *[target] * round(pause / SAMPLE_S)]

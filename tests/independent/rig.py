@@ -21,7 +21,7 @@ from .effect import Effect, State
 from .noises import NOISES
 from .penalty import PenaltyPlant
 from .plan import Setup, draw_setup
-from .scene import PAD_FACE_M, SAMPLE_S, STEP_S, MujocoPlant, Servo
+from .scene import SAMPLE_S, STEP_S, MujocoPlant, Servo
 from .spoiled import SPOILED, Sheet
 
 __all__ = ["CATALOGUE", "OTHERWISE", "OUTSIDE", "VARIANTS", "Recording", "Truth", "draw_setup", "record", "simulate"]
@@ -209,7 +209,7 @@ class _Hand:
         s, plant = self.state, self.plant
         s.o, s.ov, s.f, s.load = plant.o, plant.ov, plant.touch * self._gain, plant.load
         # The left finger meets the object's lower side along y, the right one its upper side.
-        s.depth = self._radius - plant.q - PAD_FACE_M - s.o[:, None] * [1.0, -1.0]
+        s.depth = self._radius - plant.q - s.o[:, None] * [1.0, -1.0]
 
 
 def _parameters(effect: Effect) -> dict[str, float]:

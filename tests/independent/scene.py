@@ -13,7 +13,6 @@ SAMPLE_S = 0.04
 OPEN_M = 0.045
 MOTOR_LIMIT_N = 1.0
 FINGER_KG, ROTOR_KG, GUIDE_DAMPING = 0.10998, 0.1, 1.0
-PAD_FACE_M = 0.0003  # the foremost pad's face lies this far outside the joint's position
 
 _MAX_CONTACTS = 40  # per finger: multiccd finds several points per pair
 
@@ -58,7 +57,7 @@ _MOTOR = """
          ctrllimited="true" ctrlrange="0 0.045" forcelimited="true" forcerange="-{limit} {limit}"/>
 """
 
-# x, distance of the centre from the joint's position, z; half sizes
+# x, distance of the centre from the joint's position, z; half sizes. The four small ones touch first, at that position.
 _PADS = [((0.002, 0.0033, 0.0), (0.017, 0.003, 0.017))] + [
     ((x, 0.003, z), (0.0085, 0.003, 0.0085)) for x in (-0.0065, 0.0105) for z in (0.0085, -0.0085)
 ]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import dataclasses
 import json
 import os
 from collections.abc import Callable
@@ -45,6 +46,19 @@ def rig(name: str = "", size: str = "medium", pace: int = 1, **parameters: float
     """The little grasp, without noise, with one effect."""
     chosen = {name: parameters or size} if name else {}
     return simulate(little_setup(pace), build_effects(chosen), contact="penalty", noise="none")
+
+
+@pytest.mark.parametrize("contact", ["mujoco", "penalty"])
+def test_pads_press_as_soon_as_they_are_inside_the_outline(contact: str) -> None:
+    """What effects in the contact call the depth, too."""
+    path = np.linspace(0.0256, 0.0236, 100)  # slowly
+    commands = np.repeat(path[None, :, None], 2, axis=2)
+    one = {"thing": np.zeros(1, int), "offset": np.zeros(1), "session": np.ones(1, int)}
+    setup = dataclasses.replace(little_setup(), **one, commands=commands)
+    run = simulate(setup, {}, contact=contact, noise="none")
+    inside = 0.025 - run.q[0]
+    assert np.all(run.f[0][inside < -1e-5] == 0)
+    assert np.all(run.f[0][inside > 1e-4] > 0)
 
 
 def test_null_effects_change_no_bit() -> None:
@@ -118,7 +132,8 @@ def test_symptoms_of_the_drive() -> None:
     assert np.all(lagging.q[:, NEAR + 1 : NEAR + 5] > plain.q[:, NEAR + 1 : NEAR + 5])
     np.testing.assert_allclose(lagging.q[0, settled], plain.q[0, settled], atol=2e-5)
     limited = rig("force_limit", limit=0.05)
-    np.testing.assert_allclose(limited.f[0, EASE], 0.05 * F_ALPHA, rtol=0.1)
+    swings = limited.f[0, EASE - 8 : EASE]  # a pad bounces long on an object that is damped so little
+    np.testing.assert_allclose(swings.mean(axis=0), 0.05 * F_ALPHA, rtol=0.1)
     assert np.all(plain.f[0, EASE] > 0.06 * F_ALPHA)
 
 
