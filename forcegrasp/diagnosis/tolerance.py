@@ -161,7 +161,7 @@ def wanted_moves(measured: MeasurementSet, target: Target, fit: Fit, worth: floa
     groups = [kinds for kinds in _GROUPS if any(number.kind in kinds for number in numbers)]
     steps = [_step(fit, columns, numbers, kinds) for kinds in groups]
     explained = [fit.cost - left - 2 * moved.price for moved, left in steps]
-    if max(explained) < worth * (fit.cost - target.readings):
+    if max(explained) <= max(worth * (fit.cost - target.readings), 0.0):  # noise may leave less than it should
         return None
     moved, _ = next(one for one, share in zip(steps, explained, strict=True) if share > _NEARLY * max(explained))
     for _ in range(_STEPS - 1):

@@ -257,6 +257,15 @@ def test_given_more_exactly_it_does_not_move(sound):
     assert moved.price > len(moved.moves) == len({g.object for g in measured.grasps}) + len(measured.grasps)
 
 
+def test_where_noise_leaves_less_than_it_should_nothing_moves(sound):
+    loaded, model = sound
+    target, _, base = apply_model(loaded, model, silent, refit=True)
+    calm = dataclasses.replace(base.fit, residual=0.9 * base.fit.residual)
+    assert calm.cost < target.readings
+    assert move_given(loaded.measured, target, calm) is None
+    assert move_given(loaded.measured, target, dataclasses.replace(calm, residual=0 * calm.residual)) is None
+
+
 @functools.cache
 def late(delay_s: float) -> Loaded:
     """The same grasps with commands that act late."""

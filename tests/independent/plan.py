@@ -61,9 +61,11 @@ def _draw_things(rng: np.random.Generator) -> list[Thing]:
 
 
 # A move is (target, speed in m/s, pause in s). The target is the command's squeeze in metres beyond the position at
-# which a centred object is touched; below 0 the pads are clear of it, and None is a fully open hand.
+# which a centred object is felt; below 0 the pads are clear of it, and None is a fully open hand.
 Move = tuple[float | None, float, float]
 _JUMP = 1e9
+# So deep inside the outline an object is felt: before that, soft contacts press next to nothing.
+_FELT_M = 0.0003
 
 
 def _slow_ramp(rng: np.random.Generator) -> Iterator[Move]:
@@ -139,7 +141,7 @@ def _commands(rng: np.random.Generator, plan: str, index: int, radius: float, sa
     moves = styles[plan][index % len(styles[plan])](rng)
     path = [OPEN_M] * int(rng.integers(3, 9))
     for squeeze, speed, pause in moves:
-        target = OPEN_M if squeeze is None else radius - squeeze
+        target = OPEN_M if squeeze is None else radius - _FELT_M - squeeze
         way = target - path[-1]
         steps = max(1, int(np.ceil(abs(way) / (speed * SAMPLE_S))))
         path += [*(path[-1] + way * np.arange(1, steps + 1) / steps), *[target] * round(pause / SAMPLE_S)]
