@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from forcegrasp.diagnosis.signatures import Background
+from forcegrasp.diagnosis.other_starts import costs_without
 from forcegrasp.identify.fit import Fit, Simulators, fit_exactly
 from forcegrasp.identify.predict import predict
 from forcegrasp.identify.target import Target
@@ -35,8 +35,7 @@ def look_beside(fit: Fit, target: Target, simulators: Simulators) -> Fit:
         sizes = np.clip(fit.values[index] * np.array(_MULTIPLES), entry.low, entry.high)
         starts[:, index] = [entry.coordinate(size) for size in sizes]
         signals = predict(simulators.exact, [problem.case(start) for start in starts])
-        left = np.stack([(fit.weight * target.residual(one)).ravel() for one in signals], axis=1)
-        costs = np.sum(Background(fit, (), without=index).remove(left) ** 2, axis=0)
+        costs = costs_without(index, signals, fit, target)
         if costs.min() > fit.cost - _WORTH:
             break
         again = fit_exactly(target, problem, simulators, starts[costs.argmin()], fit.jacobian)

@@ -10,6 +10,7 @@ from forcegrasp.diagnosis.signatures import Background
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.identify.fit import Fit
 from forcegrasp.identify.predict import predict
+from forcegrasp.identify.target import Target
 
 # Sizes that are looked at, as multiples of the one at which the fit ended.
 _MULTIPLES = (0.1, 0.2, 0.35, 0.6, 0.8, 1.25, 1.6, 2.5, 4.0, 8.0)
@@ -45,9 +46,7 @@ def other_starts(fit: Fit, study: Study) -> list[np.ndarray]:
     if not starts:
         return []
     signals = predict(study.simulators.cheap, [problem.case(start) for start in starts]) + fit.correction
-    others = Background(fit, (), without=index)
-    left = np.stack([(fit.weight * study.target.residual(one)).ravel() for one in signals], axis=1)
-    costs = np.sum(others.remove(left) ** 2, axis=0)
+    costs = costs_without(index, signals, fit, study.target)
     double = fit.vector.copy()
     double[index] = entry.coordinate(2 * size)
     base = [e.effect is None and e.parameter not in ("radius_m", "offset_m") for e in problem.entries]
@@ -58,6 +57,19 @@ def other_starts(fit: Fit, study: Study) -> list[np.ndarray]:
     ]  # fmt: skip
     ordered = sorted(valleys, key=lambda i: costs[i])[:_MOST]
     return [*(starts[i] for i in ordered), double, *_other_shapes(fit, index), nominal]
+
+
+def costs_without(index: int, signals: np.ndarray, fit: Fit, target: Target) -> np.ndarray:
+    """Costs of predictions, ``(starts,)``, if all parameters but one make up for what they can, as far as slopes tell.
+
+    Args:
+      index: of the parameter that stays.
+      signals: predictions near the fit, ``(starts, G, S, C)``.
+      fit: whose slopes count.
+      target: the measurements.
+    """
+    left = np.stack([(fit.weight * target.residual(one)).ravel() for one in signals], axis=1)
+    return np.sum(Background(fit, (), without=index).remove(left) ** 2, axis=0)
 
 
 def _other_shapes(fit: Fit, first: int) -> Iterator[np.ndarray]:

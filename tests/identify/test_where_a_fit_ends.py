@@ -78,7 +78,7 @@ def test_two_steps_that_fail_one_after_the_other_end_it(rough, fewer, monkeypatc
     vector, count = descended(Line(0.1), np.full(2, 0.5), rough)
     np.testing.assert_allclose(vector, TRUE, atol=0.005)
     monkeypatch.setattr(fit, "_FAILED", 99)
-    assert descended(Line(0.1), np.full(2, 0.5), rough)[1] == count + fewer  # rough fits have few steps to begin with
+    assert descended(Line(0.1), np.full(2, 0.5), rough)[1] == count + fewer  # rough ones are left to go on
 
 
 @pytest.mark.parametrize("roughness", [0.0, 0.05])
