@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, cast
 from forcegrasp.cli import run_name
 from forcegrasp.cli.one_training import FAILURE, INTERRUPTED, begin_or_resume, check
 from forcegrasp.cli.options import compose, compose_sweep, parse_override, spell_sweep
+from forcegrasp.cli.spelling import quote
 from forcegrasp.errors import ConfigError, ForcegraspError
 
 if TYPE_CHECKING:
@@ -44,26 +45,30 @@ def sweep(overrides: list[str]) -> int:
     def job(composed: DictConfig) -> int:
         return _job(composed)
 
-    quoted = folder.replace("\\", "\\\\").replace("'", "\\'")
-    sys.argv = ["forcegrasp train", "-m", *overrides, f"hydra.sweep.dir='{quoted}'"]
+    sys.argv = ["forcegrasp train", "-m", *overrides, f"hydra.sweep.dir={quote(folder)}"]
     from forcegrasp.runs.lock import only_writer
 
-    with only_writer(Path(folder) / "sweep.lock"):
-        if launcher:
-            print(f"the runs' jobs write to {folder}/.submitit")
-        try:
-            if "hydra/launcher=joblib" in overrides:
-                _side_by_side(job, Path(folder) / STOPPED)
-            else:
-                job()
-        except Exception as error:
-            if type(error).__module__.startswith("submitit."):
-                reason = " ".join(str(error).splitlines()[:2])
-                raise ForcegraspError(f"{reason}; the same sweep typed again goes on") from error
-            raise
-        finally:  # a sweep that was cut short has something to show, too
-            _draw_curves(Path(folder))
+    try:
+        with only_writer(Path(folder) / "sweep.lock"):
+            if launcher:
+                print(f"the runs' jobs write to {folder}/.submitit")
+            try:
+                _side_by_side(job, Path(folder) / STOPPED) if "hydra/launcher=joblib" in overrides else job()
+            finally:  # a sweep that was cut short has something to show, too
+                _draw_curves(Path(folder))
+    except KeyboardInterrupt:
+        print(f"go on with: {_go_on(folder)}")
+        raise
+    except Exception as error:
+        if type(error).__module__.startswith("submitit."):
+            reason = " ".join(str(error).splitlines()[:2])
+            raise ForcegraspError(f"{reason}; go on with: {_go_on(folder)}") from error
+        raise
     return _tell_failures(sorted(Path(folder).rglob(FAILURE)))
+
+
+def _go_on(folder: Path | str) -> str:
+    return f"forcegrasp train -m resume={folder}"
 
 
 def _side_by_side(job: Callable[[], None], stopped: Path) -> None:
@@ -134,7 +139,7 @@ def _job(composed) -> int:
     (path / FAILURE).unlink(missing_ok=True)  # of another job that found this one at work
     if status == INTERRUPTED:
         if launcher.startswith("submitit_"):  # a scheduler ended this job alone
-            raise ForcegraspError(f"{path}: stopped and saved; the same sweep typed again goes on")
+            raise ForcegraspError(f"{path}: stopped and saved; go on with: {_go_on(hydra.sweep.dir)}")
         if launcher == "joblib":  # which would kill the others before they have saved
             stopped.touch()
             return INTERRUPTED

@@ -186,7 +186,13 @@ MISTAKES = [
     (["train", "resume=empty"], "not a run directory"),
     (["train", "resume=file"], "file"),
     (["train", "resume=finished", "seed=3"], "drop seed=3"),
-    (["train", "resume=finished", "-m"], "drop -m"),
+    (
+        ["train", "resume=finished", "-m"],
+        "finished: no sweep is there (no multirun.yaml); a single run is resumed without -m",
+    ),
+    (["train", "resume=nowhere", "-m"], "nowhere: no sweep is there"),
+    (["train", "resume=a_sweep"], "go on with it by forcegrasp train -m resume=a_sweep"),
+    (["train", "resume=odd_sweep", "-m"], "odd_sweep/multirun.yaml: not what a sweep leaves there"),
     (["train", "resume=finished", "resume=finished"], "resume="),
     (["train", "resume=other"], "another configuration"),
     (["train", "resume=broken"], "config.yaml: not a valid configuration"),
@@ -254,6 +260,9 @@ def runs(tmp_path_factory, finished) -> Path:
     config = (folder / "other" / "config.yaml").read_text()
     (folder / "other" / "config.yaml").write_text(config.replace("seed: 0", "seed: 1"))
     (folder / "broken" / "config.yaml").write_text("ppo: [")
+    for name, record in (("a_sweep", "hydra: {overrides: {task: [], hydra: []}}"), ("odd_sweep", "hydra: 3")):
+        (folder / name).mkdir()
+        (folder / name / "multirun.yaml").write_text(record)
     for path in (folder / "damaged" / "checkpoints").iterdir():
         path.write_bytes(path.read_bytes()[:-1] + b"\x01")
     for path in (folder / "started" / "checkpoints").iterdir():

@@ -19,6 +19,7 @@ from joblib.externals.loky import get_reusable_executor
 from forcegrasp.cli.main import main
 from forcegrasp.cli.one_training import begin_or_resume
 from forcegrasp.cli.options import compose
+from forcegrasp.cli.resumed_sweep import typed_again
 from forcegrasp.errors import CheckpointError
 from forcegrasp.runs.lock import only_writer
 from forcegrasp.runs.run_dir import RunDir
@@ -127,13 +128,30 @@ def test_the_same_sweep_again_goes_on(tiny, monkeypatch, capsys):
     for frames in (8, 16, 24):
         assert main(sweep) == 130
         assert RunDir("cut/ib_s1_1").load()[1]["frames"] == frames
-        assert capsys.readouterr().out.count("already trained to the end") == (frames > 8)
+        told = capsys.readouterr().out
+        assert told.count("already trained to the end") == (frames > 8)
+        assert "go on with: forcegrasp train -m resume=cut\n" in told
+        sweep = ["train", "-m", "resume=cut"]
     assert main(sweep) == 0
     assert capsys.readouterr().out.count("already trained to the end") == 1
     assert main(["train", "seed=1", *options, "hydra.run.dir=alone"]) == 0
     assert final(RunDir("cut/ib_s1_1")) == final(RunDir("alone"))
     with pytest.raises(CheckpointError, match="already holds a run"):  # not the same: left alone
         begin_or_resume(Path("alone"), compose("train", [*options, "seed=1", "ppo.epochs=3"]), [])
+
+
+def test_a_sweep_is_typed_again_with_what_is_given_in_its_place(tmp_path):
+    begun = (
+        ["seed=0,1", "sweep=ablation"],
+        ["hydra.sweep.dir=a", "hydra/launcher=joblib", "hydra.launcher.n_jobs=2", "hydra.mode=MULTIRUN"],
+    )
+    record = {"hydra": {"overrides": dict(zip(("task", "hydra"), begun, strict=True))}}
+    (tmp_path / "multirun.yaml").write_text(yaml.safe_dump(record))
+    folder = f"hydra.sweep.dir='{tmp_path}'"
+    assert typed_again(tmp_path, []) == ["seed=0,1", "sweep=ablation", *begun[1][1:3], folder]
+    assert typed_again(tmp_path, ["seed=0,1,2"]) == ["sweep=ablation", *begun[1][1:3], "seed=0,1,2", folder]
+    slurm = ["hydra/launcher=submitit_slurm", "hydra.launcher.partition=cpu"]
+    assert typed_again(tmp_path, slurm) == ["seed=0,1", "sweep=ablation", *slurm, folder]
 
 
 @pytest.mark.usefixtures("undrawn")

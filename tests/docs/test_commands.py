@@ -18,7 +18,7 @@ from forcegrasp.policies import shipped_policies
 from forcegrasp.replay.record import parse_effect
 
 #: Programs of other packages.
-FOREIGN = {"pip", "git", "cd", "tensorboard", ".", "pre-commit", "ray"}
+FOREIGN = {"pip", "git", "cd", "tensorboard", ".", "pre-commit", "ray", "export"}
 #: What a reader of these pages has written before: an experiment, an effect.
 WRITTEN = {"experiment=blind": "experiment=ib", "experiment=ib,blind": "experiment=ib,no_ib"}
 OWN_EFFECTS = {"sensor_curvature"}

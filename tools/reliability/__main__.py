@@ -16,6 +16,7 @@ from tools.reliability.trial import Promise, Trial
 NAMES = (
     "kills",
     "resumes",
+    "sweeps",
     "writers",
     "full_disk",
     "measurements",

@@ -1,0 +1,1 @@
+"""Ray and SLURM tried on two machines, which are namespaces of this one."""
