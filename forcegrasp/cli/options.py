@@ -40,6 +40,25 @@ def compose_run(verb: str, overrides: list[str]) -> tuple[Any, str]:
     return config, _folder("hydra.run.dir", hydra["run"]["dir"])
 
 
+def with_value(config: Any, override: str) -> Any:
+    """A composed configuration with another value of an option that is no group's; Hydra would take fifty times as long.
+
+    Raises:
+      ConfigError: as :func:`compose`.
+    """
+    from omegaconf import OmegaConf
+    from omegaconf.errors import OmegaConfBaseException
+
+    parsed, node = parse_override(override), OmegaConf.structured(config)
+    try:
+        OmegaConf.update(node, parsed.get_key_element(), parsed.value())
+    except OmegaConfBaseException as error:
+        raise ConfigError(_one_line(error)) from error
+    changed = OmegaConf.to_object(node)
+    validate(changed)
+    return changed
+
+
 def compose_sweep(overrides: list[str]) -> tuple[dict[str, str], str]:
     """Returns what the preset of ``sweep`` sweeps (option → its values, as text), and the sweep's folder.
 

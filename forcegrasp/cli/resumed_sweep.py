@@ -11,7 +11,7 @@ from forcegrasp.files import plain_yaml
 
 #: What tells the folder of a sweep.
 RECORD = "multirun.yaml"
-#: Options of one launcher are of no use to another: they are replaced together.
+#: What is typed of Hydra's options, besides the folder. Those of one launcher are of no use to another: they are replaced together.
 _OF_LAUNCHER = ("hydra/launcher", "hydra.launcher.")
 
 
@@ -24,12 +24,13 @@ def typed_again(folder: Path, given: list[str]) -> list[str]:
     record = folder / RECORD
     try:
         begun = plain_yaml.load(record)["hydra"]["overrides"]
-        before = [str(text) for text in (*begun["task"], *begun["hydra"])]
+        of_hydra = [text for text in map(str, begun["hydra"]) if text.startswith(_OF_LAUNCHER)]
+        before = [*map(str, begun["task"]), *of_hydra]
     except FileNotFoundError as error:
         raise ConfigError(f"{folder}: no sweep is there (no {RECORD}); a single run is resumed without -m") from error
     except (OSError, plain_yaml.PlainYamlError, KeyError, TypeError) as error:
         raise ConfigError(f"{record}: not what a sweep leaves there; type the sweep again, with its folder") from error
-    replaced = _keys(given) | {"hydra.mode", "hydra.sweep.dir"}
+    replaced = _keys(given)
     if any(key.startswith(_OF_LAUNCHER) for key in replaced):
         replaced |= {key for key in _keys(before) if key.startswith(_OF_LAUNCHER)}
     kept = [text for text in before if not _keys([text]) & replaced]

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, cast
 
 from forcegrasp.cli import run_name
 from forcegrasp.cli.one_training import FAILURE, INTERRUPTED, begin_or_resume, check
-from forcegrasp.cli.options import compose, compose_sweep, parse_override, spell_sweep
+from forcegrasp.cli.options import compose, compose_sweep, groups, parse_override, spell_sweep, with_value
 from forcegrasp.cli.spelling import quote
 from forcegrasp.errors import ConfigError, ForcegraspError
 
@@ -31,8 +31,7 @@ def sweep(overrides: list[str]) -> int:
     launcher = next((o for o in overrides if o.startswith("hydra/launcher=submitit_")), "")
     if launcher and not find_spec("hydra_plugins.hydra_submitit_launcher"):
         raise ConfigError(f"{launcher} needs an extra: pip install 'forcegrasp[cluster]'")
-    for single in single_runs(overrides):
-        check(compose("train", single))  # refuses bad input before anything is written
+    _check_each(single_runs(overrides))  # refuses bad input before anything is written
     _, folder = compose_sweep(_without_several_values(overrides))
     import hydra
     from hydra.core.global_hydra import GlobalHydra
@@ -46,6 +45,8 @@ def sweep(overrides: list[str]) -> int:
         return _job(composed)
 
     sys.argv = ["forcegrasp train", "-m", *overrides, f"hydra.sweep.dir={quote(folder)}"]
+    if not any(text.startswith("hydra/launcher=") for text in overrides):
+        sys.argv.append("hydra.sweeper.max_batch_size=1")  # else Hydra composes all runs before it begins the first
     from forcegrasp.runs.lock import only_writer
 
     try:
@@ -145,6 +146,17 @@ def _job(composed) -> int:
             return INTERRUPTED
         raise KeyboardInterrupt  # ends the sweep, not just this run
     return status
+
+
+def _check_each(runs: list[list[str]]) -> None:
+    """Raises ConfigError if one of a sweep's values is of no use."""
+    first = compose("train", runs[0])
+    check(first)
+    for single in runs[1:]:
+        for changed in set(single) - set(runs[0]):
+            key = changed.partition("=")[0]
+            plain = key not in groups("train") and not key.startswith("hydra")
+            check(with_value(first, changed) if plain else compose("train", single))
 
 
 def single_runs(overrides: list[str]) -> list[list[str]]:
