@@ -41,7 +41,7 @@ def compose_run(verb: str, overrides: list[str]) -> tuple[Any, str]:
 
 
 def with_value(config: Any, override: str) -> Any:
-    """A composed configuration with another value of an option that is no group's; Hydra would take fifty times as long.
+    """A composed configuration with another value of an option that is no group's, in a twentieth of Hydra's time.
 
     Raises:
       ConfigError: as :func:`compose`.

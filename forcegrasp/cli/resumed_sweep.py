@@ -11,7 +11,7 @@ from forcegrasp.files import plain_yaml
 
 #: What tells the folder of a sweep.
 RECORD = "multirun.yaml"
-#: What is typed of Hydra's options, besides the folder. Those of one launcher are of no use to another: they are replaced together.
+#: What is typed of Hydra's options, besides folders. What one launcher has is of no use to another: it goes with it.
 _OF_LAUNCHER = ("hydra/launcher", "hydra.launcher.")
 
 
