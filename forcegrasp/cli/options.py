@@ -53,7 +53,7 @@ def with_value(config: Any, override: str) -> Any:
     try:
         OmegaConf.update(node, parsed.get_key_element(), parsed.value())
     except OmegaConfBaseException as error:
-        raise ConfigError(_one_line(error)) from error
+        raise ConfigError(f"{override}: {str(error).splitlines()[0]}") from error
     changed = OmegaConf.to_object(node)
     validate(changed)
     return changed
