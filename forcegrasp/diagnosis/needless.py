@@ -7,11 +7,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from forcegrasp.diagnosis.evidence import LEAST_RISE, is_beyond_chance, nearly_as_much
+from forcegrasp.diagnosis.evidence import LEAST_RISE, LEAST_SHARE, is_beyond_chance, nearly_as_much
 from forcegrasp.diagnosis.families import falls_back, fits_as_well, refit_as, refit_without, roughly_without, simpler
 from forcegrasp.diagnosis.result import Step
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.identify.fit import Fit
+from forcegrasp.identify.noise_floor import excess
 
 # Few grasps decide if they ask so many times as clearly for an effect as is enough.
 _SURELY = 10.0
@@ -75,21 +76,34 @@ def simplify(study: Study, steps: Sequence[Step], fit: Fit, given: int) -> tuple
         known = settings.get(step.effects[0])
         if known is None or not known.effect.contains:
             continue
-        without = study.heldout(refit_without(known.effect.name, fit, study))
-        of_richer = _gain(study, without, fit)
+        without, held = study.heldout(refit_without(known.effect.name, fit, study)), study.heldout(fit)
         for nested in known.effect.contains:
             study.progress(f"fitting with {nested.effect} in place of {known.effect.name}")
             less = refit_as(simpler(known, nested, fit.problem.gripper), fit, known.effect.name, study)
-            if nearly_as_much(_gain(study, without, less), of_richer):
+            of_simple = study.heldout(less)
+            nearly = nearly_as_much(_gain(study, without, of_simple), _gain(study, without, held))
+            if nearly and not _asks_for_more(study, of_simple, held):
                 study.progress(f"{nested.effect} is enough")
                 left[left.index(step)], fit = _with_simpler(step, nested.effect, less), less
                 break
     return (left if left == list(steps) else _chained(left, study.error(study.heldout(fit)))), fit
 
 
-def _gain(study: Study, without: np.ndarray, fit: Fit) -> float:
-    """By how much a fit is better on what is held out than one without an effect, whose residuals those are."""
-    return float(np.nansum(study.gains(without, study.heldout(fit))))
+def _gain(study: Study, without: np.ndarray, held: np.ndarray) -> float:
+    """By how much held-out residuals are better than those without an effect."""
+    return float(np.nansum(study.gains(without, held)))
+
+
+def _asks_for_more(study: Study, of_simple: np.ndarray, of_richer: np.ndarray) -> bool:
+    """Whether the search would put the richer effect in the place of the simple one, by the residuals that both leave.
+
+    Beside all that friction explains, say, what only the richer one explains may be little, and yet most of the rest.
+    """
+    return (
+        bool(excess(of_simple, study.numerical, study.target))
+        and is_beyond_chance(study.gains(of_simple, of_richer), LEAST_RISE)
+        and study.explained(of_simple, of_richer) >= LEAST_SHARE
+    )
 
 
 def _chained(steps: Sequence[Step], error: float) -> list[Step]:

@@ -16,6 +16,7 @@ from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.identify.cross_validation import make_folds, rms
 from forcegrasp.identify.fit import Simulators, fit_exactly
 from forcegrasp.identify.fit_set import fit_model
+from forcegrasp.identify.noise_floor import beyond_fit, numerical_error
 from forcegrasp.identify.problem import Problem
 from tests.diagnosis.test_families import jaw_with, silent
 
@@ -29,15 +30,20 @@ def rubbing():
 
 def step_with(rubbing, *names: str):
     """A study, a step that found the last of these effects, and its fit."""
-    loaded, target, simulators, base = rubbing
-    effects = [EffectSetting.typical(effect_of(name, loaded.gripper)) for name in names]
+    return step_of(rubbing, [EffectSetting.typical(effect_of(name, rubbing[0].gripper)) for name in names])
+
+
+def step_of(jaw, effects: list[EffectSetting]):
+    """The same from given sizes."""
+    loaded, target, simulators, base = jaw
     problem = Problem(loaded.gripper, target.grasps, effects)
     start = np.r_[base.fit.vector, problem.start()[len(base.fit.vector) :]]
     fit = fit_exactly(target, problem, Simulators(problem), start)
-    study = Study(target, simulators, make_folds(target.grasps))
+    own_errors = beyond_fit(base.fit, numerical_error(base.fit, target))
+    study = Study(target, simulators, make_folds(target.grasps), own_errors)
     last, error = fit.problem.case(fit.vector).effects[-1], rms(study.heldout(fit), target)
     found = Candidate(last, fit, 0.002, np.ones(4), error, 0.9, 0.5, np.ones(1))
-    return study, Step((names[-1],), (found,), (), 5.0, error), fit
+    return study, Step((last.effect.name,), (found,), (), 5.0, error), fit
 
 
 @pytest.fixture(scope="module")
@@ -101,3 +107,13 @@ def test_what_only_a_richer_effect_has_goes_where_another_found_later_makes_up_f
     assert [one.error_after for one in steps[1:]] == [error, error]
     assert simplify(study, [first, step], fit, 1) == ([first, step], fit)  # it was given
     assert simplify(study, [first], found("stiction")[2], 0)[0] == [first]  # nothing was found after it
+
+
+def test_what_only_a_richer_effect_has_stays_where_most_of_the_rest_is_of_it():
+    """Coulomb's friction explains 97 % of what friction does here, and leaves twice the noise."""
+    loaded = jaw_with("stiction", breakaway_n=0.08, kinetic_share=0.9)
+    stiction, offset = (EffectSetting.typical(effect_of(name, loaded.gripper)) for name in ("stiction", "motor_offset"))
+    stiction.values[:2] = 0.08, 0.9
+    study, step, fit = step_of((loaded, *fit_model(loaded, 0, silent)), [stiction, offset])
+    first = dataclasses.replace(step, effects=("stiction",))
+    assert simplify(study, [first, step], fit, 0) == ([first, step], fit)
