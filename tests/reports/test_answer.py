@@ -66,7 +66,9 @@ def test_a_law_that_was_sought_is_not_proposed_again(made_up, sought):
 
 
 def test_what_is_no_more_than_noise_is_not_given_a_place(made_up):
-    assert shares_sentence(made_up.diagnosis("effect")).endswith("; no more than noise is left.")
+    effect = made_up.diagnosis("effect")
+    assert shares_sentence(effect).endswith("; no more than noise is left.")
+    assert box(effect).shares[-1][0].startswith("noise ")
     assert shares_sentence(made_up.diagnosis("explained")) == ""
 
 
