@@ -8,6 +8,7 @@ from collections.abc import Callable
 import numpy as np
 
 from forcegrasp.errors import MeasurementError
+from forcegrasp.measure.check_commands import correlation
 from forcegrasp.measure.check_liveness import feels, force_noise, without_trend
 from forcegrasp.measure.samples import place
 from forcegrasp.measure.schema import MeasuredGrasp, MeasurementSet, side_of
@@ -59,7 +60,7 @@ def _check_follows(measured: MeasurementSet, motor: int, reach: float) -> None:
         command, position = grasp.command_m[:, motor], grasp.position_m[:, motor]
         if np.ptp(command) < 0.2 * reach or np.ptp(position) < 0.2 * np.ptp(command):
             continue
-        found = [_correlation(position, _held(grasp.time_s, command, grasp.time_s - lag)) for lag in _LAGS]
+        found = [correlation(position, _held(grasp.time_s, command, grasp.time_s - lag)) for lag in _LAGS]
         if min(found) < -0.7 and max(found) < 0.5:
             against.append((min(found), grasp))
     if against and (min(lowest for lowest, _ in against) < -0.9 or len(against) > 1):
@@ -77,7 +78,7 @@ def _check_own_commands(measured: MeasurementSet, reach: float) -> None:
         if np.ptp(apart) < _APART * reach:
             continue
         stand = grasp.position_m[:, 0] - grasp.position_m[:, 1]
-        found = [_correlation(stand, _held(grasp.time_s, apart, grasp.time_s - lag)) for lag in _LAGS]
+        found = [correlation(stand, _held(grasp.time_s, apart, grasp.time_s - lag)) for lag in _LAGS]
         if -min(found) > max(_CROSSED, *found):
             crossed.append(grasp)
         else:
@@ -93,7 +94,7 @@ def _check_own_commands(measured: MeasurementSet, reach: float) -> None:
 def _check_effort(measured: MeasurementSet) -> None:
     """A motor's effort must close while it is commanded to close further than it is, moving or not."""
     behind = np.concatenate([(g.position_m - g.command_m)[:, 0] for g in measured.grasps])
-    if _correlation(np.concatenate([g.force_n[:, 0] for g in measured.grasps]), behind) < -0.5:
+    if correlation(np.concatenate([g.force_n[:, 0] for g in measured.grasps]), behind) < -0.5:
         where = place(measured.path, measured.grasps[0], 0, measured.columns.force[0])
         raise MeasurementError(
             f"{where}: opens while the command is to close; f ≥ 0 presses, multiply them by -1; or q = 0 must be closed"
@@ -219,11 +220,6 @@ def _span(force: np.ndarray) -> tuple[float, float, float]:
     """Low, high and their difference, without the outermost 2 % at either end."""
     low, high = np.quantile(force, (0.02, 0.98)).tolist()
     return low, high, high - low
-
-
-def _correlation(a: np.ndarray, b: np.ndarray) -> float:
-    spread = np.std(a) * np.std(b)
-    return float(np.mean((a - a.mean()) * (b - b.mean())) / spread) if spread > 0 else 0.0
 
 
 def _held(time: np.ndarray, command: np.ndarray, at: np.ndarray) -> np.ndarray:
