@@ -79,7 +79,7 @@ def close(
       start_m: where the fingers start, metres, ``(n,)`` or one for all; open by default.
       tier: physics tier, ``"reference"`` or ``"fast"``.
       period_s: seconds for which each command is held, to the nearest physics step; the gripper's by default.
-      threads: threads of the engine; 0 uses every core.
+      threads: threads of the engine; 0 uses every core that this process may use.
 
     Raises:
       ConfigError: if a parameter is unknown, a value is none that can be simulated, or lengths differ.

@@ -23,7 +23,7 @@ class PhysicsConfig:
         "reference: the paper's physics. fast: sphere for the pads' contact and 8 ms steps, within sensor noise of it",
         choices=("reference", "fast"),
     )
-    threads: int = option(0, "physics threads of engine mujoco; 0 uses every core", low=0, high=4096)
+    threads: int = option(0, "physics threads of engine mujoco; 0 uses every core that it may", low=0, high=4096)
     engine: str = option(
         "mujoco",
         "mujoco: on the CPU. warp: MuJoCo Warp, for thousands of grasps on a GPU, see docs/gpu.md",

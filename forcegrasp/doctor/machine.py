@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import math
 import os
 import shutil
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
-from forcegrasp.doctor import cgroup
+from forcegrasp import cgroup
+from forcegrasp.cores import seen_cores, usable_cores
 from forcegrasp.doctor.finding import Finding, fine, mend, note, warning
 
 #: What a training takes, as measured, and what is little.
@@ -19,20 +19,12 @@ LITTLE_DISK_GB, NO_DISK_GB = 1.0, 0.02
 MEMORY = Path("/proc/meminfo")
 
 
-def usable_cores() -> int:
-    """Cores that this process may run on."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
-
-
 def check_cores() -> Iterator[Finding]:
     """Cores, a container's quota on them, and threads that are asked for."""
-    cores, quota = usable_cores(), cgroup.cpu_quota()
+    cores, quota = seen_cores(), cgroup.cpu_quota()
     if quota is not None and quota < cores:
-        threads = max(1, math.floor(quota))
-        told = f"{cores} are seen, but this container may use {quota:.3g} of them, and threads beyond that only wait"
-        yield warning("cores", told, f"give physics.threads={threads}")
+        told = f"{cores} are seen, of which this container may use {quota:.3g}; the physics takes {usable_cores()}"
+        yield fine("cores", told)
     else:
         yield fine("cores", f"{cores}, all of which the physics uses; torch takes one thread while it trains")
     asked = os.environ.get("OMP_NUM_THREADS")

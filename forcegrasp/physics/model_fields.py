@@ -10,6 +10,7 @@ import mujoco
 import numpy as np
 from mujoco.batch import Batch
 
+from forcegrasp.cores import usable_cores
 from forcegrasp.physics import guard
 from forcegrasp.physics.fast import SPHERE
 from forcegrasp.physics.gripper import Gripper
@@ -31,7 +32,7 @@ class ModelFields(SceneLayout):
       gripper: what is simulated.
       n: number of grasps.
       tier: physics tier, see :meth:`~forcegrasp.physics.gripper.Gripper.compile`.
-      threads: threads of the engine; 0 uses every core.
+      threads: threads of the engine; 0 uses every core that this process may use.
       step_factor: multiplies the physics step.
       other_collisions: uses MuJoCo's other collision code, native for libccd or libccd for native.
 
@@ -52,7 +53,7 @@ class ModelFields(SceneLayout):
         self.dt = float(model.opt.timestep)  #: physics step, seconds
         super().__init__(gripper, model)
         self._prepare(model)
-        self.batch = Batch(model, n, threads)
+        self.batch = Batch(model, n, threads or usable_cores())
         self._fields: dict[str, np.ndarray] = {}
         self._base: dict[str, np.ndarray] = {}
 

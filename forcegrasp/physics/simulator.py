@@ -37,7 +37,7 @@ class GraspSimulator:
     Args:
       n: number of grasps.
       tier: physics tier, ``"reference"`` or ``"fast"``, see :meth:`~forcegrasp.physics.gripper.Gripper.compile`.
-      threads: threads of the engine; 0 uses every core.
+      threads: threads of the engine; 0 uses every core that this process may use.
       variation: draws the gripper's own parameters and effects at each reset; nominal and none by default.
       gripper: what is simulated; the paper's by default.
 

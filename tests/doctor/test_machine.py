@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import tempfile
 from collections import namedtuple
@@ -9,88 +10,26 @@ from pathlib import Path
 
 import pytest
 
-from forcegrasp.doctor import cgroup, machine
+from forcegrasp import cgroup
+from forcegrasp.doctor import machine
 from forcegrasp.doctor.machine import check_cores, check_memory, check_runs_folder
 
 Usage = namedtuple("Usage", "total used free")
 
 
-@pytest.fixture
-def groups(tmp_path, monkeypatch):
-    """``groups(membership, {file: text})``: control groups of a container, none to begin with."""
-    monkeypatch.setattr(cgroup, "MEMBERSHIP", tmp_path / "membership")
-    monkeypatch.setattr(cgroup, "GROUPS", tmp_path / "cgroup")
-
-    def write(membership: str, contents: dict[str, str]) -> None:
-        (tmp_path / "membership").write_text(membership)
-        for name, text in contents.items():
-            path = tmp_path / "cgroup" / name
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_text(text + "\n")
-
-    return write
-
-
-@pytest.mark.parametrize(
-    ("membership", "contents", "quota"),
-    [
-        ("", {}, None),
-        ("0::/", {}, None),
-        ("0::/a/b\n", {"a/b/cpu.max": "max 100000", "a/cpu.max": "150000 100000", "cpu.max": "400000 100000"}, 1.5),
-        ("0::/\n", {"cpu.max": "max 100000"}, None),
-        ("4:cpu,cpuacct:/box\n", {"cpu,cpuacct/box/cpu.cfs_quota_us": "50000"}, None),
-        (
-            "4:cpu,cpuacct:/box\n",
-            {"cpu,cpuacct/box/cpu.cfs_quota_us": "50000", "cpu,cpuacct/box/cpu.cfs_period_us": "100000"},
-            0.5,
-        ),
-        ("1:cpu:/\n0::/\n", {"cpu/cpu.cfs_quota_us": "-1", "cpu/cpu.cfs_period_us": "100000"}, None),
-    ],
-)
-def test_quota(membership, contents, quota, groups):
-    groups(membership, contents)
-    assert cgroup.cpu_quota() == quota
-
-
-@pytest.mark.parametrize(
-    ("membership", "contents", "left"),
-    [
-        ("", {}, None),
-        ("0::/a\n", {"a/memory.max": "1000", "a/memory.current": "400", "memory.max": "max"}, 600),
-        (
-            "0::/a\n",  # the group around it has less left
-            {"a/memory.max": "1000", "a/memory.current": "400", "memory.max": "900", "memory.current": "800"},
-            100,
-        ),
-        (
-            "4:memory:/\n",
-            {"memory/memory.limit_in_bytes": "9223372036854771712", "memory/memory.usage_in_bytes": "5"},
-            None,
-        ),
-        ("4:memory:/\n", {"memory/memory.limit_in_bytes": "900", "memory/memory.usage_in_bytes": "5"}, 895),
-    ],
-)
-def test_memory_of_a_container(membership, contents, left, groups):
-    groups(membership, contents)
-    assert cgroup.memory_left() == left
-
-
 def test_cores(told, monkeypatch):
     monkeypatch.delenv("OMP_NUM_THREADS", raising=False)
-    monkeypatch.setattr(machine, "usable_cores", lambda: 4)
+    monkeypatch.setattr(os, "sched_getaffinity", lambda process: {0, 1, 2, 3})
     monkeypatch.setattr(cgroup, "cpu_quota", lambda: None)
     assert " 4, all of which" in told(check_cores, "fine")
     monkeypatch.setattr(cgroup, "cpu_quota", lambda: 2.5)
-    assert "may use 2.5 of them" in told(check_cores, "warning")
-    assert told(check_cores, "warning").endswith("give physics.threads=2")
-    monkeypatch.setattr(cgroup, "cpu_quota", lambda: 0.5)
-    assert told(check_cores, "warning").endswith("give physics.threads=1")
+    assert "4 are seen, of which this container may use 2.5; the physics takes 2" in told(check_cores, "fine")
 
 
 @pytest.mark.parametrize(("threads", "level"), [("4", "note"), ("64", "warning"), ("0", "warning"), ("all", "warning")])
 def test_openmp(threads, level, monkeypatch):
     monkeypatch.setenv("OMP_NUM_THREADS", threads)
-    monkeypatch.setattr(machine, "usable_cores", lambda: 4)
+    monkeypatch.setattr(os, "sched_getaffinity", lambda process: {0, 1, 2, 3})
     monkeypatch.setattr(cgroup, "cpu_quota", lambda: None)
     cores, openmp = check_cores()
     assert (cores.level, openmp.level) == ("fine", level)

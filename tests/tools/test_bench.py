@@ -51,7 +51,7 @@ def test_levels_count_their_steps(name):
 
 
 def test_program_measures_draws_and_reads_again(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr("tools.bench.__main__.cores", lambda: 1)
+    monkeypatch.setattr("tools.bench.__main__.usable_cores", lambda: 1)
     out, picture = tmp_path / "speed.json", tmp_path / "speed.png"
     small = ("--only", "simulator", "--grasps", "4", "--tiers", "fast", "--repeats", "1", "--seconds", "0")
     assert main([*small, "--scale", "2", "--json", str(out), "--figure", str(picture)]) == 0

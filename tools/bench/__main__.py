@@ -23,13 +23,14 @@ from pathlib import Path
 
 from rich.console import Console
 
+from forcegrasp.cores import usable_cores
 from tools.bench.case import Case, Measured
 from tools.bench.figures import draw
 from tools.bench.history import draw_history, entry, lost
 from tools.bench.learning import LEARNED, TRAININGS
 from tools.bench.levels import LEVELS
 from tools.bench.peers import PEERS, missing
-from tools.bench.results import Results, cores, machine
+from tools.bench.results import Results, machine
 from tools.bench.tables import tables
 from tools.bench.turns import ROOT, learn, measure
 from tools.json_lines import append, read
@@ -103,7 +104,7 @@ class Benchmark:
             for grasps in options.scale or (16, 64, 256, 1024, 4096):
                 results.by_grasps += self._measure([Case(name, tier, grasps, options.threads) for name in levels])
                 self._save()
-            for threads in sorted({*(2**k for k in range(cores().bit_length())), cores()}):
+            for threads in sorted({*(2**k for k in range(usable_cores().bit_length())), usable_cores()}):
                 results.by_threads += self._measure([Case(name, tier, options.grasps, threads) for name in levels])
                 self._save()
         if options.time_to_reward is not None:

@@ -5,12 +5,12 @@ from __future__ import annotations
 import dataclasses
 import importlib.metadata
 import json
-import os
 import platform
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from forcegrasp.cores import usable_cores
 from tools.bench.case import Case, Learning, Measured
 
 #: The level that others are held against.
@@ -63,11 +63,6 @@ class Results:
         return cls(**parts)
 
 
-def cores() -> int:
-    """Cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
 def machine() -> dict[str, Any]:
     """Processor, cores and versions."""
     try:
@@ -81,4 +76,4 @@ def machine() -> dict[str, Any]:
             versions[name] = importlib.metadata.version(name)
         except importlib.metadata.PackageNotFoundError:
             continue
-    return {"processor": processor, "cores": cores(), "python": platform.python_version(), **versions}
+    return {"processor": processor, "cores": usable_cores(), "python": platform.python_version(), **versions}
