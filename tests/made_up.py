@@ -115,7 +115,7 @@ def made_up() -> SimpleNamespace:
         grasp="slow ramp", object="thing 0", gripper="tiago", radius_m=0.02, offset_m=0.0, contact=0.02, squeeze=0.003
     )
     advice = Advice(
-        next_grasp, ("force_bias", "force_drift"), {"slow ramp": 3.0, "long hold": 1.0},
+        next_grasp, (next_grasp,), ("force_bias", "force_drift"), {"slow ramp": 3.0, "long hold": 1.0},
         {"slow ramp": 0.9, "long hold": 0.2}, time, command, predicted,
     )  # fmt: skip
     after_model = model_of(candidates[0].fit, target, loaded, [])

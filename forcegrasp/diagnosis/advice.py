@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from forcegrasp.diagnosis.expected_gain import expected_bits
-from forcegrasp.diagnosis.result import Candidate, Diagnosis
+from forcegrasp.diagnosis.result import Candidate, Diagnosis, kept_steps
 from forcegrasp.identify.fit import Fit
 from forcegrasp.identify.predict import Case, predict
 from forcegrasp.measure.schema import MeasuredGrasp
@@ -27,6 +27,7 @@ class Advice(ShortRepr):
     """The next grasp, and what to expect of it."""
 
     next_grasp: NextGrasp  #: with the set's object that it was worked out for
+    menu: tuple[NextGrasp, ...]  #: all that it was chosen from
     rivals: tuple[str, str]  #: the effects that it tells apart
     differences: dict[str, float]  #: grasp on the menu → rms difference of the rivals' predictions ÷ noise
     bits: dict[str, float]  #: grasp on the menu → what it is expected to tell about which of the two is right, 0 to 1
@@ -50,10 +51,10 @@ class Advice(ShortRepr):
 
 
 def advise(diagnosis: Diagnosis) -> Advice | None:
-    """The next grasp to tell the last step's best effects apart; None if there are no two that explain anything."""
+    """The next grasp to tell the effects of :func:`rivals_of` apart; None where there are none, and of servos."""
     if diagnosis.target.gripper.is_servo:  # the menu is of grasps
         return None
-    rivals = _rivals(diagnosis)
+    rivals = rivals_of(diagnosis)
     if rivals is None:
         return None
     target, gripper = diagnosis.target, diagnosis.target.gripper
@@ -79,6 +80,7 @@ def advise(diagnosis: Diagnosis) -> Advice | None:
     best = max(range(len(menu)), key=lambda k: (round(bits[k], 2), apart[k]))
     return Advice(
         menu[best],
+        tuple(menu),
         (rivals[0].effect.name, rivals[1].effect.name),
         {one.grasp: float(apart[k]) for k, one in enumerate(menu)},
         {one.grasp: bits[k] for k, one in enumerate(menu)},
@@ -137,8 +139,12 @@ def _predict(fit: Fit, replay: Replay, like: int) -> tuple[np.ndarray, np.ndarra
     return value, slopes @ root
 
 
-def _rivals(diagnosis: Diagnosis) -> tuple[Candidate, Candidate] | None:
-    for step in reversed(diagnosis.steps):
-        if len(step.candidates) > 1 and (step.effects or len(diagnosis.steps) == 1):
-            return step.candidates[0], step.candidates[1]
+def rivals_of(diagnosis: Diagnosis) -> tuple[Candidate, Candidate] | None:
+    """Two effects of the last tie; without one, of the last step that found something the best two."""
+    steps = kept_steps(diagnosis.steps) or (diagnosis.steps if len(diagnosis.steps) == 1 else ())
+    tied_last = sorted(steps, key=lambda step: len(step.effects) > 1)
+    for step in reversed(tied_last):
+        tied_first = sorted(step.candidates, key=lambda c: c.effect.name not in step.effects)
+        if len(tied_first) > 1:
+            return tied_first[0], tied_first[1]
     return None
