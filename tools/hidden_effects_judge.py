@@ -17,6 +17,14 @@ OF_THE_MESS = (
 )
 #: Groups where whoever names the kind of effect is right.
 BY_FAMILY = ("law", "contact")
+#: Of effects outside the catalogue for which the library of terms has a law: where it acts, and what is in its term.
+TERMS = {
+    "motor_fade": ("motor", ("memory(abs(command - position)",)),
+    "directional_gain": ("motor", ("* abs(command - position)",)),
+    "rough_guide": ("motor", ("velocity * exp(",)),
+    "curved_force_gain": ("force", ("force * abs(force)", "force ** 3")),
+    "tip_inertia": ("force", ("acceleration",)),
+}
 
 
 def families(names: Collection[str]) -> set[str]:
@@ -63,6 +71,28 @@ def judge(row: dict, right: set[str]) -> str:
     if any(hits[:1]):
         return "first"
     return "in set" if verdict == "one_of" and any(hits) else "wrong" if named else "missed"
+
+
+def has_right_term(row: dict) -> bool | None:
+    """Whether the law that was proposed has the term of what was hidden; None where there is no such term."""
+    if row["group"] != "outside" or row["hidden"][0] not in TERMS:
+        return None
+    (place, texts), law = TERMS[row["hidden"][0]], row.get("law") or {"place": "", "expression": ""}
+    return law["place"] == place and any(text in law["expression"] for text in texts)
+
+
+def settled(row: dict, right: set[str], how: str) -> bool | None:
+    """Whether further grasps, chosen so, left one effect, the right one; None where the set was no right tie.
+
+    Args:
+      row: a result of the campaign.
+      right: as in :func:`judge`.
+      how: "proposed" or "chance".
+    """
+    if row["group"] != "tie" or row["verdict"] != "one_of" or not right & set(row["effects"]):
+        return None
+    last = (row["further"][how] or [{"verdict": "", "effects": []}])[-1]
+    return last["verdict"] == "effect" and set(last["effects"]) == right
 
 
 def _judge_several(row: dict, right: set[str]) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import matplotlib
@@ -12,7 +12,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy.stats import binomtest
 
-from tools.hidden_effects_judge import false_names, judge, named_of, steps_of
+from tools.hidden_effects_judge import false_names, has_right_term, judge, named_of, settled, steps_of
 from tools.measured_code import sentences
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
@@ -55,6 +55,11 @@ def _rate(hits: list[bool]) -> str:
     return f"{sum(hits)} of {len(hits)} ({found.statistic:.0%}; {100 * interval.low:.0f}–{100 * interval.high:.0f} %)"
 
 
+def _known(hits: Iterable[bool | None]) -> str:
+    """The rate of those of which it can be said."""
+    return _rate([hit for hit in hits if hit is not None])
+
+
 def _at_floor(rows: list[dict]) -> str:
     """How often no more than 1.1 × the floor is left."""
     return _rate([r["error_after"] <= 1.1 * r["floor"] for r in rows if "error_after" in r])
@@ -68,6 +73,16 @@ def _several_lines(what: str, rows: list[dict]) -> list[str]:
         f"| {what}: share of them that is named | {_rate(hidden)} |",
         f"| … share of names that are right | {_rate(named)} |",
         f"| … error left at most 1.1 × the floor | {_at_floor(rows)} |",
+    ]
+
+
+def _tie_lines(rows: list[dict]) -> list[str]:
+    """How often few and plain grasps tell one effect, and how often the next grasps that are proposed do."""
+    by_choice = {how: _known(settled(r, set(r["right"]), how) for r in rows) for how in ("proposed", "chance")}
+    return [
+        f"| one effect, 9 grasps that close and hold: right, or in a right set | {_share(rows, 'first', 'in set')} |",
+        f"| … of ties with the right one: it alone is left after two proposed grasps | {by_choice['proposed']} |",
+        f"| … after two of the menu by chance | {by_choice['chance']} |",
     ]
 
 
@@ -135,6 +150,7 @@ def _page(rows: list[dict], planned: int) -> str:
 
     one, plain_none, noisy = of("one", grasps=24), of("none"), of("noise")
     laws, contacts, several, messy = of("law"), of("contact"), of("several"), of("messy")
+    outside, nothing = of("outside"), plain_none + noisy
     fitted = [r for r in rows if r["group"] in ("one", "none") and r["judged"] == "first"]
     inside, counted = _coverage(fitted)
     ratios = [r["error_after"] / r["floor"] for r in one if r["judged"] == "first"]
@@ -182,7 +198,10 @@ def _page(rows: list[dict], planned: int) -> str:
         f"| … called explained | {_share(noisy, 'first')} |",
         f"| a mistake of the set: told as one, or in a tie | {_share(of('spoiled'), 'first', 'in set')} |",
         f"| … an effect named without a doubt | {_share(of('spoiled'), 'wrong')} |",
-        f"| an effect outside the catalogue: called unknown | {_share(of('outside'), 'first')} |",
+        f"| an effect outside the catalogue: called unknown | {_share(outside, 'first')} |",
+        f"| … the library of terms has one for it: a law with that term | {_known(map(has_right_term, outside))} |",
+        f"| nothing hidden, odd noise or not: a law proposed | {_rate([bool(r.get('law')) for r in nothing])} |",
+        *_tie_lines(of("tie")),
         f"| held-out error ÷ floor after adding the right effect, median | {np.median(ratios):.2f} |"
         if ratios
         else None,

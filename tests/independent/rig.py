@@ -9,7 +9,7 @@ import argparse
 import csv
 import json
 from collections.abc import Callable, Iterable
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 from functools import partial, reduce
 from pathlib import Path
 
@@ -24,7 +24,10 @@ from .plan import Setup, draw_setup
 from .scene import SAMPLE_S, STEP_S, MujocoPlant, Servo
 from .spoiled import SPOILED, Sheet
 
-__all__ = ["CATALOGUE", "OTHERWISE", "OUTSIDE", "VARIANTS", "Recording", "Truth", "draw_setup", "record", "simulate"]
+__all__ = [
+    "CATALOGUE", "OTHERWISE", "OUTSIDE", "VARIANTS", "Recording", "Truth", "draw_setup", "record", "record_one_more",
+    "simulate",
+]  # fmt: skip
 
 POSITION_STD_M, FORCE_STD_N = 2.7e-5, 0.013
 
@@ -93,11 +96,7 @@ def record(
     setup = draw_setup(seed, grasps, plan, samples)
     hidden = build_effects(effects or {})
     recording = simulate(setup, hidden, seed, contact, noise, jitter_s)
-    sheet = Sheet(
-        SAMPLE_S, [setup.things[i].name for i in setup.thing], setup.per_grasp("radius"), setup.offset,
-        setup.commands, recording.q, recording.f,
-    )  # fmt: skip
-    _write(folder, SPOILED[spoiled](sheet, np.random.default_rng([seed, 4])), setup.session)
+    _write(folder, SPOILED[spoiled](_sheet(setup, recording), np.random.default_rng([seed, 4])), setup.session)
     placed = zip(setup.thing, setup.offset, setup.session, strict=True)
     truth = Truth(
         seed, plan, contact, setup.servo.gain, setup.servo.b2,
@@ -108,6 +107,33 @@ def record(
     )  # fmt: skip
     folder.with_name(folder.name + ".truth.json").write_text(json.dumps(asdict(truth), indent=1))
     return truth
+
+
+def record_one_more(
+    folder: str | Path, truth: Truth, thing: str, offset: float, commands: np.ndarray, noise_seed: int
+) -> None:
+    """Writes a set of one more grasp by the hand that recorded a set.
+
+    Args:
+      truth: of that set; only white noise, and time stamps without jitter.
+      thing: name of the object.
+      offset: where it stands, metres.
+      commands: ``(samples, 2)``, metres.
+      noise_seed: of the readings' noise; another one than the set's.
+    """
+    setup = draw_setup(truth.seed, len(truth.grasps), truth.plan, len(commands))
+    index = [t.name for t in setup.things].index(thing)
+    places = {"thing": np.array([index]), "offset": np.array([offset]), "session": np.array([1])}
+    setup = replace(setup, **places, commands=np.asarray(commands)[None])
+    recording = simulate(setup, build_effects(dict(truth.effects)), noise_seed, truth.contact)
+    _write(Path(folder), _sheet(setup, recording), setup.session)
+
+
+def _sheet(setup: Setup, recording: Recording) -> Sheet:
+    return Sheet(
+        SAMPLE_S, [setup.things[i].name for i in setup.thing], setup.per_grasp("radius"), setup.offset,
+        setup.commands, recording.q, recording.f,
+    )  # fmt: skip
 
 
 def simulate(

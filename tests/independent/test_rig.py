@@ -17,7 +17,7 @@ import yaml
 from .catalogue import CATALOGUE, CLASSES, OTHERWISE, OUTSIDE, VARIANT_OF, VARIANTS, build_effects
 from .noises import NOISES
 from .plan import Setup, Thing, draw_setup
-from .rig import FORCE_STD_N, PLANTS, POSITION_STD_M, record, simulate
+from .rig import FORCE_STD_N, PLANTS, POSITION_STD_M, record, record_one_more, simulate
 from .scene import Servo, compile_model
 from .spoiled import SPOILED
 
@@ -267,6 +267,23 @@ def test_record(tmp_path: Path) -> None:
     rows = list(csv.DictReader(first.splitlines()))
     assert len(rows) == 4 * 50
     assert all(0 <= float(row["qdes_l_m"]) <= 0.045 for row in rows)
+
+
+def test_one_more_grasp_is_of_the_same_hand_and_object(tmp_path: Path) -> None:
+    truth, setup = record(tmp_path / "set", {"force_lag": "large"}, 3, grasps=4), draw_setup(3, 4, "rich", 150)
+    thing = setup.things[setup.thing[2]].name
+    record_one_more(tmp_path / "more", truth, thing, float(setup.offset[2]), setup.commands[2], noise_seed=4)
+    (row,) = csv.DictReader((tmp_path / "more" / "grasps.csv").read_text().splitlines())
+    assert row["object"] == thing
+    all_rows, more = (
+        np.loadtxt(tmp_path / name / "samples.csv", delimiter=",", skiprows=1) for name in ("set", "more")
+    )
+    before = all_rows[all_rows[:, 0] == 2]
+    np.testing.assert_array_equal(before[:, 1:4], more[:, 1:4])  # time and commands
+    for columns, std in ((slice(4, 6), POSITION_STD_M), (slice(6, 8), FORCE_STD_N)):
+        off = (more - before)[:, columns]
+        assert np.std(off) == pytest.approx(2**0.5 * std, rel=0.2)
+        assert np.max(np.abs(off)) < 8 * std
 
 
 @pytest.mark.parametrize(("contact", "plan"), [*((name, "rich") for name in PLANTS), ("penalty", "close_and_hold")])

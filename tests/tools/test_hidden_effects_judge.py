@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import ast
+
 import pytest
 
-from tools.hidden_effects_judge import false_names, families, judge, named_of
+from forcegrasp.diagnosis.law_terms import LIBRARY
+from tests.independent.catalogue import OUTSIDE
+from tools.hidden_effects_judge import TERMS, false_names, families, has_right_term, judge, named_of, settled
 
 
 def row(group: str, verdict: str, *steps: str) -> dict:
@@ -68,3 +72,39 @@ def test_what_is_named_and_what_is_named_falsely() -> None:
 
 def test_families_are_those_of_the_catalogue() -> None:
     assert families(["stiction", "coulomb_friction", "early_row"]) == {"friction"}
+
+
+def test_a_tie_is_settled_where_the_right_effect_is_left_alone() -> None:
+    def tie(*last: tuple[str, list[str]], named: str = "force_lag|force_delay") -> dict:
+        further = [{"grasp": "fast step", "verdict": verdict, "effects": effects} for verdict, effects in last]
+        return row("tie", "one_of", named) | {"further": {"proposed": further, "chance": []}}
+
+    right, still = {"force_delay"}, ("one_of", ["force_delay", "force_lag"])
+    assert settled(tie(still, ("effect", ["force_delay"])), right, "proposed") is True
+    assert settled(tie(("effect", ["force_lag"])), right, "proposed") is False
+    assert settled(tie(("effect", ["force_delay", "backlash"])), right, "proposed") is False
+    assert settled(tie(still, still), right, "proposed") is False
+    assert settled(tie(still), right, "chance") is False  # no grasp was proposed
+    assert settled(tie(still, named="backlash|adhesion"), right, "proposed") is None  # no right tie
+    assert settled(row("tie", "effect", "force_delay"), right, "proposed") is None
+    assert settled(row("one", "one_of", "force_lag|force_delay"), right, "proposed") is None
+
+
+def test_a_law_is_right_if_it_has_the_term_of_what_was_hidden() -> None:
+    def outside(hidden: str, law: dict | None) -> dict:
+        return row("outside", "unknown") | {"hidden": [hidden], "law": law}
+
+    bent = {"place": "force", "expression": "c1 * force * abs(force) + c2 * time", "share": 0.9}
+    assert has_right_term(outside("curved_force_gain", bent)) is True
+    assert has_right_term(outside("curved_force_gain", bent | {"place": "motor"})) is False
+    assert has_right_term(outside("tip_inertia", bent)) is False
+    assert has_right_term(outside("tip_inertia", None)) is False
+    assert has_right_term(outside("motor_cogging", bent)) is None  # no term of the library turns with the motor
+    assert has_right_term(row("none", "explained") | {"hidden": [], "law": bent}) is None
+
+
+def test_each_term_that_would_be_right_is_in_the_library_and_each_effect_in_the_rig() -> None:
+    assert set(TERMS) <= set(OUTSIDE)
+    for place, texts in TERMS.values():
+        known = [ast.unparse(ast.parse("c1 * " + t.format(e="(command - position)", v=1))) for t, _ in LIBRARY[place]]
+        assert all(any(text in one for one in known) for text in texts)
