@@ -80,6 +80,39 @@ def test_without_a_result_of_servos_their_page_stays_as_it_is(page):
     assert "| … strictly first | 1 of 1 (100%; 21–100 %) |" in text
 
 
+def test_the_page_says_what_a_diagnosis_costs_by_what_was_hidden(page):
+    jobs = [Job("one", ("backlash",), "medium", k) for k in range(3)] + [Job("none", (), "", 1)]
+    rows = [row(job, "effect", ("backlash",), processor_s=float(20 + 10 * job.seed)) for job in jobs[:3]]
+    text = page([*rows, row(jobs[3], "explained", processor_s=7.0)], jobs, "grippers")
+    assert "| one effect | 3 | 30 | 38 |" in text
+    assert "| nothing | 1 | 7 | 7 |" in text
+    assert "a messy rig" not in text.split("What a diagnosis costs")[1].split("##")[0]
+
+
+def test_ties_and_laws_have_rates_of_their_own(page):
+    ties = [Job("tie", ("backlash",), "medium", k, grasps=9, plan="close_and_hold") for k in range(3)]
+    left = {
+        "proposed": [{"verdict": "effect", "effects": ["backlash"]}],
+        "chance": [{"verdict": "one_of", "effects": []}],
+    }
+    laws = [Job("outside", (name,), "large", 1) for name in ("curved_force_gain", "tip_inertia", "motor_cogging")]
+    bent = {"place": "force", "expression": "c1 * force * abs(force)", "share": 0.9}
+    tied = ("one_of", ("backlash", "adhesion"))
+    rows = [
+        row(ties[0], *tied, further=left), row(ties[1], *tied, further=left), row(ties[2], "effect", ("backlash",)),
+        *(row(job, "unknown", law=bent) for job in laws),
+    ]  # fmt: skip
+    text = page(rows, [*ties, *laws], "grippers")
+    for line in (
+        "| one effect, 9 grasps that close and hold: right, or in a right set | 3 of 3 (100%; 44–100 %) |",
+        "| … of ties with the right one: it alone is left after two proposed grasps | 2 of 2 (100%; 34–100 %) |",
+        "| … after two of the menu by chance | 0 of 2 (0%; 0–66 %) |",
+        "| … the library of terms has one for it: a law with that term | 1 of 2 (50%; 9–91 %) |",
+        "| nothing hidden, odd noise or not: a law proposed | – |",
+    ):
+        assert line in text
+
+
 def test_a_set_that_failed_is_counted_and_not_measured(page):
     failed = {"name": ONE[0].name, **asdict(ONE[0]), "verdict": "error", "error": "no memory"}
     text = page([failed, row(ONE[1], "effect", ("stiction",))], ONE)
