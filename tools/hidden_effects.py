@@ -209,8 +209,8 @@ def run_job(job: Job) -> dict:
         diagnosis, _ = diagnose_set(loaded, None, [], 0, lambda text: None, law=job.group in WITH_LAW)
         seconds, processor = time.perf_counter() - started, time.process_time() - busy
         model = model_of(diagnosis.fit, diagnosis.target, loaded, diagnosis.numerical)
-        is_tie = job.group == "tie" and diagnosis.verdict is Verdict.ONE_OF
-        further = settle(folder, truth, diagnosis) if is_tie else {}
+        tied = diagnosis.verdict is Verdict.ONE_OF and job.group == "tie"
+        further = settle(folder, truth, diagnosis) if tied and isinstance(truth, rig.Truth) else {}
     finally:
         shutil.rmtree(folder, ignore_errors=True)
     return {

@@ -10,7 +10,6 @@ import pytest
 
 from forcegrasp.diagnosis import diagnose_set as diagnosing
 from forcegrasp.identify.verdict import Verdict
-from forcegrasp.measure import read_set
 from tests.independent.rig import record
 from tools.hidden_effects_ties import settle
 
@@ -19,9 +18,8 @@ from tools.hidden_effects_ties import settle
 def tie(made_up, tmp_path, monkeypatch):
     """``tie(*verdicts)``: what is told where each further diagnosis comes to the next of these; and the sets joined."""
     truth = record(tmp_path / "set", {}, 5, grasps=2, samples=60)
-    objects = read_set(tmp_path / "set").grasps
     menu = [
-        made_up.advice.next_grasp.model_copy(update={"grasp": kind, "object": objects[0].object})
+        made_up.advice.next_grasp.model_copy(update={"grasp": kind, "object": truth.grasps[0]["object"]})
         for kind in ("slow ramp", "long hold", "fast step")
     ]
     advice = dataclasses.replace(made_up.advice, next_grasp=menu[1], menu=tuple(menu))

@@ -156,21 +156,21 @@ def _sweep(out: Path, sweep: str) -> Columns:
     return by_experiment(read_evaluation(out / f"evaluate-{sweep}" / "softness"), folders)
 
 
-def ablation(out: Path, sweep: str = "ablation", figures: tuple[str, ...] = (*_OF_SWEEPS, "fast_steps")) -> str:
+def ablation(out: Path, sweep: str = "ablation", shown: tuple[str, ...] = (*_OF_SWEEPS, "fast_steps")) -> str:
     """A row per experiment of a sweep, and each seed's force reward."""
     report, found = read_evaluation(out / f"evaluate-{sweep}" / "softness"), _sweep(out, sweep)
     each = {who: sorted(one[REWARD]["mean"] for one in seeds) for who, seeds in found.items()}
     rows = [
-        [f"`{who}`", *_figures(seeds, figures), " ".join(f"{reward:.1f}" for reward in each[who])]
+        [f"`{who}`", *figures(seeds, shown), " ".join(f"{reward:.1f}" for reward in each[who])]
         for who, seeds in found.items()
     ]
-    rows.append(["hand-written (`force_pi`)", *_figures([report["policies"]["force_pi"]], figures), ""])
+    rows.append(["hand-written (`force_pi`)", *figures([report["policies"]["force_pi"]], shown), ""])
     seeds = len(next(iter(found.values())))
     commands = [policy.options for policy in POLICIES if policy.name in SWEEPS[sweep].beside] + [SWEEPS[sweep].options]
     trained = ", ".join(f"`forcegrasp train -m {options}`" for options in commands)
     trained += f", {seeds} seeds each, {_frames(out, sweep):,} frames"
     grasps = f"evaluated on the same {len(report['cells'])} × {report['trials']} grasps of the reference tier"
-    header = ["experiment", *(_ROWS[name][0] for name in figures), "each seed's force reward"]
+    header = ["experiment", *headings(shown), "each seed's force reward"]
     return f"{trained}; {grasps}. {_SEEDS}:\n\n" + table(header, rows)
 
 
@@ -180,7 +180,13 @@ def _frames(out: Path, sweep: str) -> int:
     return max(run["frames"] for group in curves["groups"].values() for run in group["runs"])
 
 
-def _figures(seeds: list[Figures], names: Iterable[str]) -> list[str]:
+def headings(names: Iterable[str]) -> list[str]:
+    """What columns of these figures are called."""
+    return [_ROWS[name][0] for name in names]
+
+
+def figures(seeds: list[Figures], names: Iterable[str]) -> list[str]:
+    """The means of an experiment over its seeds."""
     return [_mean(seeds, name, *_ROWS[name][1:]) for name in names]
 
 
