@@ -45,7 +45,7 @@ def is_significant(candidate: Candidate, least_gain: float, least_share: float =
     """
     return (
         candidate.p_family <= ALARM
-        and candidate.is_resolved
+        and candidate.is_plausible
         and (is_beyond_chance(candidate.evidence, LEAST_RISE) or _shows_in_some(candidate))
         and candidate.largest_fall >= least_gain
         and candidate.share >= least_share
@@ -77,7 +77,7 @@ def indistinguishable(winner: Candidate, other: Candidate) -> bool:
     simpler = len(other.effect.parameters) < len(winner.effect.parameters)
     nearly = simpler and nearly_as_much(other.heldout_gain, winner.heldout_gain)
     # it may be there besides, and not instead
-    if other.share < min(LEAST_SHARE, _HALF * winner.share) or not other.is_resolved:
+    if other.share < min(LEAST_SHARE, _HALF * winner.share) or not other.is_plausible:
         return False
     if other.fit.cost > _FITS_WORSE * winner.fit.cost:
         return False
@@ -98,7 +98,8 @@ def with_close_rivals(step: Step) -> Step:
     winner, known = step.candidates[0], len(step.effects)
     close = [
         c for c in step.candidates[known:]
-        if (c.heldout_gain > _ALIKE * winner.heldout_gain or c.error_after <= winner.error_after)
+        if c.is_plausible
+        and (c.heldout_gain > _ALIKE * winner.heldout_gain or c.error_after <= winner.error_after)
         and c.fit.cost <= _FITS_WORSE * winner.fit.cost
         and not families.contain(c.effect, winner.effect)
     ]  # fmt: skip

@@ -63,12 +63,17 @@ class Candidate(ShortRepr):
         return self.gains if self.of_recordings is None else self.of_recordings
 
     @property
-    def is_resolved(self) -> bool:
-        """Whether it is more than what integrators differ by; where the drive samples at each step, it always is."""
-        gripper, least = self.fit.problem.gripper, self.effect.least_steps
-        if not least or gripper.steps_as_its_drive:
+    def is_plausible(self) -> bool:
+        """Whether it is as large as it must be: columns are swapped or not, a lag is more than integrators differ by.
+
+        Where the drive samples at each step, integrators do not differ.
+        """
+        gripper, effect, size = self.fit.problem.gripper, self.effect, self.setting.values[0]
+        if size < effect.least_size:
+            return False
+        if not effect.least_steps or gripper.steps_as_its_drive:
             return True
-        return bool(self.setting.values[0] >= least * gripper.compile().opt.timestep)
+        return bool(size >= effect.least_steps * gripper.compile().opt.timestep)
 
     @property
     def heldout_gain(self) -> float:

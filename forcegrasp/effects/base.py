@@ -96,6 +96,7 @@ class Effect:
     servo_only: ClassVar[bool] = False  #: of drives alone; where fingers grasp, another effect has its part
     needs_position_loop: ClassVar[bool] = False  #: has no meaning where efforts are commanded
     needs_velocity_gain: ClassVar[bool] = False  #: has no meaning where servos do not act on their velocity
+    least_size: ClassVar[float] = -np.inf  #: of its first parameter: what comes out smaller is something else
     least_steps: ClassVar[float] = 0.0  #: of its first parameter, a time, fewer physics steps are the integrator's own
     base_parameter: ClassVar[str] = ""  #: one that says the same; where a gripper has it, the effect is left out
     least_channels: ClassVar[int] = 0  #: force readings that the gripper must have for it to make a difference

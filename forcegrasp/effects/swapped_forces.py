@@ -20,6 +20,8 @@ class SwappedForces(Effect):
     look_alikes = ("force_crosstalk", "force_gain_asymmetry")
     separates = "press on one finger by hand, and see which column moves"
     parameters = (Parameter("share", "s, how far they are swapped", "1", 0.0, 1.2, 1.0, trials=(1.0,)),)
+    # in part they can't be: a small share is crosstalk, which is the same but for a gain
+    least_size = 0.7
     least_channels = 2
     order = 9  # columns are exchanged after all that happens to a force
 

@@ -50,6 +50,17 @@ def test_a_lag_of_which_the_integrator_makes_as_much_does_not_convince(made_up, 
     assert is_significant(candidate(made_up, setting=lag(0.99 * two_steps)), 0.02)
 
 
+@pytest.mark.parametrize(("share", "plausible"), [(0.69, False), (0.71, True)])
+def test_columns_that_are_swapped_in_part_are_not_swapped(made_up, share, plausible):
+    """A share of 0.07 is crosstalk of 0.075 by another name: grasps with crosstalk were a tie with swapped columns."""
+    swapped = candidate(made_up, setting=EffectSetting(get_effect("swapped_forces"), "", np.array([share])))
+    crosstalk = candidate(made_up, setting=EffectSetting.typical(get_effect("force_crosstalk")))
+    assert is_significant(swapped, 0.02) == plausible
+    assert indistinguishable(crosstalk, swapped) == plausible
+    rivals = with_close_rivals(Step(("force_crosstalk",), (crosstalk, swapped), (), 4.0, 3.0)).effects[1:]
+    assert rivals == (("swapped_forces",) if plausible else ())
+
+
 @pytest.mark.parametrize(
     ("changed", "taken"),
     [
