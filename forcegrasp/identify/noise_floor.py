@@ -83,7 +83,7 @@ def excess(residual: np.ndarray, numerical: Sequence[np.ndarray], target: Target
 
 def _by_chance(residual: np.ndarray, target: Target, where: np.ndarray | bool = True) -> float:
     """How many times its expectation the rms of so few readings of noise may be; ``where`` is ``(G, S, C)``."""
-    readings = np.sum(target.mask[..., None] & np.isfinite(residual) & where)
+    readings = np.sum(target.mask[..., None] & target.is_new & np.isfinite(residual) & where)
     return 1 + _CHANCE / np.sqrt(2 * max(readings, 1))
 
 

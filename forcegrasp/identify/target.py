@@ -77,6 +77,15 @@ class Target(ShortRepr):
         steps = [self.quantum[part].max(initial=0.0) for part in (self.axis.positions, self.axis.forces)]
         return EffectSetting(effect_of(Quantisation.name, self.gripper), "", np.array(steps))
 
+    @property
+    def is_new(self) -> np.ndarray:
+        """Which samples' readings may say more than the one before, ``(G, S, C)``.
+
+        While nothing moves a rounded reading stays as it is, and is off by the same: a hold is off once.
+        """
+        changes = np.diff(self.signals, axis=1, prepend=np.nan) != 0
+        return changes | (self.quantum == 0)
+
     def before_rounding(self, residual: np.ndarray) -> np.ndarray:
         """Residuals ÷ noise, as a model has them that takes what rounding adds to the noise for an error."""
         return residual * (self.sigma / self.sensor_sigma)
