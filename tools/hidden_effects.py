@@ -42,6 +42,8 @@ PAIRS = (
     ("rate_limit", "force_saturation"),
     ("finger_compliance", "encoder_bias"),
 )
+#: What grasps that close and hold hardly tell from another one of these: all of them are late.
+LIKE_OTHERS = ("command_delay", "actuator_lag", "force_delay", "force_lag")
 #: Hidden in logs of a slide without fingers, alone and in pairs.
 OF_SERVOS = (
     "coulomb_friction", "stiction", "load_friction", "presliding", "direction_friction", "position_deadband",
@@ -141,6 +143,11 @@ def jobs() -> list[Job]:
     found += [
         Job("tie", (name,), "medium", 80 + k, grasps=9, plan="close_and_hold")
         for k, name in enumerate(sorted(CATALOGUE))
+    ]
+    found += [
+        Job("tie", (name,), "medium", 120 + 10 * k + seed, grasps=9, plan="close_and_hold")
+        for k, name in enumerate(LIKE_OTHERS)
+        for seed in range(2)
     ]
     found += _servo_jobs()
     rng.shuffle(found)
