@@ -1,6 +1,6 @@
 """Trains with several settings, five seeds of each, and fills in the table of a page.
 
-    python tools/compare_settings.py fewer_frames    what makes a good policy come sooner (docs/speed.md); 45 minutes
+    python tools/compare_settings.py fewer_frames    what makes a good policy come sooner (docs/speed.md); 20 minutes
     python tools/compare_settings.py algorithms      every algorithm on the same budget (docs/algorithms.md); 40 minutes
     python tools/compare_settings.py NAME --report   only writes what there is so far into the page; seconds
 
@@ -52,11 +52,8 @@ COMPARISONS = {
         "speed.md",
         {
             "quick": _QUICK,
-            "two_passes": f"{_QUICK} ppo.epochs=2",
             "eight_passes": f"{_QUICK} ppo.epochs=8",
-            "short_steps": f"{_QUICK} ppo.learning_rate=0.0005",
             "64_grasps": f"{_QUICK} ppo.grasps=64",
-            "256_grasps": f"{_QUICK} ppo.grasps=256",
         },
     ),
     # in the time that SAC takes for so many frames, and for as many frames
