@@ -124,6 +124,7 @@ _PLANS = {
         ((22.6, 0.02, 0.3), (26, 0.006, 0.2), (23, 0.02, 0.3), (25.6, 0.003, 0.2)),
     ),
     "object_friction": _OFF_CENTRE,
+    "smooth_object_friction": _OFF_CENTRE,
     "contact_friction": _OFF_CENTRE,
     "force_crosstalk": _OFF_CENTRE,
     "swapped_forces": _OFF_CENTRE,

@@ -7,7 +7,7 @@ explains more.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 
 import numpy as np
 
@@ -81,9 +81,15 @@ def richer(setting: EffectSetting, container: type[Effect]) -> list[EffectSettin
     return list(found.values())
 
 
-def refit_as(setting: EffectSetting, fit: Fit, without: str, study: Study) -> Fit:
-    """Fits a model in which this effect takes the place of another, from where the model stands."""
+def refit_as(setting: EffectSetting, fit: Fit, without: str | Collection[str], study: Study) -> Fit:
+    """Fits a model in which this effect takes the place of another, or of several, from where the model stands."""
     return _refit([setting], fit, without, study)
+
+
+def roughly_as(settings: Sequence[EffectSetting], fit: Fit, without: str | Collection[str], study: Study) -> Fit:
+    """The same by the cheap model, from the best of several sizes."""
+    problem, start = _best_start(settings, fit, without, study)
+    return fit_once(study.target, problem, study.simulators, start, fit.correction, rounds=0)
 
 
 def refit_as_richer(container: type[Effect], fit: Fit, without: str, study: Study) -> Fit:
@@ -93,8 +99,7 @@ def refit_as_richer(container: type[Effect], fit: Fit, without: str, study: Stud
 
 def roughly_as_richer(container: type[Effect], fit: Fit, without: str, study: Study) -> Fit:
     """The same by the cheap model."""
-    problem, start = _best_start(_richer_than(without, container, fit), fit, without, study)
-    return fit_once(study.target, problem, study.simulators, start, fit.correction, rounds=0)
+    return roughly_as(_richer_than(without, container, fit), fit, without, study)
 
 
 def _richer_than(name: str, container: type[Effect], fit: Fit) -> list[EffectSetting]:
@@ -102,38 +107,40 @@ def _richer_than(name: str, container: type[Effect], fit: Fit) -> list[EffectSet
     return richer(known, container)
 
 
-def refit_without(name: str, fit: Fit, study: Study) -> Fit:
-    """Fits a model that lacks one of the effects, from where the model stands."""
-    problem, start, slopes = _problem_without(name, fit)
+def refit_without(names: str | Collection[str], fit: Fit, study: Study) -> Fit:
+    """Fits a model that lacks one of the effects, or several, from where the model stands."""
+    problem, start, slopes = _problem_without(names, fit)
     return fit_exactly(study.target, problem, study.simulators, start, slopes)
 
 
-def roughly_without(name: str, fit: Fit, study: Study) -> Fit:
+def roughly_without(names: str | Collection[str], fit: Fit, study: Study) -> Fit:
     """The same by the cheap model."""
-    problem, start, _ = _problem_without(name, fit)
+    problem, start, _ = _problem_without(names, fit)
     return fit_once(study.target, problem, study.simulators, start, fit.correction, rounds=0)
 
 
-def _problem_without(name: str, fit: Fit) -> tuple[Problem, np.ndarray, np.ndarray]:
-    """The problem without one of the effects, where the fit stands in it, and its slopes there."""
-    kept, places = _without(name, fit)
+def _problem_without(names: str | Collection[str], fit: Fit) -> tuple[Problem, np.ndarray, np.ndarray]:
+    """The problem without these effects, where the fit stands in it, and its slopes there."""
+    kept, places = _without(names, fit)
     return Problem(fit.problem.gripper, fit.problem.grasps, kept), fit.vector[places], fit.jacobian[..., places]
 
 
-def _without(name: str, fit: Fit) -> tuple[list[EffectSetting], list[int]]:
-    """The other effects of a fit, and the indices of all coordinates but those of this one."""
-    case = fit.problem.case(fit.vector)
-    gone = [i for i, one in enumerate(case.effects) if one.effect.name == name]
+def _without(names: str | Collection[str], fit: Fit) -> tuple[list[EffectSetting], list[int]]:
+    """The other effects of a fit, and the indices of all coordinates but those of this one, or of these."""
+    case, names = fit.problem.case(fit.vector), {names} if isinstance(names, str) else names
+    gone = [i for i, one in enumerate(case.effects) if one.effect.name in names]
     places = [i for i, entry in enumerate(fit.problem.entries) if entry.effect not in gone]
-    return [one for one in case.effects if one.effect.name != name], places
+    return [one for one in case.effects if one.effect.name not in names], places
 
 
-def _refit(settings: Sequence[EffectSetting], fit: Fit, without: str, study: Study) -> Fit:
+def _refit(settings: Sequence[EffectSetting], fit: Fit, without: str | Collection[str], study: Study) -> Fit:
     problem, start = _best_start(settings, fit, without, study)
     return fit_exactly(study.target, problem, study.simulators, start)
 
 
-def _best_start(settings: Sequence[EffectSetting], fit: Fit, without: str, study: Study) -> tuple[Problem, np.ndarray]:
+def _best_start(
+    settings: Sequence[EffectSetting], fit: Fit, without: str | Collection[str], study: Study
+) -> tuple[Problem, np.ndarray]:
     kept, places = _without(without, fit)
     base = fit.vector[places]
     problems = [Problem(fit.problem.gripper, fit.problem.grasps, [*kept, setting]) for setting in settings]

@@ -14,8 +14,8 @@ from forcegrasp.diagnosis.study import Study
 from forcegrasp.identify.fit import Fit
 from forcegrasp.identify.noise_floor import excess
 
-# Few grasps decide if they ask so many times as clearly for an effect as is enough.
-_SURELY = 10.0
+#: Few grasps decide if they ask so many times as clearly for an effect as is enough.
+SURELY = 10.0
 
 
 def drop_needless(study: Study, step: Step, fit: Fit, given: int) -> tuple[Step, Fit]:
@@ -80,33 +80,33 @@ def simplify(study: Study, steps: Sequence[Step], fit: Fit, given: int) -> tuple
         for nested in known.effect.contains:
             study.progress(f"fitting with {nested.effect} in place of {known.effect.name}")
             less = refit_as(simpler(known, nested, fit.problem.gripper), fit, known.effect.name, study)
-            of_simple = study.heldout(less)
-            nearly = nearly_as_much(_gain(study, without, of_simple), _gain(study, without, held))
-            if nearly and not _asks_for_more(study, of_simple, held):
+            if is_enough(study, without, study.heldout(less), held):
                 study.progress(f"{nested.effect} is enough")
                 left[left.index(step)], fit = _with_simpler(step, nested.effect, less), less
                 break
-    return (left if left == list(steps) else _chained(left, study.error(study.heldout(fit)))), fit
+    return (left if left == list(steps) else chained(left, study.error(study.heldout(fit)))), fit
 
 
-def _gain(study: Study, without: np.ndarray, held: np.ndarray) -> float:
-    """By how much held-out residuals are better than those without an effect."""
-    return float(np.nansum(study.gains(without, held)))
-
-
-def _asks_for_more(study: Study, of_simple: np.ndarray, of_richer: np.ndarray) -> bool:
-    """Whether the search would put the richer effect in the place of the simple one, by the residuals that both leave.
+def is_enough(study: Study, without: np.ndarray, of_simple: np.ndarray, of_richer: np.ndarray) -> bool:
+    """Whether a simple model does for a richer one: it gains nearly as much, and the search would not ask for the rest.
 
     Beside all that friction explains, say, what only the richer one explains may be little, and yet most of the rest.
+
+    Args:
+      study: the measurements.
+      without: held-out residuals of the model without what the two have of their own.
+      of_simple, of_richer: those that they leave.
     """
-    return (
+    gain, most = (float(np.nansum(study.gains(without, held))) for held in (of_simple, of_richer))
+    asks_for_more = (
         bool(excess(of_simple, study.numerical, study.target))
         and is_beyond_chance(study.gains(of_simple, of_richer), LEAST_RISE)
         and study.explained(of_simple, of_richer) >= LEAST_SHARE
     )
+    return nearly_as_much(gain, most) and not asks_for_more
 
 
-def _chained(steps: Sequence[Step], error: float) -> list[Step]:
+def chained(steps: Sequence[Step], error: float) -> list[Step]:
     """The steps, each of which begins with the error that the one before it leaves; the last effect leaves this one."""
     found = max(i for i, step in enumerate(steps) if step.effects)
     after = [step.error_after if i < found else error for i, step in enumerate(steps)]
@@ -146,7 +146,7 @@ def _is_surely_needed(name: str, fit: Fit, study: Study) -> bool:
     """Whether few grasps say so clearly that the model needs an effect that all need not be asked."""
     some, part = study.on_few(fit)
     less = None if some is study else roughly_without(name, part, some)
-    return less is not None and is_beyond_chance(some.gains(less.residual, part.residual), _SURELY * LEAST_RISE)
+    return less is not None and is_beyond_chance(some.gains(less.residual, part.residual), SURELY * LEAST_RISE)
 
 
 def _without_needless(study: Study, fit: Fit, names: Sequence[str]) -> tuple[str, Fit] | None:

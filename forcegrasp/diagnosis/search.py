@@ -11,6 +11,7 @@ from forcegrasp.diagnosis import families
 from forcegrasp.diagnosis.evidence import LEAST_SHARE_TOGETHER, with_close_rivals
 from forcegrasp.diagnosis.exchange import exchange
 from forcegrasp.diagnosis.few import with_few
+from forcegrasp.diagnosis.merge import merge
 from forcegrasp.diagnosis.needless import drop_needless, simplify
 from forcegrasp.diagnosis.noise_check import Noise, unexpected_noise
 from forcegrasp.diagnosis.odd_grasps import odd_grasps
@@ -99,6 +100,7 @@ def diagnose(
         if not left and (noise is None or not noise.stronger):
             break  # what seems to be stronger noise may hide an effect: only that none is found tells
     steps, fit = simplify(study, steps, fit, len(base.fit.problem.effects))
+    steps, fit = merge(study, steps, fit, effects, len(base.fit.problem.effects))
     if believed is not None and not _convincing(believed[2], believed[1], study, fit):
         steps, fit, study = believed
         target = study.target

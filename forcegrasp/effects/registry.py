@@ -41,6 +41,7 @@ _SHIPPED = (
     "load_friction",
     "motor_offset",
     "object_friction",
+    "smooth_object_friction",
     "object_size",
     "position_deadband",
     "presliding",

@@ -159,6 +159,27 @@ class ModelFields(SceneLayout):
         for name, stiff in (("dof_solref", _STIFF_SOLREF), ("dof_solimp", _STIFF_SOLIMP)):
             self.field(name)[rows, dof] = np.where(more, stiff, self.base(name)[rows, dof])
 
+    def let_friction_creep(self, dof: int, rows: np.ndarray, speed: np.ndarray) -> None:
+        """Lets dry friction that an effect added grow in proportion to the speed until it slides.
+
+        The engine makes a friction's constraint as a damper with a mass of its own, as small as the step allows.
+
+        Args:
+          dof: of the object, one in which it slides.
+          rows: whose friction it is.
+          speed: at which it slides, m/s, ``(len(rows),)``; where it is 0 friction holds at rest.
+        """
+        self.stiffen_friction(dof, rows)
+        loss = self.field("dof_frictionloss")[rows, dof]
+        creeps = (speed > 0) & (loss > self.base("dof_frictionloss")[rows, dof])
+        rows, damping = rows[creeps], loss[creeps] / speed[creeps]
+        mass = self.field("body_mass")[rows, self.model.dof_bodyid[dof]]
+        # the force is −(a + b v) d / (1 − d) m, held to the friction: a damper if b d m / (1 − d) is its damping
+        rate = 0.5 * np.minimum(1 / self.dt, damping / mass)  # b d, which the steps must resolve
+        impedance = 1 - rate * mass / damping
+        self.field("dof_solref")[rows, dof] = np.stack([-np.ones_like(rate), -rate], axis=1)
+        self.field("dof_solimp")[rows, dof, :2] = impedance[:, None]
+
     def restore_fields(self, ids: np.ndarray) -> None:
         """Takes back in these rows whatever effects made of the fields."""
         for name, field in self._fields.items():

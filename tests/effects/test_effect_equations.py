@@ -7,7 +7,9 @@ import pytest
 from scipy.signal import lfilter
 
 from forcegrasp.effects import Effect, catalogue, get_effect
-from forcegrasp.physics.plant import write_base
+from forcegrasp.effects.base import Contribution
+from forcegrasp.physics.gripper_file import load_gripper
+from forcegrasp.physics.plant import Plant, write_base
 
 from .rollouts import FORCE_SCALE, make_plant, play, rollout, start
 from .signals import DT, GAIN, TOUCH_M, T, make, read, settle, wave
@@ -374,6 +376,35 @@ def test_object_friction_holds_an_off_centre_object():
     for share in (0.3, 0.6):  # it stops where the finger pushes no harder than F_t
         assert pushed(share * push)[1] == pytest.approx(share * push, rel=0.1)
     assert pushed(1.2 * push)[0] < 2e-5
+
+
+@pytest.mark.parametrize("tier", ["reference", "fitting", "fast"])
+def test_smooth_object_friction_creeps_in_proportion_to_the_push_and_then_slides(tier):
+    class Push(Effect):
+        name, stage, parameters = "push", "object", ()
+        newtons = np.zeros(0)
+
+        def act(self) -> Contribution:
+            return Contribution(object_push_n=self.newtons)
+
+    slide, speed = 0.1, 2e-3
+    push = Push(np.empty((5, 0)), 0.002)
+    push.newtons = np.array([0.03, 0.03, 0.06, 0.06, 0.3])  # the first and third without the effect
+    gripper = load_gripper("tiago")
+    plant, rows = Plant(gripper, 5, tier=tier, threads=1), np.array([1, 3, 4])
+    creeps = get_effect("smooth_object_friction")(np.array([[slide, speed]] * 3), plant.dt)
+    plant.attach([(creeps, rows), (push, np.arange(5))])
+    plant.reset(np.arange(5), np.zeros(5))
+    plant.advance(np.full((5, 2), gripper.stroke), round(1 / plant.dt))
+    before = plant.object_position.copy()
+    plant.advance(np.full((5, 2), gripper.stroke), round(0.2 / plant.dt))
+    free, creeping, twice_free, twice, beyond = (plant.object_position - before) / 0.2
+    # the scene's own creep takes its part of the push: dampers side by side
+    assert creeping == pytest.approx(0.03 / (0.03 / free + slide / speed), rel=0.01)
+    assert twice == pytest.approx(0.06 / (0.06 / twice_free + slide / speed), rel=0.01)
+    # beyond the speed at which it slides friction grows no more
+    assert beyond > speed
+    assert beyond * 0.03 / free == pytest.approx(0.3 - slide, rel=0.03)
 
 
 # --- sensors -------------------------------------------------------------------------------------------------------

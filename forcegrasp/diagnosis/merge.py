@@ -1,0 +1,111 @@
+"""Puts one effect in the place of two that were found, where it does for both: their sum may look like it."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Collection, Iterator, Sequence
+from itertools import combinations
+
+import numpy as np
+
+from forcegrasp.diagnosis.evidence import LEAST_RISE, is_beyond_chance
+from forcegrasp.diagnosis.exchange import are_alike
+from forcegrasp.diagnosis.families import contain, refit_as, refit_without, roughly_as
+from forcegrasp.diagnosis.needless import SURELY, chained, is_enough
+from forcegrasp.diagnosis.result import Step, kept_steps
+from forcegrasp.diagnosis.signatures import trials
+from forcegrasp.diagnosis.study import Study
+from forcegrasp.effects import Effect
+from forcegrasp.effects.setting import EffectSetting
+from forcegrasp.identify.fit import Fit
+
+
+def merge(
+    study: Study, steps: Sequence[Step], fit: Fit, effects: Sequence[type[Effect]], given: int
+) -> tuple[list[Step], Fit]:
+    """The steps with one effect in place of two, where held-out grasps do not ask for both; and the fit.
+
+    What was still missing may have made half of an effect fit better than the whole: positions that are read late, and
+    forces that are, are a late command.
+
+    Args:
+      study: the measurements.
+      steps: that found the effects.
+      fit: with all effects.
+      effects: the catalogue.
+      given: number of effects that were in the model before the search; they stay.
+    """
+    left = list(steps)
+    while found := _one_for_two(study, left, fit, effects, given):
+        pair, fit = found
+        left = _with_one(study, left, fit, pair)
+    return left, fit
+
+
+def _one_for_two(
+    study: Study, steps: Sequence[Step], fit: Fit, effects: Sequence[type[Effect]], given: int
+) -> tuple[tuple[str, str], Fit] | None:
+    """Two effects of which another one does for both, and the fit with that."""
+    held, few = study.heldout(fit), study.on_few(fit)
+    searched = {one.effect.name for one in fit.problem.effects[given:]}
+    found = [step.effects[0] for step in kept_steps(steps) if step.candidates and step.effects[0] in searched]
+    for pair in combinations(found, 2):
+        for effect in _like_both(pair, fit, effects):
+            study.progress(f"fitting with {effect.name} in place of {pair[0]} and {pair[1]}")
+            setting = _roughly_as_good(*few, pair, effect)
+            if setting is None:
+                continue
+            less, without = refit_as(setting, fit, pair, study), refit_without(pair, fit, study)
+            if is_enough(study, study.heldout(without), study.heldout(less), held):
+                study.progress(f"{effect.name} does for both")
+                return pair, less
+    return None
+
+
+def _like_both(pair: Collection[str], fit: Fit, effects: Sequence[type[Effect]]) -> Iterator[type[Effect]]:
+    """Effects that look like either of two, and may stand beside all others of the model."""
+    known = [one.effect for one in fit.problem.effects]
+    two, others = [e for e in known if e.name in pair], [e for e in known if e.name not in pair]
+    barred = {name for other in others for name in other.instead_of}
+    for effect in effects:
+        is_new = effect not in known and effect.name not in barred and not any(contain(effect, e) for e in others)
+        if is_new and not effect.of_set and all(are_alike(effect, one) for one in two):
+            yield effect
+
+
+def _roughly_as_good(study: Study, fit: Fit, pair: Collection[str], effect: type[Effect]) -> EffectSetting | None:
+    """The effect as a rough fit has it, unless that says clearly that both of the others are needed."""
+    less = roughly_as(trials([effect]), fit, pair, study)
+    if is_beyond_chance(study.gains(less.residual, fit.residual), SURELY * LEAST_RISE):
+        return None
+    return less.problem.case(less.vector).effects[-1]
+
+
+def _with_one(study: Study, steps: Sequence[Step], fit: Fit, pair: Collection[str]) -> list[Step]:
+    """The steps without the one that found the first of two effects; that of the second found what stands for both."""
+    kept = kept_steps(steps)
+    first, second = (step for step in kept if step.effects[0] in pair)
+    both = [step.candidates[0] for step in (first, second)]
+    error = study.error(study.heldout(fit))
+    one = dataclasses.replace(
+        both[1],
+        setting=fit.problem.case(fit.vector).effects[-1],
+        fit=fit,
+        p_family=min(c.p_family for c in both),
+        gains=both[0].gains + both[1].gains,
+        of_recordings=_added([c.of_recordings for c in both]),
+        error_after=error,
+        replaces="",
+    )
+    others = [c for c in second.candidates[1:] if c.effect is not one.effect]
+    merged = dataclasses.replace(
+        second, effects=(one.effect.name,), candidates=(one, *others), error_after=error, of_many=False
+    )
+    left = [merged if s is second else s for s in steps if s is not first and (s in kept or not s.effects)]
+    left[0] = dataclasses.replace(left[0], error_before=steps[0].error_before)
+    return chained(left, error)
+
+
+def _added(gains: Sequence[np.ndarray | None]) -> np.ndarray | None:
+    known = [one for one in gains if one is not None]
+    return np.sum(known, axis=0) if len(known) == len(gains) else None

@@ -1,0 +1,76 @@
+"""One effect takes the place of two that were found, where held-out grasps do not ask for both."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from forcegrasp.diagnosis.merge import merge
+from forcegrasp.diagnosis.result import Candidate, Step
+from forcegrasp.diagnosis.study import Study
+from forcegrasp.effects import get_effect
+from forcegrasp.effects.for_gripper import effects_of
+from forcegrasp.effects.setting import EffectSetting
+from forcegrasp.identify.cross_validation import make_folds
+from forcegrasp.identify.fit import Simulators, fit_exactly
+from forcegrasp.identify.fit_set import fit_model
+from forcegrasp.identify.noise_floor import beyond_fit, numerical_error
+from forcegrasp.identify.problem import Problem
+from tests.light_set import light_gripper, light_set
+
+LATE = ("readout_skew", "force_delay")
+CATALOGUE = list(effects_of(light_gripper()).values())
+
+
+def silent(text: str) -> None:
+    """Takes what a diagnosis tells about its progress."""
+
+
+def explained_by_late_readings(*hidden: str):
+    """A study of a set with these effects hidden, a step for each of two that are not, or are, and the fit of both."""
+    loaded = light_set(*hidden, grasps=6)
+    target, simulators, base = fit_model(loaded, 0, silent)
+    study = Study(
+        target, simulators, make_folds(target.grasps), beyond_fit(base.fit, numerical_error(base.fit, target))
+    )
+    settings = [EffectSetting(get_effect(name), "", np.array([0.015])) for name in LATE]
+    problem = Problem(loaded.gripper, target.grasps, settings)
+    fit = fit_exactly(target, problem, Simulators(problem), np.r_[base.fit.vector, problem.start()[-len(LATE) :]])
+    steps, errors = [], [9.0, 4.0, study.error(study.heldout(fit))]
+    for setting, before, after in zip(problem.case(fit.vector).effects, errors[:-1], errors[1:], strict=True):
+        one = Candidate(setting, fit, 0.002, np.ones(6), after, 0.9, 0.5, np.ones(1))
+        steps.append(Step((setting.effect.name,), (one,), (), before, after))
+    return study, steps, fit
+
+
+@pytest.fixture(scope="module")
+def late():
+    """A late command, explained by positions and forces that are read late."""
+    return explained_by_late_readings("command_delay delay_s=0.016")
+
+
+def test_a_late_command_stands_for_late_positions_and_late_forces(late):
+    study, steps, fit = late
+    nothing = dataclasses.replace(steps[1], effects=(), error_before=steps[1].error_after)
+    left, less = merge(study, [*steps, nothing], fit, CATALOGUE, 0)
+    assert [step.effects for step in left] == [("command_delay",), ()]
+    assert [one.effect.name for one in less.problem.effects] == ["command_delay"]
+    (found,) = left[0].candidates
+    assert found.setting.values == pytest.approx([0.016], abs=0.001)
+    assert found.fit is less
+    assert found.heldout_gain == 12
+    error = study.error(study.heldout(less))
+    assert (left[0].error_before, left[0].error_after, left[1].error_before) == (9.0, error, error)
+    assert error < 1.02 * steps[1].error_after
+
+
+def test_what_was_given_stays(late):
+    study, steps, fit = late
+    assert merge(study, steps, fit, CATALOGUE, 1) == (steps, fit)
+
+
+def test_two_that_are_there_stay():
+    study, steps, fit = explained_by_late_readings("readout_skew delay_s=0.008", "force_delay delay_s=0.03")
+    assert merge(study, steps, fit, CATALOGUE, 0) == (steps, fit)
