@@ -8,9 +8,9 @@ from itertools import combinations
 
 import numpy as np
 
-from forcegrasp.diagnosis.evidence import LEAST_RISE, is_beyond_chance
+from forcegrasp.diagnosis.evidence import LEAST_RISE, is_beyond_chance, nearly_as_much
 from forcegrasp.diagnosis.exchange import are_alike
-from forcegrasp.diagnosis.families import contain, refit_as, refit_without, roughly_as
+from forcegrasp.diagnosis.families import contain, refit_as, refit_without, roughly_as, roughly_without
 from forcegrasp.diagnosis.needless import SURELY, chained, is_enough
 from forcegrasp.diagnosis.result import Step, kept_steps
 from forcegrasp.diagnosis.signatures import trials
@@ -74,11 +74,13 @@ def _like_both(pair: Collection[str], fit: Fit, effects: Sequence[type[Effect]])
 
 
 def _roughly_as_good(study: Study, fit: Fit, pair: Collection[str], effect: type[Effect]) -> EffectSetting | None:
-    """The effect as a rough fit has it, unless that says clearly that both of the others are needed."""
+    """The effect as a rough fit has it, unless that says clearly that the others are needed."""
     less = roughly_as(trials([effect]), fit, pair, study)
     if is_beyond_chance(study.gains(less.residual, fit.residual), SURELY * LEAST_RISE):
         return None
-    return less.problem.case(less.vector).effects[-1]
+    without = roughly_without(pair, fit, study)
+    gain, most = (float(np.nansum(study.gains(without.residual, one.residual))) for one in (less, fit))
+    return less.problem.case(less.vector).effects[-1] if nearly_as_much(gain, most) else None
 
 
 def _with_one(study: Study, steps: Sequence[Step], fit: Fit, pair: Collection[str]) -> list[Step]:
