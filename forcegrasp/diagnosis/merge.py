@@ -63,7 +63,7 @@ def _one_for_two(
 
 
 def _like_both(pair: Collection[str], fit: Fit, effects: Sequence[type[Effect]]) -> Iterator[type[Effect]]:
-    """Effects that look like either of two, and may stand beside all others of the model."""
+    """Effects that look like both of two, and may stand beside all others of the model."""
     known = [one.effect for one in fit.problem.effects]
     two, others = [e for e in known if e.name in pair], [e for e in known if e.name not in pair]
     barred = {name for other in others for name in other.instead_of}
