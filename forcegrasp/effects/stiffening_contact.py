@@ -8,30 +8,35 @@ from forcegrasp.effects.base import Contribution, Effect, Parameter, State
 from forcegrasp.effects.touch import contact_push, depth_in_object, untouched
 from forcegrasp.physics.plant import Plant
 
-#: Depth at which the cubic spring's force is given, metres.
+#: Depth at which the spring's force is given, metres.
 DEPTH_M = 0.001
 
 
 class StiffeningContact(Effect):
-    """A steeper impedance curve of the object's contact, or a hardening spring beside it."""
+    """A steeper impedance curve of the object's contact, or a spring beside it whose force is a power of the depth.
+
+    Power 1 is an elastic layer, 1.5 a round body (Hertz), 3 what hardens as foam does.
+    """
 
     name = "stiffening_contact"
     stage = "contact"
     family = "contact"
     needs_object = True
     symptom = "the curve of force over squeeze is more convex than modelled"
-    formula = "d(r) with power p + Δp instead of p (MuJoCo's solimp), and F = F_contact + F₁ (δ / 1 mm)³"
-    source = "MuJoCo's `solimp`, last number; Duffing's hardening spring"
+    formula = "d(r) with power p + Δp instead of p (MuJoCo's solimp), and F = F_contact + F₁ (δ / 1 mm)^q"
+    source = "MuJoCo's `solimp`, last number; q is 1.5 of round bodies (Hertz 1882), 3 of Duffing's hardening spring"
     look_alikes = ("hunt_crossley_contact", "finger_compliance", "viscoelastic_contact")
     separates = "slow ramps to high force on soft objects"
     parameters = (
         Parameter("extra_power", "Δp, added to the scene's power", "1", 0.0, 8.0, 1.5),
-        Parameter("cubic_n", "force F₁ of the spring at a depth δ of 1 mm", "N", 0.0, 5.0, 0.05, follows="force"),
+        Parameter("spring_n", "force F₁ of the spring at a depth δ of 1 mm", "N", 0.0, 5.0, 0.05, follows="force"),
+        Parameter("spring_power", "power q of the spring", "1", 1.0, 6.0, 3.0, null=3.0, if_missing=3.0),
     )
 
     @classmethod
     def trials(cls) -> np.ndarray:
-        return np.array([[0.5, 0.0], [2.0, 0.0], [5.0, 0.0], [0.0, 0.01], [0.0, 0.04], [0.0, 0.15]])
+        curves = [[extra, 0.0, 3.0] for extra in (0.5, 2.0, 5.0)]
+        return np.array([*curves, *([0.0, force, power] for power in (1.0, 3.0) for force in (0.01, 0.04, 0.15))])
 
     def init(self, which: np.ndarray) -> State:
         # no motor can press harder; a long time step that overshoots must not be thrown back with more
@@ -45,7 +50,8 @@ class StiffeningContact(Effect):
 
     def act(self) -> Contribution:
         depth = np.maximum(depth_in_object(self, self.pad_force), 0.0)
-        self.state["push"] = push = np.minimum(self["cubic_n"] * (depth / DEPTH_M) ** 3, self.state["strongest"])
+        spring = self["spring_n"] * (depth / DEPTH_M) ** self["spring_power"]
+        self.state["push"] = push = np.minimum(spring, self.state["strongest"])
         return contact_push(push)
 
     def interaction(self, force: np.ndarray) -> np.ndarray:

@@ -17,6 +17,7 @@ class Prior:
     low: float  #: sizes are drawn between these multiples of the typical one, evenly in their logarithm
     high: float
     why: str
+    fixed: tuple[str, ...] = ()  #: parameters that are what is typical
 
 
 #: By effect of the catalogue. No robot has what is not here: mistakes of a measurement set, effects of drives alone,
@@ -41,7 +42,9 @@ EFFECTS = {
     "back_emf": Prior(0.15, 2, 10, "assumed: as the limit of force"),
     "backlash": Prior(0.4, 0.2, 2, "assumed: 0.1 to 1.2 mm at a fingertip 45 mm from open to closed"),
     "finger_compliance": Prior(0.3, 0.1, 2, "assumed: printed fingers and soft pads, 500 to 10 000 N/m"),
-    "stiffening_contact": Prior(0.5, 0.3, 2, "round and soft bodies stiffen as they are pressed (Hertz: power 1.5)"),
+    "stiffening_contact": Prior(
+        0.5, 0.3, 2, "round and soft bodies stiffen as they are pressed (Hertz: power 1.5)", fixed=("spring_power",)
+    ),
     "viscoelastic_contact": Prior(0.3, 0.2, 1, "assumed: foam and rubber creep, hard objects do not"),
     "adhesion": Prior(0.1, 0.2, 1, "assumed: soft pads stick a little, rarely"),
     "object_friction": Prior(0.7, 0.3, 5, "μ m g of 10 to 170 g at μ 0.3, on what the object stands on"),

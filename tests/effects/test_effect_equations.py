@@ -209,32 +209,33 @@ def test_stiffening_contact_steepens_the_impedance():
         d = 0.99 * 0.5 * (2 * r / rho) ** p
         return r * d**2 / (1 - d)
 
-    for values, p in (((0.0, 0.0), 2.0), ((1.5, 0.0), power)):
+    for values, p in (((0.0, 0.0, 3.0), 2.0), ((1.5, 0.0, 3.0), power)):
         squeeze, force = rest(values)
         assert np.all((squeeze > 0) & (squeeze < rho / 2))
         ratio = force / shape(squeeze, p)
         assert ratio == pytest.approx(ratio[0], rel=0.03)
 
 
-def test_stiffening_spring_is_cubic():
+@pytest.mark.parametrize("power", [1.0, 1.5, 3.0])
+def test_stiffening_spring_is_a_power_of_the_depth(power):
     distance, force, depth = depth_of((1.0, 0.4))
-    added = press(make("stiffening_contact", 1.5, 0.05), distance, force, 0.002 * np.cos(3 * T))
-    assert added == pytest.approx(0.05 * np.maximum(depth / 1e-3, 0) ** 3, abs=1e-9)
+    added = press(make("stiffening_contact", 1.5, 0.05, power), distance, force, 0.002 * np.cos(3 * T))
+    assert added == pytest.approx(0.05 * np.maximum(depth / 1e-3, 0) ** power, abs=1e-9)
 
 
-@pytest.mark.parametrize("cubic", [0.02, 0.1])
-def test_stiffening_spring_shares_the_load(cubic):
+@pytest.mark.parametrize(("force", "power"), [(0.02, 3.0), (0.1, 3.0), (0.1, 1.5)])
+def test_stiffening_spring_shares_the_load(force, power):
     """At rest the servo holds the contact and the spring, which are compressed alike."""
-    plant = settle("stiffening_contact", (0.0, cubic), 0.0249, 0.0247, 0.0245, 0.023, 0.0215)
+    plant = settle("stiffening_contact", (0.0, force, power), 0.0249, 0.0247, 0.0245, 0.023, 0.0215)
     spring = plant.force / FORCE_SCALE - plant.pad_force
-    assert spring == pytest.approx(cubic * ((TOUCH_M - plant.position) / 1e-3) ** 3, rel=0.08)
+    assert spring == pytest.approx(force * ((TOUCH_M - plant.position) / 1e-3) ** power, rel=0.08)
     assert plant.force == pytest.approx(GAIN * (plant.position - 0.0215) * FORCE_SCALE, rel=0.03)
     assert np.all(spring > 0.1 * plant.pad_force)
 
 
 def test_stiffening_spring_throws_no_finger_out():
     """As hard as it may be, on a small object that turns away from the pads, with 8 ms steps."""
-    plant = make_plant(1, [(get_effect("stiffening_contact"), (1.033, 4.623), "", [0])], "fast")
+    plant = make_plant(1, [(get_effect("stiffening_contact"), (1.033, 4.623, 3.0), "", [0])], "fast")
     base = {"position_gain": 105.5, "velocity_gain": -26.45, "rho_m": 0.01612, "radius_m": 0.008184}
     values = {name: np.array([value]) for name, value in (base | {"force_scale": 16.62, "offset_m": 0.02111}).items()}
     plant.reset(np.arange(1), write_base(plant, np.arange(1), values))
@@ -278,7 +279,7 @@ def test_long_steps_end_where_short_ones_do_however_stiff_the_contact(values, ta
 
 
 def test_what_effects_in_the_contact_press_bends_fingers_and_loads_gears():
-    stiff = [(get_effect("stiffening_contact"), (0.0, 0.3), "", [0])]
+    stiff = [(get_effect("stiffening_contact"), (0.0, 0.3, 3.0), "", [0])]
     for name, values in (("finger_compliance", (0.001,)), ("load_friction", (0.3,))):
         plant = make_plant(1, [*stiff, (get_effect(name), values, "", [0])], "reference")
         start(plant, [0], np.zeros(1))

@@ -92,8 +92,8 @@ def test_warning_at_a_bound(value, bound):
 
 
 def test_no_warning_where_an_effect_is_simply_not_there():
-    fit = fit_at(random_slopes(6), noise(), "stiffening_contact", cubic_n=0.0, extra_power=8.0)
-    lines = warnings(fit, np.full(6, 0.01))
+    fit = fit_at(random_slopes(7), noise(), "stiffening_contact", spring_n=0.0, extra_power=8.0)
+    lines = warnings(fit, np.full(7, 0.01))
     assert lines == ["stiffening_contact.extra_power ended at its bound 8 1: widen it or doubt the model"]
 
 
