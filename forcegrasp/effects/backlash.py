@@ -6,6 +6,7 @@ import numpy as np
 
 from forcegrasp.effects.base import Contribution, Effect, Parameter, State
 from forcegrasp.effects.touch import depth_in_object, pad_reach, untouched
+from forcegrasp.physics.contact_law import ContactLaw
 
 # A motor that is slower than this makes no difference to a contact's damping.
 _CREEP_M_S = 2e-5
@@ -47,6 +48,7 @@ class Backlash(Effect):
         apart = self.plant.clearance(self.rows[which])
         return memory | {
             "behind": apart - apart.min(axis=2, keepdims=True),  # pads behind the foremost of their side
+            "contact": self.plant.contact_numbers(self.rows[which]),
             "surface": untouched(which),
             "reach": pad_reach(self)[which],
             "motor": self.position[which],
@@ -85,12 +87,12 @@ class Backlash(Effect):
         state, dt, motor, reach = self.state, self.dt, self.position, pad_reach(self)
         passing = self.plant.to_sides(np.where(stand, motor - state["motor"], 0.0)) / dt
         pushed = np.where((passing != 0) & (state["passing"] != 0), (passing - state["passing"]) / dt, 0.0)
-        depth = depth_in_object(self, self.pad_force) - shift
+        depth = depth_in_object(self, self.pad_force, reach) - shift
         closing = (state["reach"] - reach) / dt
         further = np.zeros_like(shift)
         row, _ = at = np.nonzero((np.abs(passing) > _CREEP_M_S) & (depth > 0))
         if len(row):
-            law, near = self.plant.contact_law(self.rows[row], state["behind"][at]), depth[at] - state["further"][at]
+            law, near = ContactLaw(state["contact"][row], state["behind"][at]), depth[at] - state["further"][at]
             force = law.force(depth[at], law.damping * (closing + passing)[at])
             found = law.depth(force, law.damping * closing[at] - pushed[at], np.where(near > 0, near, depth[at]))
             further[at] = depth[at] - np.minimum(found, _DEEPEST * depth[at])

@@ -72,7 +72,7 @@ class HuntCrossleyContact(Effect):
         state, dt, mass = self.state, self.dt, self.state["mass"]
         reach = pad_reach(self)
         rate = (state["reach"] - reach) / dt
-        depth = np.maximum(depth_in_object(self, self.pad_force), 0.0)
+        depth = np.maximum(depth_in_object(self, self.pad_force, reach), 0.0)
         there = np.isfinite(self["force_n"]) & (depth > 0)
         spring = np.where(there, self["force_n"], 0.0) * (depth / state["width_m"]) ** self["power"]
         grown = 1 + self["damping_s_m"] * rate

@@ -12,7 +12,7 @@ def untouched(which: np.ndarray) -> np.ndarray:
     return np.full((len(which), 2), -np.inf)
 
 
-def depth_in_object(effect: Effect, force: np.ndarray) -> np.ndarray:
+def depth_in_object(effect: Effect, force: np.ndarray, reach: np.ndarray | None = None) -> np.ndarray:
     """Depth of the pads below the surface, metres, ``(rows, 2)``; negative above it, −inf before the first touch.
 
     Once an object is felt, its shape says where its surface is. The contact's own force does not tell: a contact that
@@ -21,8 +21,9 @@ def depth_in_object(effect: Effect, force: np.ndarray) -> np.ndarray:
     Args:
       effect: whose rows, plant and memory of the surface it is.
       force: forces of the contact itself, newtons, ``(rows, 2)``.
+      reach: of the pads, from :func:`pad_reach`; asked for by default.
     """
-    surface, reach = effect.state["surface"], pad_reach(effect)
+    surface, reach = effect.state["surface"], pad_reach(effect) if reach is None else reach
     felt = (force > 0) & np.isinf(surface)
     if felt.any():
         new = np.flatnonzero(felt.any(axis=1))

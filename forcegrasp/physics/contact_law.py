@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import functools
-from dataclasses import dataclass
-
 import numpy as np
 
 # What MuJoCo clips impedances to.
@@ -13,7 +10,19 @@ _LEAST, _MOST = 1e-4, 0.9999
 _SMALL_M, _STEPS = 1e-6, 40
 
 
-@dataclass(frozen=True, eq=False)
+def contact_numbers(solref: np.ndarray, solimp: np.ndarray) -> np.ndarray:
+    """What a :class:`ContactLaw` is made of, ``(n, 7)``, from MuJoCo's ``solref`` ``(n, 2)`` and ``solimp`` ``(n, 5)``.
+
+    Damping b in 1/s, stiffness k in 1/s², least impedance, by how much it rises, over which depth, its middle, power.
+    """
+    (first, second), (least, most, width, middle, power) = solref.T, solimp.T
+    least, most, middle = (np.clip(one, _LEAST, _MOST) for one in (least, most, middle))
+    of_times = first > 0  # else they are stiffness and damping themselves
+    damping = np.where(of_times, 2 / np.where(of_times, first, 1.0), -second) / most
+    stiffness = np.where(of_times, 1 / np.where(of_times, first * second, 1.0) ** 2, -first) / most**2
+    return np.stack([damping, stiffness, least, most - least, width, middle, np.maximum(power, 1.0)], axis=1)
+
+
 class ContactLaw:
     """The force of a side's contacts at depths r that grow by u, up to a factor: Σ d / (1 − d) · (k d r + b u).
 
@@ -22,26 +31,15 @@ class ContactLaw:
     Computation, "Constraint model").
 
     Args:
-      solref: of each row's contacts, ``(n, 2)``.
-      solimp: likewise, ``(n, 5)``.
+      numbers: of each row's contacts, from :func:`contact_numbers`, ``(n, 7)``.
       behind: how much less deep than a row's deepest each of its contacts is, metres, ``(n, contacts)``; ∞ for none.
     """
 
-    solref: np.ndarray
-    solimp: np.ndarray
-    behind: np.ndarray
-
-    @functools.cached_property
-    def damping(self) -> np.ndarray:
-        """b, in 1/s, ``(n,)``."""
-        first, second = self.solref.T
-        return np.where(first > 0, 2 / np.where(first > 0, first, 1.0), -second) / self._largest
-
-    @functools.cached_property
-    def stiffness(self) -> np.ndarray:
-        """k, in 1/s², ``(n,)``."""
-        first, second = self.solref.T
-        return np.where(first > 0, 1 / np.where(first > 0, first * second, 1.0) ** 2, -first) / self._largest**2
+    def __init__(self, numbers: np.ndarray, behind: np.ndarray) -> None:
+        self.behind = behind
+        self.damping = numbers[:, 0]  #: b, in 1/s, ``(n,)``
+        self._stiffness = numbers[:, 1:2]
+        self._curve = [numbers[:, place : place + 1] for place in range(2, numbers.shape[1])]
 
     def impedance(self, depth: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """d at depths ``(n, contacts)``, and its slope, 1/m."""
@@ -57,7 +55,8 @@ class ContactLaw:
 
     def force(self, depth: np.ndarray, more: np.ndarray) -> np.ndarray:
         """Force at a depth of the deepest contact, ``(n,)``; ``more`` adds to k d r: b u, less what the bodies have."""
-        return self._force(depth, more)[0]
+        _, d, _, aim = self._aim(depth, more)
+        return (d / (1 - d) * aim).sum(axis=1)
 
     def depth(self, force: np.ndarray, more: np.ndarray, near: np.ndarray) -> np.ndarray:
         """Depth of the deepest contact at so much force, ``(n,)``, metres.
@@ -86,22 +85,14 @@ class ContactLaw:
 
     def _force(self, depth: np.ndarray, more: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Force and how it grows with the depth, each ``(n,)``."""
-        each = depth[:, None] - self.behind
-        inside = np.where(each > 0, each, 0.0)
-        (d, slope), k = self.impedance(inside), self.stiffness[:, None]
-        aim = k * d * inside + more[:, None]
-        presses = (each > 0) & (aim > 0)
-        force = np.where(presses, d / (1 - d) * aim, 0.0)
-        growth = slope / (1 - d) ** 2 * aim + d / (1 - d) * k * (d + slope * inside)
-        return force.sum(axis=1), np.where(presses, growth, 0.0).sum(axis=1)
+        inside, d, slope, aim = self._aim(depth, more)
+        ratio = d / (1 - d)
+        growth = slope / (1 - d) ** 2 * aim + ratio * self._stiffness * (d + slope * inside)
+        return (ratio * aim).sum(axis=1), np.where(aim > 0, growth, 0.0).sum(axis=1)
 
-    @functools.cached_property
-    def _curve(self) -> list[np.ndarray]:
-        """Least impedance, by how much it rises, over which depth, its middle and its power, each ``(n, 1)``."""
-        least, _, width, middle, power = self.solimp.T
-        least, middle = np.clip(least, _LEAST, _MOST), np.clip(middle, _LEAST, _MOST)
-        return [one[:, None] for one in (least, self._largest - least, width, middle, np.maximum(power, 1.0))]
-
-    @functools.cached_property
-    def _largest(self) -> np.ndarray:
-        return np.clip(self.solimp[:, 1], _LEAST, _MOST)
+    def _aim(self, depth: np.ndarray, more: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Each contact's depth, impedance with its slope, and k d r + ``more``, 0 where it does not press."""
+        inside = np.maximum(depth[:, None] - self.behind, 0.0)
+        d, slope = self.impedance(inside)
+        aim = np.maximum(self._stiffness * d * inside + more[:, None], 0.0)
+        return inside, d, slope, np.where(inside > 0, aim, 0.0)

@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 
 from forcegrasp.physics.attached_effects import AttachedEffects
-from forcegrasp.physics.contact_law import ContactLaw
+from forcegrasp.physics.contact_law import contact_numbers
 from forcegrasp.physics.gripper import OF_READINGS, START_VELOCITY, Gripper
 from forcegrasp.physics.model_fields import ModelFields
 from forcegrasp.physics.protocols import PlantEffect
@@ -111,13 +111,10 @@ class Plant(ModelFields):
         found = [self.distances(self.field("geom_size")[row], self._qpos[row]) for row in rows]
         return np.array(found).reshape(len(rows), 2, max(map(len, self._pad_geoms)))
 
-    def contact_law(self, rows: np.ndarray, behind: np.ndarray) -> ContactLaw:
-        """How hard objects press back on pads that lie so much behind the foremost, metres, ``(len(rows), pads)``.
-
-        Where the object's softness alone decides.
-        """
+    def contact_numbers(self, rows: np.ndarray) -> np.ndarray:
+        """How hard objects press back, by their softness alone, ``(len(rows), 7)``; see :mod:`.contact_law`."""
         geom = self.object_geoms[0]
-        return ContactLaw(self.field("geom_solref")[rows, geom], self.field("geom_solimp")[rows, geom], behind)
+        return contact_numbers(self.field("geom_solref")[rows, geom], self.field("geom_solimp")[rows, geom])
 
     def presses(self, rows: np.ndarray) -> np.ndarray:
         """Which motors' pads an object pushes against, ``(len(rows), motors)``."""

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from forcegrasp.physics.contact_law import ContactLaw
+from forcegrasp.physics.contact_law import ContactLaw, contact_numbers
 
 _SCENE = """
 <mujoco>
@@ -42,7 +42,7 @@ def _pressed(model: mujoco.MjModel, depth: float, speed: float) -> float:
 @pytest.mark.parametrize("solimp", _SOLIMPS)
 def test_force_is_the_engines(solref, solimp):
     model = mujoco.MjModel.from_xml_string(_SCENE.format(solref=solref, solimp=solimp))
-    law = ContactLaw(_numbers(solref, 2), _numbers(solimp, 5), np.zeros((1, 1)))
+    law = ContactLaw(contact_numbers(_numbers(solref, 2), _numbers(solimp, 5)), np.zeros((1, 1)))
 
     def expected(depth: float, speed: float) -> float:
         return float(law.force(np.array([depth]), law.damping * speed)[0])
@@ -57,7 +57,7 @@ def test_force_is_the_engines(solref, solimp):
 @pytest.mark.parametrize("behind", [(0.0,), (0.0, 3e-4, 3e-4, np.inf)])
 def test_depth_presses_as_hard_at_another_speed(solimp, speed, behind):
     depth, rows = np.linspace(1e-4, 5e-3, 40), np.ones((40, 1))
-    law = ContactLaw(rows * _numbers("0.02 1", 2), rows * _numbers(solimp, 5), rows * np.array(behind))
+    law = ContactLaw(rows * contact_numbers(_numbers("0.02 1", 2), _numbers(solimp, 5)), rows * np.array(behind))
     still = law.force(depth, np.zeros(40))
     found = law.depth(still, law.damping * speed, depth)
     near = 1e-6  # where contacts press harder however shallow, next to 0 is right
@@ -67,12 +67,8 @@ def test_depth_presses_as_hard_at_another_speed(solimp, speed, behind):
 
 
 def test_pads_that_lie_behind_press_later():
-    law = ContactLaw(
-        np.tile(_numbers("0.02 1", 2), (2, 1)),
-        np.tile(_numbers("0 0.99 0.0065", 5), (2, 1)),
-        np.array([[0.0, 1e-3]] * 2),
-    )
-    alone = ContactLaw(law.solref, law.solimp, np.zeros((2, 1)))
+    numbers = np.tile(contact_numbers(_numbers("0.02 1", 2), _numbers("0 0.99 0.0065", 5)), (2, 1))
+    law, alone = ContactLaw(numbers, np.array([[0.0, 1e-3]] * 2)), ContactLaw(numbers, np.zeros((2, 1)))
     depth, none = np.array([0.9e-3, 2.5e-3]), np.zeros(2)
     expected = alone.force(depth, none) + np.array([0.0, alone.force(np.array([1.0, 1.5e-3]), none)[1]])
     np.testing.assert_allclose(law.force(depth, none), expected, rtol=1e-12)
@@ -81,6 +77,6 @@ def test_pads_that_lie_behind_press_later():
 def test_impedance_rises_by_its_slope():
     depth, rows = np.linspace(1e-5, 9e-3, 50), np.ones((50, 1))
     for solimp in _SOLIMPS:
-        law = ContactLaw(rows * _numbers("0.02 1", 2), rows * _numbers(solimp, 5), np.zeros((50, 1)))
+        law = ContactLaw(rows * contact_numbers(_numbers("0.02 1", 2), _numbers(solimp, 5)), np.zeros((50, 1)))
         (low, slope), (high, _) = law.impedance(depth[:, None]), law.impedance(depth[:, None] + 1e-9)
         np.testing.assert_allclose((high - low) / 1e-9, slope, rtol=1e-3, atol=1e-3)
