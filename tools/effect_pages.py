@@ -52,16 +52,18 @@ _OFF_CENTRE = Show(
     ((25.8, 0.015, 0.4), (22.5, 0.003, 0.3), (27.2, 0.006, 0.2)),
     offset_m=0.002,
 )
+_STEPS_OF_SEVERAL_SIZES = Show(
+    "steps of 0.6, 1.8 and 4.5 mm, and a slow ramp",
+    ((26.9, JUMP, 0.4), (25.1, JUMP, 0.5), (26.5, 0.006, 0.2), (22, JUMP, 0.7), (23.2, 0.006, 0.2)),
+)
 _PLANS = {
     "command_deadband": Show(
         "steps of 0.2 mm and of 0.4 mm in free air, a squeeze, a release in increments of 0.1 mm",
         ((27.3, JUMP, 0.28), (27.1, JUMP, 0.28), (26.9, JUMP, 0.28), (26.7, JUMP, 0.28),
          (27.1, JUMP, 0.28), (27.5, JUMP, 0.28), (22.5, 0.015, 0.3), (23.5, 0.0025, 0.3)),
     ),
-    "rate_limit": Show(
-        "steps of 0.6, 1.8 and 4.5 mm, and a slow ramp",
-        ((26.9, JUMP, 0.4), (25.1, JUMP, 0.5), (26.5, 0.006, 0.2), (22, JUMP, 0.7), (23.2, 0.006, 0.2)),
-    ),
+    "rate_limit": _STEPS_OF_SEVERAL_SIZES,
+    "rate_limited_lag": _STEPS_OF_SEVERAL_SIZES,
     "stiction": Show(
         "slow ramps and pauses in free air, and a slow squeeze",
         ((26, 0.0012, 0.2), (27, 0.0012, 0.2), (26.6, 0.0012, 0.2), (23, 0.004, 0.3)),

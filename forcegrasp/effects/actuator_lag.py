@@ -16,7 +16,7 @@ class ActuatorLag(Effect):
     symptom = "like a delay, but rounded: steps in the command arrive as exponentials"
     formula = "τ du'/dt = u − u'"
     source = "first-order lag; MuJoCo's `dyntype=filterexact` does the same for one value per model"
-    look_alikes = ("command_delay", "rate_limit")
+    look_alikes = ("command_delay", "rate_limited_lag", "rate_limit")
     separates = "fast steps: a lagged response has no corner"
     parameters = (Parameter("time_constant_s", "time constant τ", "s", 0.0, 0.5, 0.05, trials=(0.01, 0.04, 0.12)),)
     known_beforehand = ("",)

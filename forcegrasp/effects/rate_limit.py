@@ -17,7 +17,7 @@ class RateLimit(Effect):
     symptom = "fast commands become ramps of one constant slope; slow ones are followed"
     formula = "|du'/dt| ≤ v"
     source = "slew limit of position drivers"
-    look_alikes = ("force_limit", "actuator_lag", "command_delay", "back_emf")
+    look_alikes = ("rate_limited_lag", "force_limit", "actuator_lag", "command_delay", "back_emf")
     separates = "steps of several sizes: the slope stays, the time to arrive grows with the step"
     parameters = (
         Parameter(

@@ -47,6 +47,7 @@ _SHIPPED = (
     "presliding",
     "quantisation",
     "rate_limit",
+    "rate_limited_lag",
     "readout_skew",
     "smooth_friction",
     "stiction",

@@ -95,6 +95,29 @@ def test_rate_limit_makes_ramps(height):
     assert send(make("rate_limit", 0.02), 0.019 * T) == pytest.approx(0.019 * T, abs=1e-12)
 
 
+@pytest.mark.parametrize("height", [0.0006, 0.016])
+def test_rate_limited_lag_makes_ramps_that_end_in_an_exponential(height):
+    """What is left of a step falls by v until it is v τ, and from there by its τ-th part."""
+    rate, tau = 0.02, 0.05
+    left = height - send(make("rate_limited_lag", rate, tau), np.where(T < 0.1, 0.0, height))[T >= 0.1]
+    ramp = max(height - rate * tau, 0.0) / rate  # seconds that it takes
+    since = T[T >= 0.1] - 0.1 + DT
+    expected = np.where(
+        since < ramp, height - rate * since, min(height, rate * tau) * np.exp(-np.maximum(since - ramp, 0) / tau)
+    )
+    assert left == pytest.approx(expected, abs=3e-5 if ramp else 1e-12)  # where it bends lies within a step
+
+
+def test_rate_limited_lag_is_a_rate_limit_or_a_lag_where_the_other_is_not_there():
+    command = 0.01 * wave()
+    np.testing.assert_array_equal(
+        send(make("rate_limited_lag", 0.02, 0.0), command), send(make("rate_limit", 0.02), command)
+    )
+    np.testing.assert_allclose(
+        send(make("rate_limited_lag", np.inf, 0.05), command), send(make("actuator_lag", 0.05), command), rtol=1e-12
+    )
+
+
 def test_actuator_lag_is_an_exponential():
     tau = 0.05
     sent = send(make("actuator_lag", tau), np.where(T < 0.1, 0.0, 1.0))
