@@ -8,14 +8,17 @@ from forcegrasp.effects.base import Effect, Parameter
 
 
 class ForceSaturation(Effect):
-    """A sensor that reads no more than its range."""
+    """A sensor that reads no more than its range, and may bend towards it.
+
+    At k = 0 it reads all up to F as it is; with k = 0.4 nearly as F tanh(f / F), with k = 1 half of F at F.
+    """
 
     name = "force_saturation"
     stage = "sensor"
     family = "force sensor"
     symptom = "force reaches a plateau at one value, for all objects alike, while the finger goes on closing"
-    formula = "f' = clip(f, −F, F)"
-    source = "range of the sensor or its amplifier"
+    formula = "f' = f / (1 + |f / F|^(1/k))^k, which is clip(f, −F, F) at k = 0"
+    source = "range of the sensor or its amplifier; the blend of two asymptotes of Churchill and Usagi (1972)"
     look_alikes = ("force_limit",)
     separates = "the finger's position, and objects that need more force"
     parameters = (
@@ -31,9 +34,18 @@ class ForceSaturation(Effect):
             trials=tuple(np.geomspace(0.08, 5, 14)),
             follows="force",
         ),
+        Parameter("knee", "how early it bends k", "1", 0.0, 1.0, 0.1, null=0.1, trials=(0.0, 0.4), if_missing=0.0),
     )
     order = 8
     least_channels = 1
 
     def read_force(self, force: np.ndarray) -> np.ndarray:
-        return np.clip(force, -self["level_n"], self["level_n"])
+        level, knee = self["level_n"], self["knee"]
+        clipped = np.clip(force, -level, level)
+        bends = (knee > 0) & np.isfinite(level)
+        if not bends.any():
+            return clipped
+        power = 1 / np.where(bends, knee, 1.0)
+        with np.errstate(divide="ignore"):  # no force at all; by logarithms, as powers grow beyond all numbers
+            bent = np.exp(-np.logaddexp(-power * np.log(np.abs(force)), -power * np.log(level)) / power)
+        return np.where(bends, np.sign(force) * bent, clipped)

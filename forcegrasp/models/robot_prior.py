@@ -6,7 +6,8 @@ Sizes are multiples of the effect's typical one on the gripper in question, so t
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 
 @dataclass(frozen=True)
@@ -17,7 +18,7 @@ class Prior:
     low: float  #: sizes are drawn between these multiples of the typical one, evenly in their logarithm
     high: float
     why: str
-    fixed: tuple[str, ...] = ()  #: parameters that are what is typical
+    fixed: Mapping[str, float] = field(default_factory=dict)  #: parameters that are alike for all robots
 
 
 #: By effect of the catalogue. No robot has what is not here: mistakes of a measurement set, effects of drives alone,
@@ -44,7 +45,7 @@ EFFECTS = {
     "backlash": Prior(0.4, 0.2, 2, "assumed: 0.1 to 1.2 mm at a fingertip 45 mm from open to closed"),
     "finger_compliance": Prior(0.3, 0.1, 2, "assumed: printed fingers and soft pads, 500 to 10 000 N/m"),
     "stiffening_contact": Prior(
-        0.5, 0.3, 2, "round and soft bodies stiffen as they are pressed (Hertz: power 1.5)", fixed=("spring_power",)
+        0.5, 0.3, 2, "round and soft bodies stiffen as they are pressed (Hertz: power 1.5)", fixed={"spring_power": 3.0}
     ),
     "viscoelastic_contact": Prior(0.3, 0.2, 1, "assumed: foam and rubber creep, hard objects do not"),
     "adhesion": Prior(0.1, 0.2, 1, "assumed: soft pads stick a little, rarely"),
@@ -57,7 +58,7 @@ EFFECTS = {
     "force_deadzone": Prior(0.3, 0.25, 1.5, "the paper's robot: 65 mN (real-table.md)"),
     "force_drift": Prior(0.2, 0.05, 0.5, "assumed: a few per cent of the range within a grasp"),
     "force_bias": Prior(0.4, 0.1, 1, "assumed: what is left after a sensor was set to zero"),
-    "force_saturation": Prior(0.1, 2, 10, "assumed; lower ones would hide most goals"),
+    "force_saturation": Prior(0.1, 2, 10, "assumed; lower ones would hide most goals", fixed={"knee": 0.0}),
     "readout_skew": Prior(0.3, 0.2, 1.3, "found in logs of a jaw, up to a sample of 20 ms (real-data.md)"),
     "encoder_bias": Prior(0.3, 0.2, 2, "assumed: homing to 0.06 to 0.6 mm"),
     "quantisation": Prior(0.7, 0.1, 1, "assumed: encoders of 9 to 12 bits over the travel, 25 to 250 steps a newton"),

@@ -199,8 +199,8 @@ def _present(setting: EffectSetting) -> np.ndarray:
 
 def _range(effect: type[Effect], parameter: Parameter, prior: Prior) -> tuple[float, float]:
     """Smallest and largest absolute value that is drawn."""
-    if parameter.name in prior.fixed:
-        return parameter.typical, parameter.typical
+    if (value := prior.fixed.get(parameter.name)) is not None:
+        return value, value
     own = {"mass_factor": MASS, "friction_factor": FRICTION}
     shapes = np.isfinite(parameter.null) and parameter.null != 0
     low, high = own.get(parameter.name, SHAPE if shapes else (prior.low, prior.high))[:2]
@@ -212,8 +212,8 @@ def _range(effect: type[Effect], parameter: Parameter, prior: Prior) -> tuple[fl
 def _sizes(
     rng: np.random.Generator, effect: type[Effect], parameter: Parameter, prior: Prior, count: int
 ) -> np.ndarray:
-    if parameter.name in prior.fixed:
-        return np.full(count, parameter.typical)
+    if (value := prior.fixed.get(parameter.name)) is not None:
+        return np.full(count, value)
     size = _log_uniform(rng, *_range(effect, parameter, prior), count)
     return size * rng.choice([-1, 1], count) if parameter.low < 0 else size
 

@@ -482,8 +482,19 @@ def test_force_bias():
     assert out == pytest.approx(np.stack([wave() + 0.06, 0 * T - 0.04], axis=1), abs=1e-12)
 
 
+@pytest.mark.parametrize("knee", [0.002, 0.4, 1.0])
+def test_force_saturation_bends(knee):
+    force = wave()
+    assert np.abs(force).max() > 0.6
+    out = read(make("force_saturation", 0.5, knee), force)[:, 0]
+    if knee < 0.01:  # as good as sharp, and no number is too large
+        assert out == pytest.approx(np.clip(force, -0.5, 0.5), abs=1e-3)
+    else:
+        assert out == pytest.approx(force / (1 + np.abs(force / 0.5) ** (1 / knee)) ** knee, rel=1e-9, abs=1e-12)
+
+
 def test_force_saturation():
-    out = read(make("force_saturation", 0.5), wave())[:, 0]
+    out = read(make("force_saturation", 0.5, 0.0), wave())[:, 0]
     assert out.max() == 0.5
     assert out.min() == -0.5
     inside = np.abs(wave()) < 0.5

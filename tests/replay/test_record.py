@@ -69,7 +69,7 @@ def test_replay_with_the_true_parameters_is_the_recording(gripper):
 def test_every_effect_can_be_recorded_and_replayed(effect, variant):
     """The replay knows recorded positions only, not what happened; that is enough for every effect alone."""
     # the typical converter saturates beyond what this grasp presses
-    strength = np.array([0.1]) if effect.name == "force_saturation" else effect.typical_values()
+    strength = np.array([0.1, 0.0]) if effect.name == "force_saturation" else effect.typical_values()
     use = EffectSetting(effect, variant, strength)
     made = make(effects=(use,), grasps=1)
     assert signals(made).tobytes() != signals(plain())[:1].tobytes()
