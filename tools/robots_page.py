@@ -30,7 +30,6 @@ def table() -> Iterator[str]:
                 " 1"
             )
             for p, low, high in ranges[name]
-            if p.name not in prior.fixed
         )
         signed = " (±)" if any(p.low < 0 for p, _, _ in ranges[name]) else ""
         yield f"| `{name}` | {100 * prior.chance:.0f} % | {sizes}{signed} | {prior.why} |"

@@ -79,8 +79,11 @@ def draw_robots(gripper: Gripper, rng: np.random.Generator, count: int) -> Robot
 
 
 def size_ranges(gripper: Gripper) -> dict[str, list[tuple[Parameter, float, float]]]:
-    """Effect → each of its parameters, with the smallest and the largest absolute value that is drawn."""
-    return {e.name: [(p, *_range(e, p, prior)) for p in e.parameters] for e, prior in _possible(gripper)}
+    """Effect → each of its parameters that is drawn, with the smallest and the largest absolute value."""
+    return {
+        e.name: [(p, *_range(e, p, prior)) for p in e.parameters if p.name not in prior.fixed]
+        for e, prior in _possible(gripper)
+    }
 
 
 def population(gripper: Gripper, count: int) -> Robots:
