@@ -9,6 +9,7 @@ import numpy as np
 
 from forcegrasp.diagnosis.doubt import leaves_less, more_likely, with_fault
 from forcegrasp.diagnosis.faults import Fault, leaves_nothing, suspects
+from forcegrasp.diagnosis.late_rows import may_be_late_rows
 from forcegrasp.diagnosis.law import find_law
 from forcegrasp.diagnosis.moved_set import go_on_with_moved, within_tolerance_after_all
 from forcegrasp.diagnosis.result import Diagnosis, Step
@@ -75,7 +76,7 @@ def diagnose_set(
     def with_law(diagnosis: Diagnosis, simulators: Simulators) -> tuple[Diagnosis, Simulators]:
         rng = np.random.default_rng(seed + 2)
         found = find_law(diagnosis, simulators, rng, progress) if law else None
-        return dataclasses.replace(diagnosis, law=found, law_sought=law), simulators
+        return dataclasses.replace(may_be_late_rows(diagnosis, loaded), law=found, law_sought=law), simulators
 
     def put_right(fault: Fault) -> tuple[Fault, Fitted] | None:
         progress(f"fitting the set with {fault.name} put right")

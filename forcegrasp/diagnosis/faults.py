@@ -41,6 +41,7 @@ class Fault(ShortRepr):
     least_m: float = SEEN_M  #: by how much less they were as given
     of_most: bool = False  #: radii of most objects are doubted, so that an effect may do as well
     wider: Fault | None = None  #: the same of more objects, to be tried if something is left
+    instead_of: str = ""  #: the one effect that it stands for where it is a rival; otherwise it stands for all
 
     def is_borne_out(self, fit: Fit) -> bool:
         """Whether a fit of the set put right, with the effects that were found, still wants other radii than given."""

@@ -58,7 +58,8 @@ def fault_words(diagnosis: Diagnosis) -> str:
         as_given = f"as given the error is {diagnosis.error_before:.2f} × noise"
         return f"What the set gives was moved within its tolerance: {diagnosis.fault.words}; {as_given}."
     if diagnosis.fault_is_rival:
-        return f"Or the set is wrong, and nothing is missing: {named}; these data can't tell which."
+        not_there = f"there is no {diagnosis.fault.instead_of}" if diagnosis.fault.instead_of else "nothing is missing"
+        return f"Or the set is wrong, and {not_there}: {named}; these data can't tell which."
     return f"The set seems to be wrong: {named}. What follows is of the set with that put right."
 
 
@@ -72,11 +73,13 @@ def _of_step(step: Step, diagnosis: Diagnosis) -> str:
 
 
 def row_sentence(diagnosis: Diagnosis) -> str:
-    """Delays of whole rows, which the set itself may have; empty if there are none."""
+    """Delays of whole rows, which the set itself may have; empty if there are none, or the answer says so."""
     step = float(np.median(np.concatenate([np.diff(grasp.time_s) for grasp in diagnosis.target.grasps])))
     whole = []
     for effect, parameters in found_parameters(diagnosis).items():
         rows = parameters["delay_s"].value / step if "delay_s" in parameters else 0.0
+        if diagnosis.fault is not None and diagnosis.fault.instead_of == effect:
+            continue
         if round(rows) and abs(rows - round(rows)) < _WHOLE:
             whole.append(f"{effect} is {counted(round(rows), 'row')} of the set")
     if not whole:
