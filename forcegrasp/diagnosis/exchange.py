@@ -35,6 +35,7 @@ def exchange(
       rng: for the null distribution.
     """
     held, known = study.heldout(fit), {one.effect.name: one.effect for one in fit.problem.effects}
+    most = fit.cost - LEAST_SHARE * study.target.beyond_noise(fit.residual)
     names = [step.effects[0] for step in kept_steps(steps) if step.effects[0] in known and not step.is_counted]
     for name in names if len(names) > 1 else ():  # the only one was chosen with all there is in the model
         # a mistake of the set may look like anything
@@ -42,7 +43,7 @@ def exchange(
         if not alike:
             continue
         study.progress(f"looking for what may stand in place of {name}")
-        found = look_further(study, roughly_without(name, fit, study), screen, alike, rng)
+        found = look_further(study, roughly_without(name, fit, study), screen, alike, rng, most=most)
         if not found.effects:
             continue
         best = dataclasses.replace(_against(found.candidates[0], held, study), replaces=name)

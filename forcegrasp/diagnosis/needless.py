@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from forcegrasp.diagnosis.result import Step
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.identify.fit import Fit
 from forcegrasp.identify.noise_floor import excess
+from forcegrasp.identify.side_by_side import side_by_side
 
 #: Few grasps decide if they ask so many times as clearly for an effect as is enough.
 SURELY = 10.0
@@ -152,11 +154,12 @@ def _is_surely_needed(name: str, fit: Fit, study: Study) -> bool:
 def _without_needless(study: Study, fit: Fit, names: Sequence[str]) -> tuple[str, Fit] | None:
     """That one of these effects which held-out grasps ask for least, if they don't, and the fit without it."""
     held, without = study.heldout(fit), {}
-    for name in names:
-        if _is_surely_needed(name, fit, study):
-            continue
+    surely = side_by_side([partial(_is_surely_needed, name, fit, study) for name in names])
+    doubted = [name for name, is_needed in zip(names, surely, strict=True) if not is_needed]
+    for name in doubted:
         study.progress(f"fitting without {name}")
-        less = refit_without(name, fit, study)
+    fits = side_by_side([partial(refit_without, name, fit, study) for name in doubted])
+    for name, less in zip(doubted, fits, strict=True):
         if not is_beyond_chance(study.gains(study.heldout(less), held), LEAST_RISE):
             without[name] = less
     return min(without.items(), key=lambda item: item[1].cost) if without else None

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import ndtr, ndtri
 
+from forcegrasp.diagnosis.stray_readings import stray_readings
 from forcegrasp.identify.cross_validation import rms
 from forcegrasp.identify.noise_floor import excess, numerical_floor
 from forcegrasp.identify.target import Target
@@ -17,8 +18,9 @@ _LAGS = 5
 # Of the mean square beyond the assumed noise, so much may follow from the sample before and still be called
 # noise: no effect that explains less is looked for. And so much may phases, speeds and forces differ by.
 _IN_TIME, _BETWEEN_GROUPS = 0.25, 0.35
-# A group has the assumed noise if that explains it so much better than the noise of all groups (log likelihood ratio).
-_LOG_RATIO, _LEAST_SAMPLES = np.log(3.0), 40
+# A group has the assumed noise if that explains it so much better than the noise of all groups (likelihood ratio),
+# times the number of groups that are asked (Bonferroni).
+_RATIO, _LEAST_SAMPLES = 3.0, 40
 # Residuals are counted between these quantiles of their sizes, and beyond so many σ; the rarest class is of this share.
 _QUANTILES, _OUTLIER, _LEAST_SHARE = (0.25, 0.5, 0.75, 0.9, 0.97), 4.0, 1e-3
 # Readings that scatter less than this share of the assumed noise.
@@ -45,11 +47,12 @@ class Noise:
     core: np.ndarray  #: the same of the middle half of them, which tails don't reach, ``(C,)``
     affected: np.ndarray  #: which signals it concerns, ``(C,)``
     memory: np.ndarray  #: correlation of each reading's noise with that of the reading before; 0 if white, ``(C,)``
+    has_stray: np.ndarray | bool = False  #: whether single readings that are far off are all that is odd, ``(C,)``
 
     @property
     def heavy_tails(self) -> np.ndarray:
         """Which of these signals have more outliers than a normal distribution, ``(C,)``."""
-        return self.affected & (self.ratio > _HEAVY * self.core)
+        return self.affected & (self.has_stray | (self.ratio > _HEAVY * self.core))
 
     @property
     def stronger(self) -> bool:
@@ -80,11 +83,11 @@ def unexpected_noise(
         smaller = ratio < _SMALLER
         return Noise(ratio, core, smaller, np.zeros(count)) if smaller.any() else None
     clean, affected, memory = residual.copy(), np.zeros(count, bool), np.zeros(count)
-    for k, signal in enumerate(one):
+    states = [predicted[..., target.axis.side_of(k)] for k in range(count)]
+    partitions = [_partitions(target, state) for state in states]
+    for k, (signal, state, groups) in enumerate(zip(one, states, partitions, strict=True)):
         values, floor = residual[..., k], numerical_floor(numerical, target, signal)
         scores, beyond = _normal_scores(values, _present(values, target)), 1 - (min(floor, core[k]) / ratio[k]) ** 2
-        state = predicted[..., target.axis.side_of(k)]
-        groups = _partitions(target, state)
         if _some_group_as_assumed(values / floor, groups):
             continue
         if _is_white(scores, beyond, groups):
@@ -95,7 +98,13 @@ def unexpected_noise(
         new, leaning = _innovations(scores)
         if 0 < leaning < _SLOWEST and _is_white(new, beyond, groups) and foretold(scores, state, target) < _BY_STATE:
             clean[..., k], affected[k], memory[k] = new, True, leaning
-    return None if excess(clean, numerical, target) else Noise(ratio, core, affected, memory)
+    if not excess(clean, numerical, target):
+        return Noise(ratio, core, affected, memory)
+    stray = stray_readings(np.where(target.mask[..., None], residual, np.nan), partitions)
+    if not stray.any() or excess(np.where(stray, np.nan, residual), numerical, target):
+        return None
+    has_stray = np.asarray(stray.any(axis=(0, 1)))
+    return Noise(ratio, core, has_stray, np.zeros(count), has_stray)
 
 
 def _present(values: np.ndarray, target: Target) -> np.ndarray:
@@ -209,7 +218,8 @@ def _some_group_as_assumed(values: np.ndarray, partitions: Sequence[np.ndarray])
     of_all = counted(everything) / len(everything)
     evidence = np.log(np.maximum(of_all, _LEAST_SHARE) / np.maximum(assumed, _LEAST_SHARE))
     counts = [counted(group) for partition in partitions for group in _grouped(sizes, partition)]
-    return any(count @ evidence < -_LOG_RATIO for count in counts if count.sum() >= _LEAST_SAMPLES)
+    counts = [count for count in counts if count.sum() >= _LEAST_SAMPLES]
+    return any(count @ evidence < -np.log(_RATIO * len(counts)) for count in counts)
 
 
 def _at_most(square: float, of_noise: float, terms: int) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from forcegrasp.diagnosis.study import Study
 from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.identify.fit import Fit, fit_once
 from forcegrasp.identify.problem import Problem
+from forcegrasp.identify.side_by_side import side_by_side
 from forcegrasp.short_repr import ShortRepr
 
 # At its best size an effect promises nearly what a fit will gain, and fitted to few grasps what it gains on all: one
@@ -45,21 +47,20 @@ def refine(scores: Sequence[Score], study: Study, fit: Fit, background: Backgrou
     racing = {*_in_the_race([one.gain for one, _ in sized], _LOST), *_in_the_race([few for _, few in sized], _LOST)}
     pairs = sorted(((sized[i][0], scores[i]) for i in racing), key=lambda pair: -pair[0].gain)
     some, part = study.on_few(fit)
-    fits: list[Fit] = []
-    for number, (sized, _) in enumerate(pairs, 1):
-        setting = sized.setting
-        study.progress(f"refitting with {setting.effect.name} {setting.variant} ({number} of {len(pairs)})")
-        fits.append(_fit_from(part.vector, setting, some, part))
+    settings = [sized.setting for sized, _ in pairs]
+    for setting in settings:
+        study.progress(f"refitting with {setting.effect.name} {setting.variant}")
+    fits = side_by_side([partial(_fit_from, part.vector, setting, some, part) for setting in settings])
     if some is study:
         return [Refined(score, one) for (_, score), one in zip(pairs, fits, strict=True)]
-    refined = []
     racing = _in_the_race([part.cost - one.cost for one in fits], _LOST_IF_FITTED)
-    for i in (i for i in racing if not _adds_nothing(fits[i], fits)):
-        few, setting = fits[i], fits[i].problem.case(fits[i].vector).effects[-1]
-        start = fit.moved(part.problem, few.vector[: len(part.problem)])
+    left = [i for i in racing if not _adds_nothing(fits[i], fits)]
+    tasks = []
+    for few in (fits[i] for i in left):
+        setting = few.problem.case(few.vector).effects[-1]
         study.progress(f"refitting with {setting.effect.name} {setting.variant} on all grasps")
-        refined.append(Refined(pairs[i][1], _fit_from(start, setting, study, fit)))
-    return refined
+        tasks.append(partial(_fit_from, fit.moved(part.problem, few.vector[: len(part.problem)]), setting, study, fit))
+    return [Refined(pairs[i][1], refitted) for i, refitted in zip(left, side_by_side(tasks), strict=True)]
 
 
 def _in_the_race(gains: Sequence[float], least: float) -> list[int]:

@@ -152,6 +152,7 @@ class Diagnosis(ShortRepr):
     law: FoundLaw | None = None  #: that explains what no effect does, if one was looked for and found
     law_sought: bool = False  #: whether one was looked for
     fault: Fault | None = None  #: of the set: put right in all of the above; or else the last of the rivals
+    alone: str = ""  #: the one grasp that shows more than noise, in words, where all others show none; empty if none
 
     @property
     def preferred(self) -> tuple[str, ...]:

@@ -22,7 +22,7 @@ from forcegrasp.diagnosis.study import Study
 from forcegrasp.diagnosis.verdict import MUCH, conclude, explained_share
 from forcegrasp.effects import Effect
 from forcegrasp.identify.base_fit import BaseFit
-from forcegrasp.identify.cross_validation import evidence_folds, make_folds
+from forcegrasp.identify.cross_validation import evidence_folds, make_folds, rms_of_grasps
 from forcegrasp.identify.fit import Fit, Simulators
 from forcegrasp.identify.noise_floor import beyond_fit, excess, numerical_error, numerical_floor
 from forcegrasp.identify.progress import Progress, silent
@@ -32,6 +32,8 @@ from forcegrasp.identify.weights import reweigh
 
 #: Largest number of effects that are looked for.
 MOST_EFFECTS = 8
+# Of so many grasps one alone says nothing of the gripper: where fingers push an object is a matter of chance.
+_MANY = 12
 # Where the base fit stopped short, parameters are a little off: so many times the floor is as good as nothing left.
 _AS_GOOD_AS_NOTHING = 1.1
 
@@ -104,7 +106,7 @@ def diagnose(
     if believed is not None and not _convincing(believed[2], believed[1], study, fit):
         steps, fit, study = believed
         target = study.target
-    error_after, (left, noise) = study.error(study.heldout(fit)), _left(study, fit)
+    error_after, (left, noise, alone) = study.error(study.heldout(fit)), _left_by_many(study, fit)
     much_left = bool(left) and error_after > MUCH * floor
     steps = settle_ties([with_close_rivals(step) for step in steps] if much_left else steps)
     found = kept_steps(steps)
@@ -127,7 +129,7 @@ def diagnose(
     of_final = of_base if fit is first else numerical_error(fit, target)
     return Diagnosis(
         verdict, tuple(dict.fromkeys(names)), tuple(steps), base, fit, target, folds, error_before, error_after,
-        of_final, floor, left, odd, noise,
+        of_final, floor, left, odd, noise, alone=alone,
     )  # fmt: skip
 
 
@@ -148,6 +150,22 @@ def _convincing(before: Study, fewer: Fit, study: Study, fit: Fit) -> bool:
     """Whether effects that explain little each leave nothing together, or little of what was left before them."""
     error, left = before.error(before.heldout(fewer)), study.error(study.heldout(fit))
     return not _left(study, fit)[0] or explained_share(error, left) >= LEAST_SHARE_TOGETHER
+
+
+def _left_by_many(study: Study, fit: Fit) -> tuple[str, Noise | None, str]:
+    """The same where no single grasp shows it; and what one shows, in words, where all others show noise alone."""
+    (left, noise), target = _left(study, fit), study.target
+    if not left or target.gripper.is_servo or len(target.grasps) < _MANY:
+        return left, noise, ""
+    held = study.heldout(fit)
+    for index in np.argsort(-np.nansum(held**2, axis=(1, 2))):
+        others = held.copy()
+        others[index] = np.nan
+        noise = unexpected_noise(others, study.numerical, target, fit.predicted)
+        if noise is not None or not excess(others, study.numerical, target):
+            grasp, error = target.grasps[index], rms_of_grasps(fit.residual, target)[index]
+            return "", noise, f"grasp {grasp.name} of {grasp.object} ({error:.2f} × noise)"
+    return left, None, ""
 
 
 def _left(study: Study, fit: Fit) -> tuple[str, Noise | None]:

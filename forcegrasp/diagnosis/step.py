@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 
 import numpy as np
 
@@ -32,6 +33,7 @@ from forcegrasp.identify.cross_validation import rms
 from forcegrasp.identify.fit import Fit, fit_exactly, fit_once
 from forcegrasp.identify.led_astray import fit_past_few
 from forcegrasp.identify.noise_floor import cells, excess
+from forcegrasp.identify.side_by_side import side_by_side
 from forcegrasp.identify.target import Target
 
 #: An effect must lower the error of some signal in some phase by this share; by more where all is at the floor already.
@@ -40,6 +42,8 @@ LEAST_GAIN, LEAST_GAIN_AT_FLOOR = 0.02, 0.1
 _REFITTED = 5
 # Of these the best ones are fitted to the end.
 _REFINED = 3
+# Fitted to the end, the cost of a rough fit falls by this share of it at most, or of what the effect gained.
+_FALLS, _GAINS_MORE = 0.2, 0.1
 # An error of so many times the noise leaves nothing to look for; beyond the other, no start will find it.
 _ALL_FITTED, _FAR = 1.05, 10.0
 
@@ -51,6 +55,7 @@ def look_further(
     effects: Sequence[type[Effect]],
     rng: np.random.Generator,
     richer: Sequence[tuple[str, type[Effect]]] = (),
+    most: float = np.inf,
 ) -> Step:
     """Looks for one more effect.
 
@@ -61,11 +66,13 @@ def look_further(
       effects: those that are not in the model.
       rng: for the null distribution.
       richer: names of effects in the model, each with one that contains it and may take its place.
+      most: cost that a fit with the effect must come down to; one that is too far from it is not looked for.
     """
     start = _Start(study, fit)
     study.progress(f"trying {len(effects)} effects")
     look = screen.look(study, fit, start.background, effects, start.noise, rng)
     candidates = start.refit(look.worth_a_fit[:_REFITTED], look.null)
+    candidates = [one for one in candidates if _least_cost(one.fit, fit) < most]
     candidates += start.refit_richer(richer, look.null)
     variants: dict[str, list[Candidate]] = {}
     for candidate in sorted(candidates, key=start.place):
@@ -83,6 +90,11 @@ def look_further(
     ordered = (*equal, *(c for c in ordered if c not in equal))
     names = tuple(c.effect.name for c in equal)
     return Step(names, ordered, look.scores, start.error, equal[0].error_after, of_many)
+
+
+def _least_cost(rough: Fit, without: Fit) -> float:
+    """What a rough fit with an effect may come down to at the end, ``without`` being the fit without it."""
+    return rough.cost - max(_FALLS * rough.cost, _GAINS_MORE * (without.cost - rough.cost))
 
 
 def _leaves_more(fit: Fit, target: Target) -> bool:
@@ -168,12 +180,12 @@ class _Start:
         contained = {nested.effect for c in near for nested in c.effect.contains}
         near += [c for c in ordered if c.effect.name in contained and c not in near]
         rough = {c.effect.name: c.fit for c in near}
-        refined: list[Candidate] = []
-        for c in sorted(near, key=lambda c: c.effect.name not in contained):  # the simple ones first
-            if c.replaces:  # fitted to the end already
-                refined.append(c)
-            elif not any(self._is_enough(simple, rough, c) for simple in refined):
-                refined.append(self._best_at_the_end([c, *alike[c.effect.name]]))
+        simple = [c for c in near if c.effect.name in contained]
+        refined = self._at_the_end(simple, alike)
+        others = [c for c in near if c not in simple]
+        refined += self._at_the_end(
+            [c for c in others if not any(self._is_enough(one, rough, c) for one in refined)], alike
+        )
         refined = self._compare_with_contained(refined)
         names = {c.effect.name for c in refined}
         every = [*refined, *(c for c in ordered if c.effect.name not in names)]
@@ -185,7 +197,7 @@ class _Start:
                 return tuple(every), redundant
             # fitted to the end the others are no better than this rough one: it is to be fitted, too
             names.add(first.effect.name)
-            every[0] = self._best_at_the_end([first, *alike[first.effect.name]])
+            (every[0],) = self._at_the_end([first], alike)
 
     def _is_enough(self, simple: Candidate, rough: Mapping[str, Fit], richer: Candidate) -> bool:
         """Whether a richer effect promises nothing beyond one that it contains, which leaves only noise."""
@@ -213,14 +225,23 @@ class _Start:
                         found[nested.effect] = self._judge(fallen, c.p_family, c.signature)
         return list(found.values())
 
-    def _best_at_the_end(self, variants: Sequence[Candidate]) -> Candidate:
-        """The best of an effect's variants once they are fitted to the end."""
-        ends: list[tuple[Fit, Candidate]] = []
-        for one in variants:
+    def _at_the_end(self, candidates: Sequence[Candidate], alike: Mapping[str, Sequence[Candidate]]) -> list[Candidate]:
+        """The candidates once they are fitted to the end, each of them the best of its variants there.
+
+        Args:
+          candidates: the best variants of some effects.
+          alike: the other variants that are to be fitted to the end, by effect.
+        """
+        fitted = [c for c in candidates if not c.replaces]  # the others were fitted to the end already
+        every = [one for c in fitted for one in (c, *alike[c.effect.name])]
+        for one in every:
             self._study.progress(f"fitting {one.effect.name} {one.setting.variant} to the end")
-            ends.append((self._to_the_end(one.fit), one))
-        fit, best = min(ends, key=lambda end: end[0].cost)
-        return self._judge(fit, best.p_family, best.signature)
+        ends = list(zip(side_by_side([partial(self._to_the_end, one.fit) for one in every]), every, strict=True))
+        judged = {}
+        for c in fitted:
+            fit, best = min((end for end in ends if end[1].effect is c.effect), key=lambda end: end[0].cost)
+            judged[c.effect.name] = self._judge(fit, best.p_family, best.signature)
+        return [judged.get(c.effect.name, c) for c in candidates]
 
     def _to_the_end(self, rough: Fit) -> Fit:
         target, simulators = self._study.target, self._study.simulators
@@ -234,9 +255,12 @@ class _Start:
         # few grasps tell where; slopes of all but its last effect hardly change
         some, part = self._study.on_few(exact)
         known = part.jacobian[..., : part.problem.first_entry(len(part.problem.effects) - 1)]
-        own, *others = (
-            fit_once(some.target, part.problem, some.simulators, start, part.correction, rounds=0, known_slopes=known)
-            for start in (part.vector, *other_starts(part, some))
+        rough_fit = partial(fit_once, some.target, part.problem, some.simulators)
+        own, *others = side_by_side(
+            [
+                partial(rough_fit, start, part.correction, rounds=0, known_slopes=known)
+                for start in (part.vector, *other_starts(part, some))
+            ]
         )
         best = min(others, key=lambda fit: fit.cost, default=own)
         if best.cost > NO_BETTER * own.cost:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from forcegrasp.identify.fit import LARGE_STEP, STEP, Fit, Simulators, descend_r
 from forcegrasp.identify.initial_guess import guess
 from forcegrasp.identify.problem import Problem
 from forcegrasp.identify.progress import Progress, silent
+from forcegrasp.identify.side_by_side import side_by_side
 from forcegrasp.identify.target import Target
 from forcegrasp.short_repr import ShortRepr
 
@@ -50,11 +52,14 @@ def fit_base(
     progress(f"base model, start 1 of {STARTS}: {rms_error(first, target):.2f} × noise")
     few = _few_grasps(target)
     small = Subset(target, few, first)
-    ends = [small.fit(small.known)]
-    while len(ends) < STARTS or (len(ends) < MOST_STARTS and not _ends_agree(ends, small.target)):
-        ends.append(small.fit(_random_start(small.problem, guess(small.target, small.problem), rng)))
-        most = STARTS if len(ends) <= STARTS else MOST_STARTS
-        progress(f"base model, start {len(ends)} of {most}: {ends[-1].error:.2f} × noise")
+    contact_estimate = guess(small.target, small.problem)
+    starts = [small.known, *(_random_start(small.problem, contact_estimate, rng) for _ in range(1, STARTS))]
+    ends = side_by_side([partial(small.fit, start) for start in starts])
+    for number, end in enumerate(ends[1:], 2):
+        progress(f"base model, start {number} of {STARTS}: {end.error:.2f} × noise")
+    while len(ends) < MOST_STARTS and not _ends_agree(ends, small.target):
+        ends.append(small.fit(_random_start(small.problem, contact_estimate, rng)))
+        progress(f"base model, start {len(ends)} of {MOST_STARTS}: {ends[-1].error:.2f} × noise")
     best = min(ends, key=lambda end: end.cost)
     errors = tuple(end.error for end in ends)
     if ends[0].cost - best.cost > cost_tolerance(best, small.target):  # another start found a better place

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextvars import ContextVar
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -30,11 +31,25 @@ class Case(ShortRepr):
         return b"|".join(parts)
 
 
+#: Takes what is to be predicted in this thread, as :func:`predict_each` does; see :mod:`.side_by_side`.
+TAKEN_BY: ContextVar[Callable[[Replay, Sequence[Sequence[Case]]], Sequence[np.ndarray]] | None] = ContextVar(
+    "TAKEN_BY", default=None
+)
+
+
 def predict(replay: Replay, cases: Sequence[Case]) -> np.ndarray:
     """Predicted signals of all cases, ``(cases, G, S, C)``; everything that must be simulated is simulated at once.
 
     The replay remembers how the first case of each call moved: the next call often asks for that one again.
     """
+    return predict_each(replay, [cases])[0]
+
+
+def predict_each(replay: Replay, calls: Sequence[Sequence[Case]]) -> Sequence[np.ndarray]:
+    """What :func:`predict` returns for each of some calls, all of which are simulated at once."""
+    if (taken_by := TAKEN_BY.get()) is not None:
+        return taken_by(replay, calls)
+    cases = [case for call in calls for case in call]
     keys, count = [case.simulation_key() for case in cases], len(replay.grasps)
     first = dict(zip(reversed(keys), reversed(cases), strict=True))  # of cases that share a simulation
     known = [key for key in first if key in replay.remembered]
@@ -44,7 +59,9 @@ def predict(replay: Replay, cases: Sequence[Case]) -> np.ndarray:
         motions.append(_simulate(replay, [first[key] for key in fresh]))
     motion = join(motions)
     place = {key: np.arange(count) + n * count for n, key in enumerate([*known, *fresh])}
-    replay.remember(keys[0], motion, place[keys[0]])
+    ends = np.cumsum([len(call) for call in calls])
+    for start in ends - [len(call) for call in calls]:
+        replay.remember(keys[start], motion, place[keys[start]])
     rows = np.concatenate([place[key] for key in keys])
     of_force = EFFORT_SCALE if EFFORT_SCALE in cases[0].base else "force_scale"
     scale = np.concatenate([case.base[of_force] for case in cases])
@@ -54,7 +71,7 @@ def predict(replay: Replay, cases: Sequence[Case]) -> np.ndarray:
     )
     readings = replay.read(motion, rows, scale, _spread(cases, count, lambda e: e.effect.reads()), skew, force_skew)
     signals = np.concatenate([readings.position, readings.force], axis=-1)
-    return signals.reshape(len(cases), count, *signals.shape[1:])
+    return np.split(signals.reshape(len(cases), count, *signals.shape[1:]), ends[:-1])
 
 
 def _simulate(replay: Replay, cases: Sequence[Case]) -> Motion:

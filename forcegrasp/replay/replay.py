@@ -29,7 +29,7 @@ NOWHERE = 1e6
 # of the gripper. Samples that scatter by this share of it have no period.
 _SAME_STEP, _OTHER_STEP, _JITTER = 1e-5, 0.1, 0.25
 # Motions that are kept; those of 24 grasps of 6 s take 3 MB.
-_REMEMBERED = 6
+_REMEMBERED = 16
 
 
 @dataclass(frozen=True, eq=False, repr=False)

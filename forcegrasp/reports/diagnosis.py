@@ -80,6 +80,7 @@ def diagnosis_json(diagnosis: Diagnosis, advice: Advice | None, tried: Sequence[
         },
         "law": law_json(diagnosis.law),
         "odd_grasps": [dataclasses.asdict(grasp) for grasp in diagnosis.odd],
+        "alone": diagnosis.alone,
         "steps": [_step_json(step, diagnosis) for step in diagnosis.steps],
         "ranking": ranking(diagnosis),
         "no_trace": no_trace(diagnosis, tried),
@@ -119,7 +120,8 @@ def _step_json(step: Step, diagnosis: Diagnosis) -> dict[str, Any]:
 def answer(diagnosis: Diagnosis) -> str:
     """The verdict in words."""
     of_model, of_set = _of_model(diagnosis), fault_words(diagnosis)
-    return " ".join(filter(None, (of_model, of_set) if diagnosis.fault_is_rival else (of_set, of_model)))
+    alone = f"Only {diagnosis.alone} shows more: look at it." if diagnosis.alone else ""
+    return " ".join(filter(None, (*((of_model, of_set) if diagnosis.fault_is_rival else (of_set, of_model)), alone)))
 
 
 def _missed_objects(d: Diagnosis) -> str:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from forcegrasp.diagnosis.exchange import are_alike, exchange
+from forcegrasp.diagnosis.families import roughly_without
 from forcegrasp.diagnosis.noise_check import Noise
 from forcegrasp.diagnosis.result import Step, kept_steps
 from forcegrasp.diagnosis.screen import Screen
@@ -64,7 +65,9 @@ def test_what_is_true_stays(found):
 
 
 def test_the_only_effect_was_chosen_with_all_there_is_in_the_model(found, monkeypatch):
-    monkeypatch.setattr("forcegrasp.diagnosis.exchange.look_further", lambda *_: pytest.fail("looked for another"))
+    monkeypatch.setattr(
+        "forcegrasp.diagnosis.exchange.look_further", lambda *_, **__: pytest.fail("looked for another")
+    )
     assert exchanged(found, "position_deadband", only_last=True)[0] is None
 
 
@@ -73,7 +76,7 @@ def test_look_alikes_are_tried_and_mistakes_of_the_set(found, monkeypatch, other
     """A mistake may look like anything: radii that were too large were called friction."""
     asked = []
 
-    def nothing(study, fit, screen, effects, rng) -> Step:
+    def nothing(study, fit, screen, effects, rng, most) -> Step:
         asked.extend(effects)
         return Step((), (), (), 1.0, 1.0)
 
@@ -83,6 +86,20 @@ def test_look_alikes_are_tried_and_mistakes_of_the_set(found, monkeypatch, other
     one = get_effect(other)
     assert exchange(study, fit, Screen([one], study), [one], steps, np.random.default_rng(0)) is None
     assert (one in asked) == tried
+
+
+def test_what_would_leave_far_more_is_not_fitted_to_the_end(found):
+    study, _, fit = found("actuator_lag", "position_deadband")
+    friction = get_effect("coulomb_friction")
+    without = roughly_without("position_deadband", fit, study)
+
+    def fitted(most: float) -> list[float]:
+        look = look_further(study, without, Screen([friction], study), [friction], np.random.default_rng(0), most=most)
+        return [candidate.fit.cost for candidate in look.candidates]
+
+    (cost,) = fitted(np.inf)
+    assert fitted(cost) == [cost]
+    assert fitted(cost - 0.1 * without.cost) == []
 
 
 def test_alike_are_look_alikes_either_way_and_effects_of_one_kind():

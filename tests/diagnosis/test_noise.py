@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from forcegrasp.diagnosis.noise_check import Noise, unexpected_noise
-from forcegrasp.diagnosis.search import _left
+from forcegrasp.diagnosis.search import _left, _left_by_many
 from forcegrasp.diagnosis.signatures import Score, null_gains
 from forcegrasp.effects import get_effect
 from forcegrasp.effects.setting import EffectSetting
@@ -20,7 +20,7 @@ from forcegrasp.measure import MeasuredGrasp
 from forcegrasp.physics.gripper_file import load_gripper
 from forcegrasp.reports import diagnosis as diagnosis_report
 
-G, S = 8, 150
+G, S, MANY = 8, 150, 24
 TIAGO = load_gripper("tiago")
 ONES = np.ones(4)
 NOTHING = (np.zeros((G, S, 4)),) * 2
@@ -86,6 +86,18 @@ def test_heavy_tails(scale, seed):
     assert noise.heavy_tails.all()
     assert noise.stronger
     assert noise.core == pytest.approx(1.134 * scale, rel=0.1)  # 0.765 ÷ 0.6745, the medians of the two
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_few_outliers_everywhere(seed):
+    """A phase of few samples that has none of them is no sign of noise as it was said."""
+    rng = np.random.default_rng(seed)
+    residual = rng.standard_normal((MANY, S, 4)) * np.where(rng.random((MANY, S, 4)) < 1 / 300, 8.0, 1.0)
+    nothing = (0 * residual,) * 2
+    assert excess(residual, nothing, make(MANY))
+    noise = unexpected_noise(residual, nothing, make(MANY), np.tile(GRASPS[:1], (MANY, 1, 1)))
+    assert noise is not None
+    assert noise.stronger
 
 
 def test_noise_of_one_signal():
@@ -296,6 +308,19 @@ def test_noise_as_said_is_not_mentioned(made_up):
     diagnosis = made_up.diagnosis("explained")
     assert "white in time" not in diagnosis_report.answer(diagnosis)
     assert diagnosis_report.diagnosis_json(diagnosis, None, made_up.tried, "s")["noise"] is None
+
+
+@pytest.mark.parametrize(("grasps", "of_many"), [(1, False), (2, True)])
+def test_what_one_grasp_alone_shows_is_told_and_is_no_missing_effect(grasps, of_many, made_up):
+    """Fingers push an object here or there by chance; two grasps of many show what the model lacks."""
+    held = np.random.default_rng(0).standard_normal((MANY, S, 4))
+    held[:grasps, 40:60, 0] += 8.0
+    fit = SimpleNamespace(residual=held, predicted=np.tile(GRASPS[:1], (MANY, 1, 1)))
+    study = SimpleNamespace(target=make(MANY), numerical=(0 * held,) * 2, heldout=lambda _: held.copy())
+    left, noise, alone = _left_by_many(study, fit)
+    assert (bool(left), noise, bool(alone)) == (of_many, None, not of_many)
+    told = dataclasses.replace(made_up.diagnosis("explained"), alone=alone)
+    assert ("Only grasp g0 of cup (" in diagnosis_report.answer(told)) is not of_many
 
 
 @pytest.mark.parametrize(("fitted", "told"), [(normal(0), None), (student(0), True), (0.5 * normal(0), False)])
