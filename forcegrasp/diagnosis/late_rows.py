@@ -48,7 +48,7 @@ def whole_rows(found: Diagnosis, name: str) -> int:
     """How many rows of the set an effect's delay is, if that is within its interval and a physics step; 0 otherwise."""
     fit, gripper = found.fit, found.target.gripper
     which = next(k for k, setting in enumerate(fit.problem.effects) if setting.effect.name == name)
-    _, low, high = intervals(fit, standard_errors(fit, found.numerical))[fit.problem.first_entry(which)]
+    _, low, high = intervals(fit, standard_errors(fit, found.target, found.numerical))[fit.problem.first_entry(which)]
     step = gripper.compile().opt.timestep
     row = float(np.median(np.concatenate([np.diff(grasp.time_s) for grasp in found.target.grasps])))
     rows = round((low + high) / 2 / row)

@@ -15,21 +15,22 @@ _MULTIPLES = (0.9, 0.95, 0.98, 1.02, 1.05, 1.1)
 _WORTH = 4.0
 
 
-def look_beside(fit: Fit, target: Target, simulators: Simulators) -> Fit:
+def look_beside(fit: Fit, target: Target, simulators: Simulators, place: int = -1) -> Fit:
     """The better of a fit and one from a size beside it, for as long as that is better; only of effects that need it.
 
-    A gap that is crossed a sample later lets go of an object a sample later: the cost has a small valley at each, out
-    of which no slope leads. So sizes beside it are simulated by the model itself, and of what is left that is taken out
-    which the other parameters would make up for, as far as slopes tell.
+    A gap that is crossed a sample later lets go of an object a sample later, a threshold drops one command more: the
+    cost has a small valley at each, out of which no slope leads. So sizes beside it are simulated by the model itself,
+    and of what is left that is taken out which the other parameters would make up for, as far as slopes tell.
 
     Args:
-      fit: of the model itself, with the effect as its last one.
+      fit: of the model itself.
       target: the measurements.
       simulators: of the problem's grasps.
+      place: of the effect among those of the model; the last one by default.
     """
-    while fit.problem.effects[-1].effect.follows_motion:
-        problem = fit.problem
-        index = problem.first_entry(len(problem.effects) - 1)
+    problem, effect = fit.problem, fit.problem.effects[place].effect
+    index = problem.first_entry(place % len(problem.effects))
+    while effect.follows_motion or effect.in_steps:
         entry = problem.entries[index]
         starts = np.tile(fit.vector, (len(_MULTIPLES), 1))
         sizes = np.clip(fit.values[index] * np.array(_MULTIPLES), entry.low, entry.high)

@@ -11,8 +11,9 @@ from forcegrasp.diagnosis import families
 from forcegrasp.diagnosis.evidence import LEAST_SHARE_TOGETHER, with_close_rivals
 from forcegrasp.diagnosis.exchange import exchange
 from forcegrasp.diagnosis.few import with_few
+from forcegrasp.diagnosis.look_beside import look_beside
 from forcegrasp.diagnosis.merge import merge
-from forcegrasp.diagnosis.needless import drop_needless, simplify
+from forcegrasp.diagnosis.needless import chained, drop_needless, simplify
 from forcegrasp.diagnosis.noise_check import Noise, unexpected_noise
 from forcegrasp.diagnosis.odd_grasps import odd_grasps
 from forcegrasp.diagnosis.result import Diagnosis, Step, kept_steps, settle_ties
@@ -103,6 +104,7 @@ def diagnose(
             break  # what seems to be stronger noise may hide an effect: only that none is found tells
     steps, fit = simplify(study, steps, fit, len(base.fit.problem.effects))
     steps, fit = merge(study, steps, fit, effects, len(base.fit.problem.effects))
+    steps, fit = _look_beside_all(study, steps, fit, simulators)
     if believed is not None and not _convincing(believed[2], believed[1], study, fit):
         steps, fit, study = believed
         target = study.target
@@ -131,6 +133,16 @@ def diagnose(
         verdict, tuple(dict.fromkeys(names)), tuple(steps), base, fit, target, folds, error_before, error_after,
         of_final, floor, left, odd, noise, alone=alone,
     )  # fmt: skip
+
+
+def _look_beside_all(study: Study, steps: Sequence[Step], fit: Fit, simulators: Simulators) -> tuple[list[Step], Fit]:
+    """The steps and a fit from better sizes of effects that jump: what was found later may have moved them."""
+    further = fit
+    for place in range(len(fit.problem.effects)):
+        further = look_beside(further, study.target, simulators, place)
+    if further is fit or not kept_steps(steps):
+        return list(steps), further
+    return chained(steps, study.error(study.heldout(further))), further
 
 
 def left_to_try(effects: Sequence[type[Effect]], fit: Fit, steps: Sequence[Step]) -> list[type[Effect]]:

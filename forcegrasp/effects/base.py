@@ -88,6 +88,7 @@ class Effect:
     #: Variants that change commands by what is commanded alone, whatever happens, so that it can be known beforehand.
     known_beforehand: ClassVar[tuple[str, ...]] = ()
     follows_motion: ClassVar[bool] = False  #: acts by a memory of positions alone, so that measured ones give it
+    in_steps: ClassVar[bool] = False  #: as its size grows, what it does stays as it is, jumps, and stays again
     after_noise: ClassVar[bool] = False  #: acts on readings with their noise, as rounding does
     of_set: ClassVar[bool] = False  #: not of the gripper: what the measurement set says is wrong
     needs_object: ClassVar[bool] = False  #: shows only where fingers press on something

@@ -37,6 +37,7 @@ class CommandDeadband(Effect):
     )
     variants = ("position", "held")
     known_beforehand = ("held",)
+    in_steps = True
 
     def init(self, which: np.ndarray) -> State:
         return {"held": self.position[which]}

@@ -23,6 +23,7 @@ from forcegrasp.identify.intervals import (
 )
 from forcegrasp.identify.loading import Loaded
 from forcegrasp.identify.noise_floor import numerical_error
+from forcegrasp.identify.plateaus import plateaus
 from forcegrasp.identify.problem import Entry
 from forcegrasp.identify.progress import Progress, silent
 from forcegrasp.identify.random_effects import holm, p_alike, shared_value, spread_between
@@ -132,9 +133,8 @@ def compare_sets(parts: Sequence[Loaded[MeasurementSet]], model: Model, progress
 def _fit(part: Loaded[MeasurementSet], model: Model, progress: Progress) -> SetFit:
     target, _, base = fit_set.apply_model(part, model, silent, refit=True)
     shifts = numerical_shifts(base.fit, numerical_error(base.fit, target))
-    one = SetFit(
-        part.measured.name, part.measured.path, base, chance_errors(base.fit), shifts, rms_error(base.fit, target)
-    )
+    chance = np.maximum(chance_errors(base.fit), plateaus(base.fit, target) / Z95)
+    one = SetFit(part.measured.name, part.measured.path, base, chance, shifts, rms_error(base.fit, target))
     progress(f"{one.name} by itself: {one.error:.2f} × noise")
     return one
 

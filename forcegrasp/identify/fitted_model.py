@@ -15,7 +15,7 @@ from forcegrasp.models.model_file import Fitted, FoundEffect, Model
 
 def model_of(fit: Fit, target: Target, loaded: Loaded, numerical: Sequence[np.ndarray]) -> Model:
     """A fit as a model that can be written."""
-    problem, errors = fit.problem, standard_errors(fit, numerical)
+    problem, errors = fit.problem, standard_errors(fit, target, numerical)
     base: dict[str, Fitted] = {}
     objects: dict[str, dict[str, Fitted]] = {}
     grasps: dict[str, dict[str, Fitted]] = {}

@@ -9,6 +9,8 @@ from scipy.signal import lfilter
 from scipy.sparse.csgraph import connected_components
 
 from forcegrasp.identify.fit import Fit
+from forcegrasp.identify.plateaus import plateaus
+from forcegrasp.identify.target import Target
 
 #: Half width of a 95 % interval in standard errors.
 Z95 = 1.96
@@ -20,14 +22,18 @@ _AT_BOUND = 1e-3
 _CONFOUNDED = 0.98
 
 
-def standard_errors(fit: Fit, numerical: Sequence[np.ndarray] = ()) -> np.ndarray:
+def standard_errors(fit: Fit, target: Target, numerical: Sequence[np.ndarray] = ()) -> np.ndarray:
     """Standard errors of the fitted coordinates, ``(p,)``: by chance, and by the model's own numerical error.
+
+    Where a size jumps, its 95 % interval reaches at least as far as nothing changes.
 
     Args:
       fit: the fit.
+      target: the measurements.
       numerical: from :func:`~forcegrasp.identify.noise_floor.numerical_error`, each ``(G, S, C)``.
     """
-    return np.sqrt(chance_errors(fit) ** 2 + np.sum(numerical_shifts(fit, numerical) ** 2, axis=0))
+    errors = np.sqrt(chance_errors(fit) ** 2 + np.sum(numerical_shifts(fit, numerical) ** 2, axis=0))
+    return np.maximum(errors, plateaus(fit, target) / Z95)
 
 
 def chance_errors(fit: Fit) -> np.ndarray:

@@ -49,7 +49,7 @@ def found_steps(diagnosis: Diagnosis) -> list[tuple[Step, Fit]]:
 def found_parameters(diagnosis: Diagnosis) -> dict[str, dict[str, Fitted]]:
     """The parameters of all effects in the final model, by effect and by name."""
     fit, target = diagnosis.fit, diagnosis.target
-    effects = effects_of_fit(fit, target, standard_errors(fit, diagnosis.numerical))
+    effects = effects_of_fit(fit, target, standard_errors(fit, target, diagnosis.numerical))
     return {found.effect.name: found.parameters for found in effects}
 
 
@@ -74,7 +74,7 @@ def candidate_parameters(candidate: Candidate, diagnosis: Diagnosis) -> dict[str
 
 def final_warnings(diagnosis: Diagnosis) -> list[str]:
     """What to bear in mind about the final model's parameters."""
-    return warnings(diagnosis.fit, standard_errors(diagnosis.fit, diagnosis.numerical))
+    return warnings(diagnosis.fit, standard_errors(diagnosis.fit, diagnosis.target, diagnosis.numerical))
 
 
 def noise_json(diagnosis: Diagnosis) -> dict[str, Any] | None:

@@ -8,18 +8,20 @@ import numpy as np
 import pytest
 
 from forcegrasp.diagnosis import look_beside as module
+from forcegrasp.diagnosis import search
 from forcegrasp.diagnosis.look_beside import look_beside
+from forcegrasp.diagnosis.result import Step
 
 TRUE, READINGS = 8.0, 50
 
 
-def _fit(size: float, follows_motion: bool = True) -> SimpleNamespace:
+def _fit(size: float, follows_motion: bool = True, in_steps: bool = False) -> SimpleNamespace:
     """A fit that is stuck at a size: another parameter shifts all readings alike, which the size does not."""
     residual = np.linspace(-1, 1, READINGS).reshape(1, READINGS, 1) * 10 * (size - TRUE)
     return SimpleNamespace(
         problem=SimpleNamespace(
-            effects=[SimpleNamespace(effect=SimpleNamespace(follows_motion=follows_motion))],
-            first_entry=lambda _: 1,
+            effects=[SimpleNamespace(effect=SimpleNamespace(follows_motion=follows_motion, in_steps=in_steps))],
+            first_entry=lambda place: {0: 1}[place],
             entries=[None, SimpleNamespace(low=0.0, high=10.0, coordinate=lambda value: value)],
             case=lambda vector: vector,
         ),
@@ -47,8 +49,13 @@ def looked(monkeypatch) -> list[float]:
     return seen
 
 
-def test_it_goes_to_better_sizes_for_as_long_as_there_are_any(looked):
-    found = look_beside(_fit(8.7), SimpleNamespace(residual=lambda signals: signals), SimpleNamespace(exact=None))
+@pytest.mark.parametrize("in_steps", [False, True])
+def test_it_goes_to_better_sizes_for_as_long_as_there_are_any(looked, in_steps):
+    found = look_beside(
+        _fit(8.7, not in_steps, in_steps),
+        SimpleNamespace(residual=lambda signals: signals),
+        SimpleNamespace(exact=None),
+    )
     assert found.values[1] == pytest.approx(TRUE, abs=0.05)
     assert len(looked) == 3 * 6
 
@@ -63,3 +70,22 @@ def test_effects_that_change_smoothly_cost_nothing(looked):
     fit = _fit(8.7, follows_motion=False)
     assert look_beside(fit, SimpleNamespace(), SimpleNamespace()) is fit
     assert looked == []
+
+
+@pytest.mark.parametrize("better", [True, False])
+def test_in_the_end_all_effects_are_looked_beside(monkeypatch, better):
+    """What was found later may have moved an earlier one's size: the last step then leaves what that leaves."""
+    fit, after = SimpleNamespace(problem=SimpleNamespace(effects=["one", "two"])), SimpleNamespace()
+    places = []
+
+    def beside(fit, target, simulators, place):
+        places.append(place)
+        return after if better and place == 1 else fit
+
+    monkeypatch.setattr(search, "look_beside", beside)
+    study = SimpleNamespace(target=None, error=lambda held: held, heldout=lambda _: 1.1)
+    steps = [Step(("one",), (), (), 3.0, 2.0), Step(("two",), (), (), 2.0, 1.5), Step((), (), (), 1.5, 1.5)]
+    left, found = search._look_beside_all(study, steps, fit, None)
+    assert places == [0, 1]
+    assert found is (after if better else fit)
+    assert [step.error_after for step in left] == ([2.0, 1.1, 1.1] if better else [2.0, 1.5, 1.5])

@@ -118,7 +118,7 @@ def test_three_sets_have_a_spread_and_their_shared_value_includes_it(three):
 
 def test_a_value_has_the_interval_that_a_fit_of_its_set_gives(three, parts):
     target, _, base = fit_set.apply_model(parts[0], Model(GRIPPER, {}), silent, refit=True)
-    expected = intervals(base.fit, standard_errors(base.fit, numerical_error(base.fit, target)))
+    expected = intervals(base.fit, standard_errors(base.fit, target, numerical_error(base.fit, target)))
     for one, (value, low, high) in zip(three.parameters, expected, strict=False):
         assert one.values["a"] == Fitted(pytest.approx(value), pytest.approx(low), pytest.approx(high), one.unit)
 

@@ -94,7 +94,7 @@ def fitted() -> SimpleNamespace:
         simulators=simulators,
         fit=fit,
         numerical=numerical,
-        errors=standard_errors(fit, numerical),
+        errors=standard_errors(fit, target, numerical),
     )
 
 

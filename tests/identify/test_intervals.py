@@ -12,7 +12,7 @@ from scipy.stats import norm
 from forcegrasp.identify.fit import Fit
 from forcegrasp.identify.intervals import intervals, reached_bound, standard_errors, warnings
 from forcegrasp.identify.problem import Problem
-from tests.identify.targets import TIAGO, G, S, fit_at, grasp, noise, random_slopes
+from tests.identify.targets import TIAGO, G, S, fit_at, grasp, make, noise, random_slopes
 
 ENTRIES = ("position_gain", "velocity_gain", "rho_m of cup", "force_scale of cup")
 
@@ -21,8 +21,8 @@ def test_standard_errors_of_white_noise():
     slopes = random_slopes(4)
     flat = slopes.reshape(-1, 4)
     expected = np.sqrt(np.diag(np.linalg.inv(flat.T @ flat)))
-    assert standard_errors(fit_at(slopes, 0 * noise())) == pytest.approx(expected, rel=1e-6)
-    white = standard_errors(fit_at(slopes, noise()))
+    assert standard_errors(fit_at(slopes, 0 * noise()), make()) == pytest.approx(expected, rel=1e-6)
+    white = standard_errors(fit_at(slopes, noise()), make())
     assert np.all(white >= expected * (1 - 1e-9))
     assert np.all(white < 3 * expected)
 
@@ -33,7 +33,7 @@ def test_standard_errors_see_what_is_correlated_in_a_grasp():
     for signal in range(4):  # each parameter is the level of one signal
         slopes[..., signal, signal] = 50.0
     offset = np.random.default_rng(0).standard_normal((G, 1, 4)) + 0 * noise()
-    alone, correlated = (standard_errors(fit_at(slopes, r)) for r in (noise(), offset))
+    alone, correlated = (standard_errors(fit_at(slopes, r), make()) for r in (noise(), offset))
     white = 1 / 50 / np.sqrt(G * S)
     assert np.all((alone >= 0.999 * white) & (alone < 2.5 * white))
     of_means = np.linalg.norm(offset[:, 0], axis=0) / 50 / G  # of the mean of G offsets
@@ -56,15 +56,15 @@ def test_intervals_hold_the_truth_under_noise_with_a_memory(memory):
         for sample in range(1, 100):
             noise[:, sample] = memory * noise[:, sample - 1] + np.sqrt(1 - memory**2) * noise[:, sample]
         found = np.linalg.lstsq(slopes.reshape(-1, 4), noise.ravel(), rcond=None)[0]
-        errors = standard_errors(fit_at(slopes, noise - slopes @ found))
+        errors = standard_errors(fit_at(slopes, noise - slopes @ found), make())
         inside += np.abs(found) < 1.96 * errors
     assert np.all((inside / draws > 0.93) & (inside / draws < 0.99))
 
 
 def test_standard_errors_see_what_numerical_error_shifts():
     slopes, shift = random_slopes(4), np.array([0.01, -0.02, 0.0, 0.03])
-    plain = standard_errors(fit_at(slopes, noise()))
-    moved = standard_errors(fit_at(slopes, noise()), [slopes @ shift])
+    plain = standard_errors(fit_at(slopes, noise()), make())
+    moved = standard_errors(fit_at(slopes, noise()), make(), [slopes @ shift])
     assert moved == pytest.approx(np.sqrt(plain**2 + shift**2), rel=1e-6)
 
 
