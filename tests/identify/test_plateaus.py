@@ -15,7 +15,7 @@ from forcegrasp.identify.problem import Problem
 from forcegrasp.identify.target import make_target
 from tests.light_set import light_set
 
-TRUE_M = 0.0003
+TRUE_M = 0.0008
 
 
 @pytest.fixture(scope="module")
