@@ -364,16 +364,17 @@ class _Local:
         return slopes
 
     def _measured(self, x: np.ndarray, value: np.ndarray) -> np.ndarray:
-        """One-sided differences, all in one simulation."""
+        """One-sided differences, all in one simulation; 0 where a coordinate jumps, and no slope leads anywhere."""
         problem, target = self.problem, self.target
         count = 0 if self._known is None else self._known.shape[-1]
-        groups = [group for group in problem.columns() if min(group) >= count]
+        groups = [g for g in problem.columns() if min(g) >= count and not problem.entries[g[0]].jumps]
         width = problem.high - problem.low
         step = np.where(x + self._step > problem.high, -self._step, self._step)
         step = np.where(width < 2 * self._step, width / 4, step)
         moved = [x + step * np.isin(np.arange(len(x)), group) for group in groups]
-        same = self._values is self._slopes
-        signals = predict(self._slopes, [problem.case(v) for v in (moved if same else [x, *moved])])
+        same = self._values is self._slopes or not moved
+        asked = [problem.case(v) for v in (moved if same else [x, *moved])]
+        signals = predict(self._slopes, asked) if asked else np.empty((0, *value.shape))
         signals, base = (signals, value) if same else (signals[1:], signals[0])
         slopes = np.zeros((*value.shape, len(problem)))
         for change, group in zip(signals - base, groups, strict=True):

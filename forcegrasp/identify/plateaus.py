@@ -32,9 +32,8 @@ def plateaus(fit: Fit, target: Target) -> np.ndarray:
     if (known := _KNOWN.get(fit)) is not None and known[0] is target:
         return known[1]
     found, problem, replay = np.zeros(len(fit.problem)), fit.problem, None
-    for place, setting in enumerate(problem.effects):
-        index = problem.first_entry(place) if setting.effect.in_steps else -1
-        if index < 0 or fit.values[index] == 0:
+    for index, entry in enumerate(problem.entries):
+        if not entry.jumps or fit.values[index] == 0:
             continue
         replay = replay or Replay(problem.gripper, problem.grasps, cheap_tier(problem.gripper))
         found[index] = _half_width(fit, target, replay, index)

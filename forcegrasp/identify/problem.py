@@ -30,6 +30,7 @@ class Entry(ShortRepr):
     logarithmic: bool
     scale: float  #: a change of this size is worth noticing, in its own unit; 1 for logarithms
     null: float = float("nan")  #: where an effect's parameter does nothing; base parameters have no such value
+    jumps: bool = False  #: whether what it does stays as it is, jumps, and stays again: no slope tells where to
 
     def coordinate(self, value: float) -> float:
         """The fit's own coordinate of a value; differences of 1 are large."""
@@ -113,11 +114,14 @@ class Problem:
     def _effect_entries(self) -> list[Entry]:
         entries = []
         for index, one in enumerate(self.effects):
-            for p, value in zip(one.effect.parameters, one.values, strict=True):
+            for place, (p, value) in enumerate(zip(one.effect.parameters, one.values, strict=True)):
                 scale = 1.0 if p.logarithmic else abs(p.typical)
                 bounds = (float(value), p.low, p.high, p.unit)
                 everyone = np.ones(len(self.grasps), bool)
-                name, kind = f"{one.effect.name}.{p.name}", (p.logarithmic, scale, p.null)
+                name, kind = (
+                    f"{one.effect.name}.{p.name}",
+                    (p.logarithmic, scale, p.null, one.effect.in_steps and place == 0),
+                )
                 entries.append(Entry(name, p.name, index, everyone, *bounds, *kind))
         return entries
 

@@ -22,7 +22,7 @@ def _fit(size: float, follows_motion: bool = True, in_steps: bool = False) -> Si
         problem=SimpleNamespace(
             effects=[SimpleNamespace(effect=SimpleNamespace(follows_motion=follows_motion, in_steps=in_steps))],
             first_entry=lambda place: {0: 1}[place],
-            entries=[None, SimpleNamespace(low=0.0, high=10.0, coordinate=lambda value: value)],
+            entries=[None, SimpleNamespace(low=0.0, high=10.0, coordinate=lambda value: value, jumps=in_steps)],
             case=lambda vector: vector,
         ),
         vector=np.array([0.0, size]),
@@ -31,6 +31,7 @@ def _fit(size: float, follows_motion: bool = True, in_steps: bool = False) -> Si
         residual=residual,
         slopes=np.ones((READINGS, 2)),
         jacobian=np.ones((1, READINGS, 1, 2)),
+        correction=0.0,
         cost=float(np.sum(residual**2)),
     )
 
@@ -54,15 +55,18 @@ def test_it_goes_to_better_sizes_for_as_long_as_there_are_any(looked, in_steps):
     found = look_beside(
         _fit(8.7, not in_steps, in_steps),
         SimpleNamespace(residual=lambda signals: signals),
-        SimpleNamespace(exact=None),
+        SimpleNamespace(exact=None, cheap=None),
     )
     assert found.values[1] == pytest.approx(TRUE, abs=0.05)
-    assert len(looked) == 3 * 6
+    assert len(looked) == 3 * (24 if in_steps else 6)  # what jumps is looked for nearer, and further away
 
 
 def test_it_stays_where_no_size_is_better(looked):
     fit = _fit(8.001)
-    assert look_beside(fit, SimpleNamespace(residual=lambda signals: signals), SimpleNamespace(exact=None)) is fit
+    assert (
+        look_beside(fit, SimpleNamespace(residual=lambda signals: signals), SimpleNamespace(exact=None, cheap=None))
+        is fit
+    )
     assert len(looked) == 6
 
 

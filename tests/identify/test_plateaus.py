@@ -7,7 +7,7 @@ import pytest
 
 from forcegrasp.effects import get_effect
 from forcegrasp.effects.setting import EffectSetting
-from forcegrasp.identify.fit import Simulators, fit_once
+from forcegrasp.identify.fit import Simulators, fit_exactly, fit_once
 from forcegrasp.identify.intervals import intervals, standard_errors
 from forcegrasp.identify.plateaus import plateaus
 from forcegrasp.identify.predict import predict
@@ -46,3 +46,12 @@ def test_of_what_changes_smoothly_slopes_tell(fitted):
     target, fit = fitted
     assert np.flatnonzero(plateaus(fit, target)).tolist() == [fit.problem.first_entry(0)]
     assert plateaus(fit, target) is plateaus(fit, target)  # simulated once
+
+
+def test_a_fit_leaves_the_size_where_it_is_for_no_slope_tells(fitted):
+    target, fit = fitted
+    index, problem = fit.problem.first_entry(0), fit.problem
+    again = fit_exactly(target, problem, Simulators(problem), fit.vector)
+    assert again.vector[index] == fit.vector[index]
+    assert not again.jacobian[..., index].any()
+    assert [entry.name for entry in problem.entries if entry.jumps] == ["command_deadband.threshold_m"]
