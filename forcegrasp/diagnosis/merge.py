@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Collection, Iterator, Sequence
+from functools import partial
 from itertools import combinations
 
 import numpy as np
@@ -18,6 +19,7 @@ from forcegrasp.diagnosis.study import Study
 from forcegrasp.effects import Effect
 from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.identify.fit import Fit
+from forcegrasp.identify.side_by_side import side_by_side
 
 
 def merge(
@@ -49,16 +51,17 @@ def _one_for_two(
     held, few = study.heldout(fit), study.on_few(fit)
     searched = {one.effect.name for one in fit.problem.effects[given:]}
     found = [step.effects[0] for step in kept_steps(steps) if step.candidates and step.effects[0] in searched]
-    for pair in combinations(found, 2):
-        for effect in _like_both(pair, fit, effects):
-            study.progress(f"fitting with {effect.name} in place of {pair[0]} and {pair[1]}")
-            setting = _roughly_as_good(*few, pair, effect)
-            if setting is None:
-                continue
-            less, without = refit_as(setting, fit, pair, study), refit_without(pair, fit, study)
-            if is_enough(study, study.heldout(without), study.heldout(less), held):
-                study.progress(f"{effect.name} does for both")
-                return pair, less
+    tried = [(pair, effect) for pair in combinations(found, 2) for effect in _like_both(pair, fit, effects)]
+    for pair, effect in tried:
+        study.progress(f"fitting with {effect.name} in place of {pair[0]} and {pair[1]}")
+    settings = side_by_side([partial(_roughly_as_good, *few, pair, effect) for pair, effect in tried])
+    for (pair, effect), setting in zip(tried, settings, strict=True):
+        if setting is None:
+            continue
+        less, without = refit_as(setting, fit, pair, study), refit_without(pair, fit, study)
+        if is_enough(study, study.heldout(without), study.heldout(less), held):
+            study.progress(f"{effect.name} does for both")
+            return pair, less
     return None
 
 

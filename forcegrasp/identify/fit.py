@@ -118,7 +118,7 @@ class Fit(ShortRepr):
         """Covariance of the coordinates, ``(p, p)``, if the noise is white; see :mod:`.intervals`."""
         slopes = self.slopes
         norms = np.linalg.norm(slopes, axis=0)
-        norms[norms == 0] = 1.0
+        norms[norms == 0] = np.inf  # no slope tells of what jumps, nor does it move with anything
         alike = slopes / norms  # what data hardly fix has slopes so small that they would pass for none
         return np.linalg.pinv(alike.T @ alike, rcond=1e-12) / np.outer(norms, norms)
 

@@ -8,7 +8,7 @@ import pytest
 from forcegrasp.effects import get_effect
 from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.identify.fit import Simulators, fit_exactly, fit_once
-from forcegrasp.identify.intervals import intervals, standard_errors
+from forcegrasp.identify.intervals import intervals, standard_errors, warnings
 from forcegrasp.identify.plateaus import plateaus
 from forcegrasp.identify.predict import predict
 from forcegrasp.identify.problem import Problem
@@ -55,3 +55,5 @@ def test_a_fit_leaves_the_size_where_it_is_for_no_slope_tells(fitted):
     assert again.vector[index] == fit.vector[index]
     assert not again.jacobian[..., index].any()
     assert [entry.name for entry in problem.entries if entry.jumps] == ["command_deadband.threshold_m"]
+    assert not again.covariance()[index].any()
+    assert not any("command_deadband" in line for line in warnings(again, standard_errors(again, target)))
