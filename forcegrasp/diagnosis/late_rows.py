@@ -33,7 +33,7 @@ def may_be_late_rows(found: Diagnosis, loaded: Loaded[MeasurementSet]) -> Diagno
     """
     if loaded.gripper.is_servo or found.fault is not None or not found.verdict.names_effects:
         return found
-    named = {step.effects[0]: step for step in kept_steps(found.steps)}
+    named = {step.effects[0] for step in kept_steps(found.steps)}
     for name in _WRITTEN:
         rows = whole_rows(found, name) if name in named else 0
         if rows:
@@ -44,12 +44,17 @@ def may_be_late_rows(found: Diagnosis, loaded: Loaded[MeasurementSet]) -> Diagno
     return found
 
 
+def row_s(found: Diagnosis) -> float:
+    """Time between two rows of the set, seconds."""
+    return float(np.median(np.concatenate([np.diff(grasp.time_s) for grasp in found.target.grasps])))
+
+
 def whole_rows(found: Diagnosis, name: str) -> int:
     """How many rows of the set an effect's delay is, if that is within its interval and a physics step; 0 otherwise."""
     fit, gripper = found.fit, found.target.gripper
     which = next(k for k, setting in enumerate(fit.problem.effects) if setting.effect.name == name)
     _, low, high = intervals(fit, standard_errors(fit, found.target, found.numerical))[fit.problem.first_entry(which)]
     step = gripper.compile().opt.timestep
-    row = float(np.median(np.concatenate([np.diff(grasp.time_s) for grasp in found.target.grasps])))
+    row = row_s(found)
     rows = round((low + high) / 2 / row)
     return rows if low - step <= rows * row <= high + step else 0

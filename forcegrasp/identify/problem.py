@@ -118,10 +118,8 @@ class Problem:
                 scale = 1.0 if p.logarithmic else abs(p.typical)
                 bounds = (float(value), p.low, p.high, p.unit)
                 everyone = np.ones(len(self.grasps), bool)
-                name, kind = (
-                    f"{one.effect.name}.{p.name}",
-                    (p.logarithmic, scale, p.null, one.effect.in_steps and place == 0),
-                )
+                name, jumps = f"{one.effect.name}.{p.name}", one.effect.in_steps and place == 0
+                kind = (p.logarithmic, scale, p.null, jumps)
                 entries.append(Entry(name, p.name, index, everyone, *bounds, *kind))
         return entries
 

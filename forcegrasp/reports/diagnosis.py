@@ -121,7 +121,8 @@ def answer(diagnosis: Diagnosis) -> str:
     """The verdict in words."""
     of_model, of_set = _of_model(diagnosis), fault_words(diagnosis)
     alone = f"Only {diagnosis.alone} shows more: look at it." if diagnosis.alone else ""
-    return " ".join(filter(None, (*((of_model, of_set) if diagnosis.fault_is_rival else (of_set, of_model)), alone)))
+    parts = (of_model, of_set) if diagnosis.fault_is_rival else (of_set, of_model)
+    return " ".join(filter(None, (*parts, alone)))
 
 
 def _missed_objects(d: Diagnosis) -> str:

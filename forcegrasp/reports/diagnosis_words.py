@@ -6,6 +6,7 @@ import numpy as np
 
 from forcegrasp.diagnosis.evidence import may_be_besides
 from forcegrasp.diagnosis.faults import Fault
+from forcegrasp.diagnosis.late_rows import row_s
 from forcegrasp.diagnosis.result import Candidate, Diagnosis, Step, kept_steps
 from forcegrasp.diagnosis.verdict import EXPLAINED_FAR, MUCH
 from forcegrasp.effects.for_gripper import effect_of
@@ -74,8 +75,7 @@ def _of_step(step: Step, diagnosis: Diagnosis) -> str:
 
 def row_sentence(diagnosis: Diagnosis) -> str:
     """Delays of whole rows, which the set itself may have; empty if there are none, or the answer says so."""
-    step = float(np.median(np.concatenate([np.diff(grasp.time_s) for grasp in diagnosis.target.grasps])))
-    whole = []
+    step, whole = row_s(diagnosis), []
     for effect, parameters in found_parameters(diagnosis).items():
         rows = parameters["delay_s"].value / step if "delay_s" in parameters else 0.0
         if diagnosis.fault is not None and diagnosis.fault.instead_of == effect:
