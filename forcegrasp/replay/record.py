@@ -105,15 +105,22 @@ def record(
     rows = np.arange(grasps)
     replay = Replay(gripper, bare, encoders_known=False, strict=True)
     on = [EffectOn(*one.kind, np.repeat(one.values[None], grasps, axis=0), rows) for one in effects]
+    steps = rounding_steps((one.effect, one.values) for one in effects)
+    of_position, of_force = (rng.standard_normal((grasps, *values.shape)) for values in (rest, unloaded))
+
+    def logged(position: np.ndarray, grasp: np.ndarray, sample: np.ndarray) -> np.ndarray:
+        """Positions as the log has them, which a driver acts on: `replay` takes the log's for its driver's, too."""
+        return with_noise(position, position_std_m, of_position[grasp, sample], steps[0])
+
     motion = replay.simulate(
         rows,
         {n: v for n, v in base.items() if n != "force_scale"},
         [e for e in on if not e.effect.reads_only(e.variant)],
+        logged,
     )
     readings = replay.read(motion, rows, base["force_scale"], [e for e in on if e.effect.reads()])
-    steps = rounding_steps((one.effect, one.values) for one in effects)
-    position = with_noise(readings.position, position_std_m, rng.standard_normal(readings.position.shape), steps[0])
-    force = with_noise(readings.force, force_std_n, rng.standard_normal(readings.force.shape), steps[1])
+    position = logged(readings.position, rows[:, None], np.arange(SAMPLES))
+    force = with_noise(readings.force, force_std_n, of_force, steps[1])
     full = tuple(dataclasses.replace(g, position_m=position[i], force_n=force[i]) for i, g in enumerate(bare))
     name = gripper.name_or_path
     noise = (position_std_m or None, force_std_n or None)  # a set without noise does not give any

@@ -30,6 +30,8 @@ NOWHERE = 1e6
 _SAME_STEP, _OTHER_STEP, _JITTER = 1e-5, 0.1, 0.25
 # Motions that are kept; those of 24 grasps of 6 s take 3 MB.
 _REMEMBERED = 16
+#: What a driver reads of positions, m or rad, ``(n, motors)``, in these grasps, ``(n,)``, at these samples, ``(n,)``.
+Reads = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -117,6 +119,7 @@ class Replay:
         self._fresh = np.zeros(self._command.shape[:2], bool)
         for index, start in enumerate(starts):
             self._fresh[start, index] = True
+        self._sample = self._fresh.cumsum(axis=0) - 1  # the latest one at each physics step, ``(steps, grasps)``
         #: Motions of all grasps that may be asked for again, by what was simulated; see :meth:`remember`.
         self.remembered: dict[bytes, Motion] = {}
         starts_at = [g.start or (start_position(g, gripper.stroke), np.zeros(len(gripper.motors))) for g in self.grasps]
@@ -146,13 +149,21 @@ class Replay:
         """The sample in force at each physics step."""
         return values[np.searchsorted(starts, np.arange(self._steps), side="right") - 1]
 
-    def simulate(self, grasp: np.ndarray, base: Mapping[str, np.ndarray], effects: Sequence[EffectOn] = ()) -> Motion:
+    def simulate(
+        self,
+        grasp: np.ndarray,
+        base: Mapping[str, np.ndarray],
+        effects: Sequence[EffectOn] = (),
+        driver_reads: Reads | None = None,
+    ) -> Motion:
         """Simulates rows at once, each one grasp with its own parameters.
 
         Args:
           grasp: which grasp each row replays, ``(n,)``.
           base: base parameters by name, each ``(n,)``, but those of readings.
           effects: those that change what happens.
+          driver_reads: what the gripper's own driver reads with each new command, where grasps hold no measured
+            positions; what encoders say, without noise, by default.
 
         Raises:
           PhysicsError: if a row diverged, and the replay is strict.
@@ -163,7 +174,7 @@ class Replay:
             for low in range(0, n, rows_at_once):
                 part = slice(low, min(n, low + rows_at_once))
                 chunk = {name: value[part] for name, value in base.items()}
-                parts.append(self.simulate(grasp[part], chunk, [_cut(e, part) for e in effects]))
+                parts.append(self.simulate(grasp[part], chunk, [_cut(e, part) for e in effects], driver_reads))
             return join(parts)
         late_s = np.zeros(n)
         if not self.gripper.is_servo:
@@ -189,6 +200,10 @@ class Replay:
             for step in range(self._steps - 1):
                 if self._encoders_known:
                     plant.recorded_position = self._encoder[step, grasp]
+                elif driver_reads is not None:
+                    reads = driver_reads(plant.measured_position, grasp, self._sample[step, grasp])
+                    known = reads if plant.recorded_position is None else plant.recorded_position
+                    plant.recorded_position = np.where(self._fresh[step, grasp][:, None], reads, known)
                 if self._disturbed:
                     plant.disturb(self._load[step, grasp], self._enabled[step, grasp] > 0)
                 plant.advance(self._command[step, grasp], 1, self._fresh[step, grasp])

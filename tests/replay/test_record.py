@@ -76,6 +76,17 @@ def test_every_effect_can_be_recorded_and_replayed(effect, variant):
     assert replay_truth(made, TIAGO, (use,)).tobytes() == signals(made).tobytes()
 
 
+def test_a_drivers_dead_band_goes_by_the_logged_positions():
+    """Noise and all, so that who has the log knows which commands were dropped."""
+    use = parse_effect("command_deadband threshold_m=0.0003")
+    made = make(effects=(use,), position_std_m=5e-5)
+    bare = dataclasses.replace(made, measured=make(effects=(use,)).measured)
+    off = np.abs(replay_truth(made, TIAGO, (use,)) - signals(made))
+    assert off[..., :2].max() < 5 * 5e-5
+    assert off[..., 2:].max() < 1e-12
+    assert np.abs(replay_truth(bare, TIAGO, (use,)) - signals(made))[..., 2:].max() > 1e-6  # noise decided somewhere
+
+
 def test_null_values_change_no_bit():
     """Of all effects at once; tests/effects/test_effect_contract.py has them one by one."""
     nothing = tuple(EffectSetting(effect, "", effect.null_values()) for effect in catalogue().values())
