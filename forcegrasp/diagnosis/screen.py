@@ -12,6 +12,7 @@ from forcegrasp.diagnosis.noise_check import Noise
 from forcegrasp.diagnosis.signatures import Background, Score, Signatures, null_gains, share_together, trials
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.effects import Effect
+from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.identify.fit import Fit
 
 # A signature this much worse than the best is not refitted.
@@ -70,11 +71,7 @@ class Screen:
         """
         tried = [trial for trial in self._tried if trial.effect in effects]
         some, part = study.on_few(fit)
-        if study.few is not self._few or self._on_few is None:
-            self._few, self._on_few = study.few, self._on_all if some is study else Signatures(some)
-        new = self._on_few.missing(tried)
-        self._on_few.simulate(part, new)
-        few = self._on_few.scores(part, Background(part, some.numerical), tried)
+        few, new = self.on_few(study, some, part, effects)
         null = null_gains(
             few,
             rng,
@@ -98,6 +95,28 @@ class Screen:
         enough = _least_gain(groups, null, study.target.beyond_noise(fit.residual))
         worth_a_fit = tuple(score for score in found if score.gain > enough)
         return Look((*found, *others), worth_a_fit, null, share_together(best, part, beyond))
+
+    def on_few(
+        self, study: Study, some: Study, fit: Fit, effects: Collection[type[Effect]]
+    ) -> tuple[list[list[Score]], list[EffectSetting]]:
+        """How well signatures fit what a fit of few grasps leaves.
+
+        Args:
+          study: the measurements.
+          some: the few of them.
+          fit: of the few, without these effects.
+          effects: those of the catalogue that are tried.
+
+        Returns:
+          The scores as :meth:`.Signatures.scores` has them, and the trials that were simulated for it: all others
+          were before.
+        """
+        if study.few is not self._few or self._on_few is None:
+            self._few, self._on_few = study.few, self._on_all if some is study else Signatures(some)
+        tried = [trial for trial in self._tried if trial.effect in effects]
+        new = self._on_few.missing(tried)
+        self._on_few.simulate(fit, new)
+        return self._on_few.scores(fit, Background(fit, some.numerical), tried), new
 
 
 def _least_gain(groups: Sequence[Sequence[Score]], null: np.ndarray, beyond: float) -> float:

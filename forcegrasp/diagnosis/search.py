@@ -18,6 +18,7 @@ from forcegrasp.diagnosis.noise_check import Noise, unexpected_noise
 from forcegrasp.diagnosis.odd_grasps import odd_grasps
 from forcegrasp.diagnosis.result import Diagnosis, Step, kept_steps, settle_ties
 from forcegrasp.diagnosis.screen import Screen
+from forcegrasp.diagnosis.split import split
 from forcegrasp.diagnosis.step import look_further
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.diagnosis.verdict import MUCH, conclude, explained_share
@@ -87,6 +88,8 @@ def diagnose(
         step = look_further(study, fit, screen, untried, rng, richer)
         if not step.effects and step.error_before > _AS_GOOD_AS_NOTHING * floor:
             step = exchange(study, fit, screen, untried, steps, rng) or step
+            two = None if step.effects else split(study, fit, screen, untried, steps, rng)
+            steps, step = two or (steps, step)
         if not step.effects:
             steps.append(step)
             break

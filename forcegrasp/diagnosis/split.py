@@ -1,0 +1,102 @@
+"""Puts two effects in the place of one that was found: what looks like one may be the sum of two."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator, Sequence
+from functools import partial
+
+import numpy as np
+
+from forcegrasp.diagnosis.evidence import LEAST_RISE, LEAST_SHARE, is_beyond_chance
+from forcegrasp.diagnosis.exchange import are_alike
+from forcegrasp.diagnosis.families import contain, roughly_as
+from forcegrasp.diagnosis.refine import refine
+from forcegrasp.diagnosis.result import Step, kept_steps
+from forcegrasp.diagnosis.screen import Screen
+from forcegrasp.diagnosis.signatures import Background, trials
+from forcegrasp.diagnosis.step import look_further
+from forcegrasp.diagnosis.study import Study
+from forcegrasp.effects import Effect
+from forcegrasp.effects.setting import EffectSetting
+from forcegrasp.identify.fit import Fit
+from forcegrasp.identify.side_by_side import side_by_side
+
+# So many of an effect's look-alikes may be the first of two, and so many effects the second of each.
+_FIRST, _SECOND = 3, 3
+
+
+def split(
+    study: Study, fit: Fit, screen: Screen, effects: Sequence[type[Effect]], steps: Sequence[Step],
+    rng: np.random.Generator,
+) -> tuple[list[Step], Step] | None:  # fmt: skip
+    """The steps with a look-alike in place of an effect, and a step that adds another one to it; None if none does.
+
+    Positions and forces that are both read late, each in its own way, look much like a command that is late, and with
+    that in the model neither does any better. So two are put in its place at once.
+
+    Args:
+      study: the measurements.
+      fit: with all effects that were found.
+      screen: of the catalogue.
+      effects: those that are not in the model.
+      steps: that found the effects.
+      rng: for the null distribution.
+    """
+    held = study.heldout(fit)
+    most = fit.cost - LEAST_SHARE * study.target.beyond_noise(fit.residual)
+    known = {one.effect.name: one.effect for one in fit.problem.effects}
+    found = [step for step in kept_steps(steps) if step.effects[0] in known and not step.is_counted]
+    for old in sorted(found, key=lambda step: step.error_after - step.error_before):  # what explains most comes first
+        name = old.effects[0]
+        study.progress(f"looking for two effects in place of {name}")
+        for first in _first_of_two(study, fit, screen, effects, known[name]):
+            start = roughly_as([first], fit, name, study)
+            step = look_further(study, start, screen, _beside(first.effect, effects), rng, most=most)
+            if not step.effects:
+                continue
+            best = step.candidates[0]
+            after = study.heldout(best.fit)
+            if is_beyond_chance(study.gains(held, after), LEAST_RISE) and study.explained(held, after) >= LEAST_SHARE:
+                study.progress(f"{first.effect.name} and {best.effect.name} do better than {name}")
+                error = study.error(study.heldout(start)) if old is steps[-1] else old.error_after
+                instead = _found_instead(old, best.fit.problem.case(best.fit.vector).effects[-2], start, error)
+                left = [instead if one is old else one for one in steps]
+                return left, dataclasses.replace(step, error_before=left[-1].error_after, of_many=False)
+    return None
+
+
+def _first_of_two(
+    study: Study, fit: Fit, screen: Screen, effects: Sequence[type[Effect]], one: type[Effect]
+) -> Iterator[EffectSetting]:
+    """Look-alikes of an effect that leave less than it on few grasps, together with one more effect; best first."""
+    some, part = study.on_few(fit)
+    alike = [e for e in effects if not e.of_set and are_alike(e, one)]
+    fits = side_by_side([partial(roughly_as, trials([e]), part, one.name, some) for e in alike])
+    promising = []
+    for first in sorted(fits, key=lambda rough: rough.cost)[:_FIRST]:
+        setting = first.problem.case(first.vector).effects[-1]
+        groups, _ = screen.on_few(study, some, first, _beside(setting.effect, effects))
+        scores = sorted((group[0] for group in groups), key=lambda score: -score.gain)[:_SECOND]
+        both = refine(scores, some, first, Background(first, some.numerical))
+        promising.append((min((pair.fit.cost for pair in both), default=np.inf), setting))
+    most = part.cost - LEAST_SHARE * some.target.beyond_noise(part.residual)
+    for cost, setting in sorted(promising, key=lambda pair: pair[0]):
+        if cost < most:
+            yield setting
+
+
+def _beside(first: type[Effect], effects: Sequence[type[Effect]]) -> list[type[Effect]]:
+    """Those of the effects that may stand beside another one."""
+    return [
+        e for e in effects
+        if e is not first and not e.of_set and not contain(e, first)
+        and e.name not in first.instead_of and first.name not in e.instead_of
+    ]  # fmt: skip
+
+
+def _found_instead(old: Step, setting: EffectSetting, fit: Fit, error: float) -> Step:
+    """The step as if it had found this effect, which leaves this error."""
+    first = dataclasses.replace(old.candidates[0], setting=setting, fit=fit)
+    others = [c for c in old.candidates[1:] if c.effect is not setting.effect]
+    return dataclasses.replace(old, effects=(setting.effect.name,), candidates=(first, *others), error_after=error)

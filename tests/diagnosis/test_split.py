@@ -1,0 +1,60 @@
+"""Two effects take the place of one that looks like their sum."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from forcegrasp.diagnosis.families import roughly_without
+from forcegrasp.diagnosis.few import with_few
+from forcegrasp.diagnosis.screen import Screen
+from forcegrasp.diagnosis.split import split
+from forcegrasp.diagnosis.step import look_further
+from forcegrasp.diagnosis.study import Study
+from forcegrasp.effects import get_effect
+from forcegrasp.effects.for_gripper import effects_of
+from forcegrasp.identify.cross_validation import make_folds
+from forcegrasp.identify.fit_set import fit_model
+from forcegrasp.identify.noise_floor import beyond_fit, numerical_error
+from tests.light_set import light_gripper, light_set
+
+CATALOGUE = [e for e in effects_of(light_gripper()).values() if e.stage in ("command", "actuator", "sensor")]
+DELAY = get_effect("command_delay")
+
+
+def silent(text: str) -> None:
+    """Takes what a diagnosis tells about its progress."""
+
+
+def split_delay(*hidden: str):
+    """What takes the place of a late command in a set with these effects hidden; and the step that had found it."""
+    loaded = light_set(*hidden, grasps=9)
+    target, simulators, base = fit_model(loaded, 0, silent)
+    numerical = beyond_fit(base.fit, numerical_error(base.fit, target))
+    study = with_few(Study(target, simulators, make_folds(target.grasps), numerical), base.fit)
+    screen, rng = Screen(CATALOGUE, study), np.random.default_rng(0)
+    step = look_further(study, base.fit, screen, [DELAY], rng)
+    assert step.effects == ("command_delay",)
+    others = [e for e in CATALOGUE if e is not DELAY]
+    return split(study, step.candidates[0].fit, screen, others, [step], rng), step, study
+
+
+def test_positions_and_forces_late_in_their_own_ways_are_no_late_command():
+    found, old, study = split_delay("readout_skew delay_s=0.03", "force_lag time_constant_s=0.03")
+    assert found is not None
+    (first,), second = found
+    assert (first.effects, second.effects) == (("readout_skew",), ("force_lag",))
+    assert [c.effect.name for c in first.candidates].count("readout_skew") == 1
+    fit = second.candidates[0].fit
+    assert [one.effect.name for one in fit.problem.effects] == ["readout_skew", "force_lag"]
+    sizes = [one.values[0] for one in fit.problem.case(fit.vector).effects]
+    assert sizes == pytest.approx([0.03, 0.03], abs=0.003)
+    assert first.candidates[0].setting.values[0] == sizes[0]
+    assert first.error_before == old.error_before > first.error_after == second.error_before > second.error_after
+    assert second.error_after < 1.05 < old.error_after
+    alone = roughly_without("force_lag", fit, study)
+    assert first.error_after == pytest.approx(study.error(study.heldout(alone)), rel=0.1)
+
+
+def test_a_late_command_stays():
+    assert split_delay("command_delay delay_s=0.03")[0] is None
