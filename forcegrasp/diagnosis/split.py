@@ -22,8 +22,9 @@ from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.identify.fit import Fit
 from forcegrasp.identify.side_by_side import side_by_side
 
-# So many of an effect's look-alikes may be the first of two, and so many effects the second of each.
-_FIRST, _SECOND = 3, 3
+# So many effects are split, those that explain most; so many look-alikes of one may be the first of two, and so many
+# effects the second of each.
+_SPLIT, _FIRST, _SECOND = 3, 3, 3
 
 
 def split(
@@ -47,10 +48,13 @@ def split(
     most = fit.cost - LEAST_SHARE * study.target.beyond_noise(fit.residual)
     known = {one.effect.name: one.effect for one in fit.problem.effects}
     found = [step for step in kept_steps(steps) if step.effects[0] in known and not step.is_counted]
-    for old in sorted(found, key=lambda step: step.error_after - step.error_before):  # what explains most comes first
+    for old in sorted(found, key=lambda step: step.error_after - step.error_before)[:_SPLIT]:
         name = old.effects[0]
+        gains = {score.setting.effect: score.gain for score in reversed(old.scores)}  # the best one of each
+        alike = [e for e in effects if e in gains and not e.of_set and are_alike(e, known[name])]
+        alike = sorted(alike, key=lambda e: -gains[e])[:_FIRST]
         study.progress(f"looking for two effects in place of {name}")
-        for first in _first_of_two(study, fit, screen, effects, known[name]):
+        for first in _first_of_two(study, fit, screen, effects, name, alike):
             start = roughly_as([first], fit, name, study)
             step = look_further(study, start, screen, _beside(first.effect, effects), rng, most=most)
             if not step.effects:
@@ -67,14 +71,12 @@ def split(
 
 
 def _first_of_two(
-    study: Study, fit: Fit, screen: Screen, effects: Sequence[type[Effect]], one: type[Effect]
+    study: Study, fit: Fit, screen: Screen, effects: Sequence[type[Effect]], name: str, alike: Sequence[type[Effect]]
 ) -> Iterator[EffectSetting]:
     """Look-alikes of an effect that leave less than it on few grasps, together with one more effect; best first."""
     some, part = study.on_few(fit)
-    alike = [e for e in effects if not e.of_set and are_alike(e, one)]
-    fits = side_by_side([partial(roughly_as, trials([e]), part, one.name, some) for e in alike])
     promising = []
-    for first in sorted(fits, key=lambda rough: rough.cost)[:_FIRST]:
+    for first in side_by_side([partial(roughly_as, trials([e]), part, name, some) for e in alike]):
         setting = first.problem.case(first.vector).effects[-1]
         groups, _ = screen.on_few(study, some, first, _beside(setting.effect, effects))
         scores = sorted((group[0] for group in groups), key=lambda score: -score.gain)[:_SECOND]
@@ -96,7 +98,8 @@ def _beside(first: type[Effect], effects: Sequence[type[Effect]]) -> list[type[E
 
 
 def _found_instead(old: Step, setting: EffectSetting, fit: Fit, error: float) -> Step:
-    """The step as if it had found this effect, which leaves this error."""
-    first = dataclasses.replace(old.candidates[0], setting=setting, fit=fit)
+    """The step as if it had found this effect, which leaves this error; what it had found is not looked for again."""
+    replaces = old.replaces or old.effects[0]
+    first = dataclasses.replace(old.candidates[0], setting=setting, fit=fit, replaces=replaces)
     others = [c for c in old.candidates[1:] if c.effect is not setting.effect]
     return dataclasses.replace(old, effects=(setting.effect.name,), candidates=(first, *others), error_after=error)

@@ -44,6 +44,7 @@ def test_positions_and_forces_late_in_their_own_ways_are_no_late_command():
     assert found is not None
     (first,), second = found
     assert (first.effects, second.effects) == (("readout_skew",), ("force_lag",))
+    assert first.replaces == "command_delay"
     assert [c.effect.name for c in first.candidates].count("readout_skew") == 1
     fit = second.candidates[0].fit
     assert [one.effect.name for one in fit.problem.effects] == ["readout_skew", "force_lag"]
