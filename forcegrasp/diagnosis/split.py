@@ -51,8 +51,8 @@ def split(
     for old in sorted(found, key=lambda step: step.error_after - step.error_before)[:_SPLIT]:
         name = old.effects[0]
         gains = {score.setting.effect: score.gain for score in reversed(old.scores)}  # the best one of each
-        alike = [e for e in effects if e in gains and not e.of_set and are_alike(e, known[name])]
-        alike = sorted(alike, key=lambda e: -gains[e])[:_FIRST]
+        alike = [e for e in effects if not e.of_set and are_alike(e, known[name])]
+        alike = sorted(alike, key=lambda e: -gains.get(e, 0.0))[:_FIRST]
         study.progress(f"looking for two effects in place of {name}")
         for first in _first_of_two(study, fit, screen, effects, name, alike):
             start = roughly_as([first], fit, name, study)
