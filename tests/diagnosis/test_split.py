@@ -33,8 +33,8 @@ def split_delay(*hidden: str):
     numerical = beyond_fit(base.fit, numerical_error(base.fit, target))
     study = with_few(Study(target, simulators, make_folds(target.grasps), numerical), base.fit)
     screen, rng = Screen(CATALOGUE, study), np.random.default_rng(0)
-    step = look_further(study, base.fit, screen, [DELAY], rng)
-    assert step.effects == ("command_delay",)
+    step = look_further(study, base.fit, screen, CATALOGUE, rng)
+    assert step.effects[0] == "command_delay"
     others = [e for e in CATALOGUE if e is not DELAY]
     return split(study, step.candidates[0].fit, screen, others, [step], rng), step, study
 
