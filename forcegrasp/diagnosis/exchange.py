@@ -34,9 +34,9 @@ def exchange(
       steps: that found the effects.
       rng: for the null distribution.
     """
-    held, known = study.heldout(fit), {one.effect.name: one.effect for one in fit.problem.effects}
-    most = fit.cost - LEAST_SHARE * study.target.beyond_noise(fit.residual)
-    names = [step.effects[0] for step in kept_steps(steps) if step.effects[0] in known and not step.is_counted]
+    held, most = study.heldout(fit), at_most(fit, study)
+    known = {one.effect.name: one.effect for one in fit.problem.effects}
+    names = [step.effects[0] for step in steps_of(fit, steps)]
     for name in names if len(names) > 1 else ():  # the only one was chosen with all there is in the model
         # a mistake of the set may look like anything
         alike = [e for e in effects if e.of_set or are_alike(e, known[name])]
@@ -46,15 +46,31 @@ def exchange(
         found = look_further(study, roughly_without(name, fit, study), screen, alike, rng, most=most)
         if not found.effects:
             continue
-        best = dataclasses.replace(_against(found.candidates[0], held, study), replaces=name)
-        if is_beyond_chance(best.gains, LEAST_RISE) and best.share >= LEAST_SHARE:
+        best = dataclasses.replace(against(found.candidates[0], held, study), replaces=name)
+        if does_better(best):
             study.progress(f"{best.effect.name} does better than {name}")
-            candidates = (best, *(_against(c, held, study) for c in found.candidates[1:]))
+            candidates = (best, *(against(c, held, study) for c in found.candidates[1:]))
             return dataclasses.replace(found, candidates=candidates, error_before=study.error(held), of_many=False)
     return None
 
 
-def _against(candidate: Candidate, held: np.ndarray, study: Study) -> Candidate:
+def at_most(fit: Fit, study: Study) -> float:
+    """The cost that a fit must come down to, to be worth an exchange."""
+    return fit.cost - LEAST_SHARE * study.target.beyond_noise(fit.residual)
+
+
+def steps_of(fit: Fit, steps: Sequence[Step]) -> list[Step]:
+    """The steps that found the effects that a fit has now, but for what was found by counting."""
+    known = {one.effect.name for one in fit.problem.effects}
+    return [step for step in kept_steps(steps) if step.effects[0] in known and not step.is_counted]
+
+
+def does_better(candidate: Candidate) -> bool:
+    """Whether a candidate that was judged :func:`against` a model does better than what it replaces there."""
+    return is_beyond_chance(candidate.gains, LEAST_RISE) and candidate.share >= LEAST_SHARE
+
+
+def against(candidate: Candidate, held: np.ndarray, study: Study) -> Candidate:
     """A candidate judged against the model that has what it may replace, by the residuals that this leaves."""
     after = study.heldout(candidate.fit)
     return dataclasses.replace(candidate, gains=study.gains(held, after), share=study.explained(held, after))

@@ -32,6 +32,12 @@ def contain(effect: type[Effect], other: type[Effect]) -> bool:
     return other.name in _contained(effect) or effect.name in _contained(other)
 
 
+def may_join(effect: type[Effect], others: Collection[type[Effect]]) -> bool:
+    """Whether an effect may stand beside others: not one of them, nor what they contain or make meaningless."""
+    barred = {name for other in others for name in other.instead_of}
+    return effect not in others and effect.name not in barred and not any(contain(effect, other) for other in others)
+
+
 def _contained(effect: type[Effect]) -> set[str]:
     return {nested.effect for nested in effect.contains}
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from forcegrasp.diagnosis.evidence import LEAST_RISE, is_beyond_chance, nearly_as_much
 from forcegrasp.diagnosis.exchange import are_alike
-from forcegrasp.diagnosis.families import contain, refit_as, refit_without, roughly_as, roughly_without
+from forcegrasp.diagnosis.families import may_join, refit_as, refit_without, roughly_as, roughly_without
 from forcegrasp.diagnosis.needless import SURELY, chained, is_enough
 from forcegrasp.diagnosis.result import Step, kept_steps
 from forcegrasp.diagnosis.signatures import trials
@@ -69,10 +69,13 @@ def _like_both(pair: Collection[str], fit: Fit, effects: Sequence[type[Effect]])
     """Effects that look like both of two, and may stand beside all others of the model."""
     known = [one.effect for one in fit.problem.effects]
     two, others = [e for e in known if e.name in pair], [e for e in known if e.name not in pair]
-    barred = {name for other in others for name in other.instead_of}
     for effect in effects:
-        is_new = effect not in known and effect.name not in barred and not any(contain(effect, e) for e in others)
-        if is_new and not effect.of_set and all(are_alike(effect, one) for one in two):
+        if (
+            may_join(effect, others)
+            and effect not in two
+            and not effect.of_set
+            and all(are_alike(effect, one) for one in two)
+        ):
             yield effect
 
 

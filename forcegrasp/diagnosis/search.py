@@ -153,12 +153,8 @@ def left_to_try(effects: Sequence[type[Effect]], fit: Fit, steps: Sequence[Step]
 
     Not those in it, nor what they contain or contains them, means nothing beside them, or gave way to one of them.
     """
-    known = {setting.effect for setting in fit.problem.effects}
-    dropped = {step.replaces for step in steps} | {name for effect in known for name in effect.instead_of}
-    return [
-        e for e in effects
-        if e not in known and e.name not in dropped and not any(families.contain(e, other) for other in known)
-    ]  # fmt: skip
+    known, dropped = {setting.effect for setting in fit.problem.effects}, {step.replaces for step in steps}
+    return [e for e in effects if e.name not in dropped and families.may_join(e, known)]
 
 
 def _convincing(before: Study, fewer: Fit, study: Study, fit: Fit) -> bool:

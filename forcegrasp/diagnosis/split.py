@@ -8,11 +8,10 @@ from functools import partial
 
 import numpy as np
 
-from forcegrasp.diagnosis.evidence import LEAST_RISE, LEAST_SHARE, is_beyond_chance
-from forcegrasp.diagnosis.exchange import are_alike
-from forcegrasp.diagnosis.families import contain, roughly_as
+from forcegrasp.diagnosis.exchange import against, are_alike, at_most, does_better, steps_of
+from forcegrasp.diagnosis.families import may_join, roughly_as
 from forcegrasp.diagnosis.refine import refine
-from forcegrasp.diagnosis.result import Step, kept_steps
+from forcegrasp.diagnosis.result import Step
 from forcegrasp.diagnosis.screen import Screen
 from forcegrasp.diagnosis.signatures import Background, trials
 from forcegrasp.diagnosis.step import look_further
@@ -44,11 +43,9 @@ def split(
       steps: that found the effects.
       rng: for the null distribution.
     """
-    held = study.heldout(fit)
-    most = fit.cost - LEAST_SHARE * study.target.beyond_noise(fit.residual)
+    held, most = study.heldout(fit), at_most(fit, study)
     known = {one.effect.name: one.effect for one in fit.problem.effects}
-    found = [step for step in kept_steps(steps) if step.effects[0] in known and not step.is_counted]
-    for old in sorted(found, key=lambda step: step.error_after - step.error_before)[:_SPLIT]:
+    for old in sorted(steps_of(fit, steps), key=lambda step: step.error_after - step.error_before)[:_SPLIT]:
         name = old.effects[0]
         gains = {score.setting.effect: score.gain for score in reversed(old.scores)}  # the best one of each
         alike = [e for e in effects if not e.of_set and are_alike(e, known[name])]
@@ -60,8 +57,7 @@ def split(
             if not step.effects:
                 continue
             best = step.candidates[0]
-            after = study.heldout(best.fit)
-            if is_beyond_chance(study.gains(held, after), LEAST_RISE) and study.explained(held, after) >= LEAST_SHARE:
+            if does_better(against(best, held, study)):
                 study.progress(f"{first.effect.name} and {best.effect.name} do better than {name}")
                 error = study.error(study.heldout(start)) if old is steps[-1] else old.error_after
                 instead = _found_instead(old, best.fit.problem.case(best.fit.vector).effects[-2], start, error)
@@ -82,7 +78,7 @@ def _first_of_two(
         scores = sorted((group[0] for group in groups), key=lambda score: -score.gain)[:_SECOND]
         both = refine(scores, some, first, Background(first, some.numerical))
         promising.append((min((pair.fit.cost for pair in both), default=np.inf), setting))
-    most = part.cost - LEAST_SHARE * some.target.beyond_noise(part.residual)
+    most = at_most(part, some)
     for cost, setting in sorted(promising, key=lambda pair: pair[0]):
         if cost < most:
             yield setting
@@ -90,11 +86,7 @@ def _first_of_two(
 
 def _beside(first: type[Effect], effects: Sequence[type[Effect]]) -> list[type[Effect]]:
     """Those of the effects that may stand beside another one."""
-    return [
-        e for e in effects
-        if e is not first and not e.of_set and not contain(e, first)
-        and e.name not in first.instead_of and first.name not in e.instead_of
-    ]  # fmt: skip
+    return [e for e in effects if not e.of_set and may_join(e, [first]) and may_join(first, [e])]
 
 
 def _found_instead(old: Step, setting: EffectSetting, fit: Fit, error: float) -> Step:

@@ -119,7 +119,6 @@ class Replay:
         self._fresh = np.zeros(self._command.shape[:2], bool)
         for index, start in enumerate(starts):
             self._fresh[start, index] = True
-        self._sample = self._fresh.cumsum(axis=0) - 1  # the latest one at each physics step, ``(steps, grasps)``
         #: Motions of all grasps that may be asked for again, by what was simulated; see :meth:`remember`.
         self.remembered: dict[bytes, Motion] = {}
         starts_at = [g.start or (start_position(g, gripper.stroke), np.zeros(len(gripper.motors))) for g in self.grasps]
@@ -198,15 +197,17 @@ class Replay:
             position[:, 1:], force[:, 1:], objects[:, 1:] = plant.play(commands, fresh)
         else:
             for step in range(self._steps - 1):
+                new = self._fresh[step, grasp]
                 if self._encoders_known:
                     plant.recorded_position = self._encoder[step, grasp]
-                elif driver_reads is not None:
-                    reads = driver_reads(plant.measured_position, grasp, self._sample[step, grasp])
-                    known = reads if plant.recorded_position is None else plant.recorded_position
-                    plant.recorded_position = np.where(self._fresh[step, grasp][:, None], reads, known)
+                elif driver_reads is not None and new.any():
+                    sample = self._fresh[: step + 1, grasp].sum(axis=0) - 1
+                    reads = driver_reads(plant.measured_position, grasp, sample)
+                    before = reads if plant.recorded_position is None else plant.recorded_position
+                    plant.recorded_position = np.where(new[:, None], reads, before)
                 if self._disturbed:
                     plant.disturb(self._load[step, grasp], self._enabled[step, grasp] > 0)
-                plant.advance(self._command[step, grasp], 1, self._fresh[step, grasp])
+                plant.advance(self._command[step, grasp], 1, new)
                 position[:, step + 1], force[:, step + 1] = plant.position, plant.transduced_force
                 objects[:, step + 1] = plant.object_position
         bad = plant.warnings().any(axis=1)

@@ -18,14 +18,11 @@ from forcegrasp.identify.fit import Simulators, fit_exactly
 from forcegrasp.identify.fit_set import fit_model
 from forcegrasp.identify.noise_floor import beyond_fit, numerical_error
 from forcegrasp.identify.problem import Problem
+from forcegrasp.identify.progress import silent
 from tests.light_set import light_gripper, light_set
 
 LATE = ("readout_skew", "force_delay")
 CATALOGUE = list(effects_of(light_gripper()).values())
-
-
-def silent(text: str) -> None:
-    """Takes what a diagnosis tells about its progress."""
 
 
 def explained_by_late_readings(*hidden: str):

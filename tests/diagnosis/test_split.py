@@ -16,14 +16,11 @@ from forcegrasp.effects.for_gripper import effects_of
 from forcegrasp.identify.cross_validation import make_folds
 from forcegrasp.identify.fit_set import fit_model
 from forcegrasp.identify.noise_floor import beyond_fit, numerical_error
+from forcegrasp.identify.progress import silent
 from tests.light_set import light_gripper, light_set
 
 CATALOGUE = [e for e in effects_of(light_gripper()).values() if e.stage in ("command", "actuator", "sensor")]
 DELAY = get_effect("command_delay")
-
-
-def silent(text: str) -> None:
-    """Takes what a diagnosis tells about its progress."""
 
 
 def split_delay(*hidden: str):
