@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from forcegrasp.diagnosis.exchange import against, are_alike, at_most, does_better, steps_of
-from forcegrasp.diagnosis.families import may_join, roughly_as
+from forcegrasp.diagnosis.families import may_join, roughly_as, roughly_without
 from forcegrasp.diagnosis.refine import refine
 from forcegrasp.diagnosis.result import Step
 from forcegrasp.diagnosis.screen import Screen
@@ -59,8 +59,9 @@ def split(
             best = step.candidates[0]
             if does_better(against(best, held, study)):
                 study.progress(f"{first.effect.name} and {best.effect.name} do better than {name}")
-                error = study.error(study.heldout(start)) if old is steps[-1] else old.error_after
-                instead = _found_instead(old, best.fit.problem.case(best.fit.vector).effects[-2], start, error)
+                instead = _found_instead(old, best.fit.problem.case(best.fit.vector).effects[-2], start, fit, study)
+                if old is not steps[-1]:  # the steps after it go on from what it left
+                    instead = dataclasses.replace(instead, error_after=old.error_after)
                 left = [instead if one is old else one for one in steps]
                 return left, dataclasses.replace(step, error_before=left[-1].error_after, of_many=False)
     return None
@@ -89,9 +90,20 @@ def _beside(first: type[Effect], effects: Sequence[type[Effect]]) -> list[type[E
     return [e for e in effects if not e.of_set and may_join(e, [first]) and may_join(first, [e])]
 
 
-def _found_instead(old: Step, setting: EffectSetting, fit: Fit, error: float) -> Step:
-    """The step as if it had found this effect, which leaves this error; what it had found is not looked for again."""
-    replaces = old.replaces or old.effects[0]
-    first = dataclasses.replace(old.candidates[0], setting=setting, fit=fit, replaces=replaces)
+def _found_instead(old: Step, setting: EffectSetting, alone: Fit, fit: Fit, study: Study) -> Step:
+    """The step as if it had found this effect; what it had found is not looked for again.
+
+    Args:
+      old: the step.
+      setting: the effect, as it is in the end.
+      alone: a fit with it, before the other of the two.
+      fit: with what the step had found.
+      study: the measurements.
+    """
+    name, error = old.effects[0], study.error(study.heldout(alone))
+    first = dataclasses.replace(
+        old.candidates[0], setting=setting, fit=alone, error_after=error, replaces=old.replaces or name
+    )
+    first = against(first, study.heldout(roughly_without(name, fit, study)), study)
     others = [c for c in old.candidates[1:] if c.effect is not setting.effect]
     return dataclasses.replace(old, effects=(setting.effect.name,), candidates=(first, *others), error_after=error)

@@ -49,6 +49,9 @@ def test_positions_and_forces_late_in_their_own_ways_are_no_late_command():
     assert sizes == pytest.approx([0.03, 0.03], abs=0.003)
     assert first.candidates[0].setting.values[0] == sizes[0]
     assert first.error_before == old.error_before > first.error_after == second.error_before > second.error_after
+    assert first.candidates[0].error_after == first.error_after
+    assert 0 < first.candidates[0].heldout_gain < old.candidates[0].heldout_gain  # its own, not the late command's
+    assert 0 < first.candidates[0].share < old.candidates[0].share
     assert second.error_after < 1.05 < old.error_after
     alone = roughly_without("force_lag", fit, study)
     assert first.error_after == pytest.approx(study.error(study.heldout(alone)), rel=0.1)
