@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from forcegrasp.diagnosis.evidence import LEAST_RISE, LEAST_SHARE, is_beyond_chance
-from forcegrasp.diagnosis.families import roughly_without
+from forcegrasp.diagnosis.families import look_alike, roughly_without
 from forcegrasp.diagnosis.result import Candidate, Step, kept_steps
 from forcegrasp.diagnosis.screen import Screen
 from forcegrasp.diagnosis.step import look_further
@@ -78,4 +78,4 @@ def against(candidate: Candidate, held: np.ndarray, study: Study) -> Candidate:
 
 def are_alike(one: type[Effect], other: type[Effect]) -> bool:
     """Whether the catalogue says of two effects that they look alike, or that they are of one kind."""
-    return one.name in other.look_alikes or other.name in one.look_alikes or one.family == other.family
+    return look_alike(one, other) or one.family == other.family

@@ -38,6 +38,11 @@ def may_join(effect: type[Effect], others: Collection[type[Effect]]) -> bool:
     return effect not in others and effect.name not in barred and not any(contain(effect, other) for other in others)
 
 
+def look_alike(one: type[Effect], other: type[Effect]) -> bool:
+    """Whether the catalogue says of either of two effects that it looks like the other."""
+    return one.name in other.look_alikes or other.name in one.look_alikes
+
+
 def _contained(effect: type[Effect]) -> set[str]:
     return {nested.effect for nested in effect.contains}
 

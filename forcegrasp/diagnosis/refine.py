@@ -1,4 +1,4 @@
-"""Fits everything again with one more effect, from where its signature puts it."""
+"""Fits everything again with one more effect, from where its signature puts it, or whatever that promises."""
 
 from __future__ import annotations
 
@@ -8,8 +8,10 @@ from functools import partial
 
 import numpy as np
 
-from forcegrasp.diagnosis.signatures import Background, Score, best_sizes
+from forcegrasp.diagnosis.families import roughly_as
+from forcegrasp.diagnosis.signatures import Background, Score, best_sizes, trials
 from forcegrasp.diagnosis.study import Study
+from forcegrasp.effects import Effect
 from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.identify.fit import Fit, fit_once
 from forcegrasp.identify.problem import Problem
@@ -61,6 +63,30 @@ def refine(scores: Sequence[Score], study: Study, fit: Fit, background: Backgrou
         study.progress(f"refitting with {setting.effect.name} {setting.variant} on all grasps")
         tasks.append(partial(_fit_from, fit.moved(part.problem, few.vector[: len(part.problem)]), setting, study, fit))
     return [Refined(pairs[i][1], refitted) for i, refitted in zip(left, side_by_side(tasks), strict=True)]
+
+
+def refine_anyway(effects: Sequence[type[Effect]], study: Study, fit: Fit, without: str | tuple[()] = ()) -> list[Fit]:
+    """Rough fits with each effect that may be the best one, of those that leave less than a fit does on few grasps.
+
+    They start from the best of the sizes that are tried, and nothing is asked of signatures.
+
+    Args:
+      effects: that are added.
+      study: the measurements.
+      fit: of the model that they are added to.
+      without: name of an effect in it whose place they take; none by default.
+    """
+    some, part = study.on_few(fit)
+    few = side_by_side([partial(roughly_as, trials([effect]), part, without, some) for effect in effects])
+    few = [one for one in few if one.cost < NO_BETTER * part.cost]
+    if some is study:
+        return few
+    tasks = []
+    for index in _in_the_race([part.cost - one.cost for one in few], _LOST_IF_FITTED):
+        setting = few[index].problem.case(few[index].vector).effects[-1]
+        study.progress(f"refitting with {setting.effect.name} {setting.variant} on all grasps")
+        tasks.append(partial(roughly_as, [setting], fit, without, study))
+    return side_by_side(tasks)
 
 
 def _in_the_race(gains: Sequence[float], least: float) -> list[int]:

@@ -117,9 +117,9 @@ class Step(ShortRepr):
 
 
 def kept_steps(steps: Sequence[Step]) -> list[Step]:
-    """The steps that found something that no later step put something richer in place of."""
-    replaced = {step.replaces for step in steps}
-    return [step for step in steps if step.effects and step.effects[0] not in replaced]
+    """The steps that found something that no later step put something else in place of."""
+    replaced = [{later.replaces for later in steps[place:]} for place in range(1, len(steps) + 1)]
+    return [step for step, gone in zip(steps, replaced, strict=True) if step.effects and step.effects[0] not in gone]
 
 
 def settle_ties(steps: Sequence[Step]) -> list[Step]:

@@ -62,8 +62,8 @@ def diagnose(
     """
     first, before = (base.fit, ()) if start is None else start
     fit = first
-    of_base = numerical_error(fit, target)
-    study = Study(target, simulators, evidence_folds(target.grasps), beyond_fit(fit, of_base), progress)
+    numerical = numerical_error(fit, target)
+    study = Study(target, simulators, evidence_folds(target.grasps), beyond_fit(fit, numerical), progress)
     folds = tuple(make_folds(target.grasps))
     error_before = study.error(target.before_rounding(study.heldout(base.fit)))
     odd = odd_grasps(target, fit)
@@ -77,7 +77,7 @@ def diagnose(
     if (rounding := target.rounding) is not None and start is None:
         progress(f"found {rounding.effect.name}: readings are multiples of one step")
         steps.append(Step((rounding.effect.name,), (), (), error_before, study.error(study.heldout(fit))))
-    screen = Screen(effects, study)
+    screen, tried_anyway = Screen(effects, study), False
     believed: tuple[list[Step], Fit, Study] | None = None  # what is, if the rest explains too little in the end
     for _ in range(MOST_EFFECTS):
         untried = left_to_try(effects, fit, steps)
@@ -87,9 +87,11 @@ def diagnose(
         study = with_few(study, fit)
         step = look_further(study, fit, screen, untried, rng, richer)
         if not step.effects and step.error_before > _AS_GOOD_AS_NOTHING * floor:
-            step = exchange(study, fit, screen, untried, steps, rng) or step
-            two = None if step.effects else split(study, fit, screen, untried, steps, rng)
-            steps, step = two or (steps, step)
+            found = None if tried_anyway else _fitted_anyway(study, fit, screen, untried, rng)
+            found = found or exchange(study, fit, screen, untried, steps, rng)
+            two = None if found else split(study, fit, screen, untried, steps, rng)
+            steps, step = two or (steps, found or step)
+            tried_anyway = True  # it takes long, and where it has helped signatures lead on
         if not step.effects:
             steps.append(step)
             break
@@ -131,11 +133,20 @@ def diagnose(
     names = [s.effects[0] for s in found] if verdict.names_effects else []
     if verdict is Verdict.ONE_OF:
         names += [name for s in found for name in s.effects[1:]]
-    of_final = of_base if fit is first else numerical_error(fit, target)
+    if fit is not first:  # what was missing may have made them odd
+        numerical, odd = numerical_error(fit, target), odd_grasps(target, fit)
     return Diagnosis(
         verdict, tuple(dict.fromkeys(names)), tuple(steps), base, fit, target, folds, error_before, error_after,
-        of_final, floor, left, odd, noise, alone=alone,
+        numerical, floor, left, odd, noise, alone=alone,
     )  # fmt: skip
+
+
+def _fitted_anyway(
+    study: Study, fit: Fit, screen: Screen, effects: Sequence[type[Effect]], rng: np.random.Generator
+) -> Step | None:
+    """A step with an effect whose signature promised too little; None if there is none."""
+    step = look_further(study, fit, screen, effects, rng, anyway=True)
+    return step if step.effects else None
 
 
 def _look_beside_all(study: Study, steps: Sequence[Step], fit: Fit, simulators: Simulators) -> tuple[list[Step], Fit]:

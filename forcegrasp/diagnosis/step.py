@@ -22,7 +22,7 @@ from forcegrasp.diagnosis.evidence import (
 from forcegrasp.diagnosis.look_beside import look_beside
 from forcegrasp.diagnosis.noise_check import unexpected_noise
 from forcegrasp.diagnosis.other_starts import other_starts
-from forcegrasp.diagnosis.refine import NO_BETTER, refine
+from forcegrasp.diagnosis.refine import NO_BETTER, refine, refine_anyway
 from forcegrasp.diagnosis.result import Candidate, Step
 from forcegrasp.diagnosis.screen import MAX_GAIN_FACTOR, Screen
 from forcegrasp.diagnosis.signatures import Background, Score
@@ -40,6 +40,8 @@ from forcegrasp.identify.target import Target
 LEAST_GAIN, LEAST_GAIN_AT_FLOOR = 0.02, 0.1
 # Refitted per step: signatures only rank.
 _REFITTED = 5
+# So many are, where none promises enough.
+_FITTED_ANYWAY = 12
 # Of these the best ones are fitted to the end.
 _REFINED = 3
 # Fitted to the end, the cost of a rough fit falls by this share of it at most, or of what the effect gained.
@@ -56,6 +58,7 @@ def look_further(
     rng: np.random.Generator,
     richer: Sequence[tuple[str, type[Effect]]] = (),
     most: float = np.inf,
+    anyway: bool = False,
 ) -> Step:
     """Looks for one more effect.
 
@@ -67,17 +70,22 @@ def look_further(
       rng: for the null distribution.
       richer: names of effects in the model, each with one that contains it and may take its place.
       most: cost that a fit with the effect must come down to; one that is too far from it is not looked for.
+      anyway: whether effects are fitted whose signatures promise too little: where parameters are far from where the
+        effect would have them, slopes tell little of what it gains.
     """
     start = _Start(study, fit)
     study.progress(f"trying {len(effects)} effects")
     look = screen.look(study, fit, start.background, effects, start.noise, rng)
-    candidates = start.refit(look.worth_a_fit[:_REFITTED], look.null)
+    if anyway:
+        candidates = start.fit_anyway(look.scores, look.null)
+    else:
+        candidates = start.refit(look.worth_a_fit[:_REFITTED], look.null)
     candidates = [one for one in candidates if _least_cost(one.fit, fit) < most]
     candidates += start.refit_richer(richer, look.null)
     variants: dict[str, list[Candidate]] = {}
     for candidate in sorted(candidates, key=start.place):
         variants.setdefault(candidate.effect.name, []).append(candidate)
-    ordered, redundant = start.refine_on_reference_tier(list(variants.values()))
+    ordered, redundant = start.refine_on_reference_tier(list(variants.values()), effects, look.null)
     of_many = bool(ordered) and not is_significant(ordered[0], start.least_gain)
     if not ordered or (of_many and not start.may_be_of_many(ordered[0], look.share_together)):
         return Step((), ordered, look.scores, start.error, start.error)
@@ -151,9 +159,7 @@ class _Start:
             self._study.progress(f"refitting with {effect.name} in place of {name}")
             refit = families.refit_as_richer(effect, self._fit, name, self._study)
             if not any(families.falls_back(refit, nested) for nested in effect.contains):
-                change = (refit.weight * (self._fit.residual - refit.residual)).ravel()
-                p_family = (1 + int(np.sum(null >= self._fit.cost - refit.cost))) / (1 + len(null))
-                candidates.append(self._judge(refit, p_family, change / max(np.linalg.norm(change), 1e-9), name))
+                candidates.append(self._judge_by_gain(refit, null, name))
         return candidates
 
     def _may_explain_enough(self, richer: type[Effect], name: str) -> bool:
@@ -164,8 +170,40 @@ class _Start:
         rough = families.roughly_as_richer(richer, part, name, some)
         return part.cost - rough.cost > MAX_GAIN_FACTOR * LEAST_SHARE * some.target.beyond_noise(part.residual)
 
+    def _may_be_a_look_alike(self, best: Candidate) -> bool:
+        """Whether an effect that was found leaves more than noise."""
+        leaves_more = rms_error(best.fit, self._study.target) > _ALL_FITTED
+        return leaves_more and not (self.place(best)[0] or best.replaces or best.effect.of_set)
+
+    def _better_of_its_family(
+        self, best: Candidate, effects: Sequence[type[Effect]], null: np.ndarray
+    ) -> list[Candidate]:
+        """Rough fits with look-alikes of one's family in its place, those that leave less than it does on few grasps.
+
+        Of two kinds of friction the wrong one may have the better signature by far, where both are to grow much larger
+        than signatures are. Where the best one is fitted, the others start from what it has found.
+
+        Args:
+          best: a candidate that was fitted to the end.
+          effects: that may be in its place.
+          null: gains of the best signature of noise.
+        """
+        name, own = best.effect.name, best.effect
+        alike = [e for e in effects if e.family == own.family and families.look_alike(e, own) and not e.of_set]
+        for effect in alike:
+            self._study.progress(f"trying {effect.name} in place of {name}")
+        fits = refine_anyway(alike, self._study, best.fit, name)
+        return [self._judge_by_gain(fit, null) for fit in fits]
+
+    def fit_anyway(self, scores: Sequence[Score], null: np.ndarray) -> list[Candidate]:
+        """Rough fits with the effects of these signatures, whatever little they promise."""
+        effects = list(dict.fromkeys(score.setting.effect for score in scores))[:_FITTED_ANYWAY]
+        for effect in effects:
+            self._study.progress(f"fitting {effect.name} to few grasps, though it promises little")
+        return [self._judge_by_gain(fit, null) for fit in refine_anyway(effects, self._study, self._fit)]
+
     def refine_on_reference_tier(
-        self, variants: Sequence[Sequence[Candidate]]
+        self, variants: Sequence[Sequence[Candidate]], effects: Sequence[type[Effect]], null: np.ndarray
     ) -> tuple[tuple[Candidate, ...], set[str]]:
         """Fits the best one, and those indistinguishable from it, on the reference tier: rough fits may stop short.
 
@@ -173,6 +211,8 @@ class _Start:
 
         Args:
           variants: candidates of each effect, best first.
+          effects: all that may be added.
+          null: gains of the best signature of noise.
         """
         ordered = [of_effect[0] for of_effect in variants]  # of several variants the best one
         alike = {best.effect.name: _as_good(best, others) for best, *others in variants}
@@ -189,15 +229,25 @@ class _Start:
         refined = self._compare_with_contained(refined)
         names = {c.effect.name for c in refined}
         every = [*refined, *(c for c in ordered if c.effect.name not in names)]
+        families_tried: set[str] = set()
         while True:
             redundant = add_nothing(every)
             every.sort(key=lambda c: (c.effect.name in redundant, *self.place(c)))
             first = every[0] if every else None
-            if first is None or first.effect.name in names or first.replaces:  # the last were fitted to the end already
+            if first is None:
+                return (), redundant
+            if first.effect.name not in names and not first.replaces:  # the last were fitted to the end already
+                # fitted to the end the others are no better than this rough one: it is to be fitted, too
+                names.add(first.effect.name)
+                (every[0],) = self._at_the_end([first], alike)
+            elif first.effect.family not in families_tried and self._may_be_a_look_alike(first):
+                families_tried.add(first.effect.family)
+                fitted = {c.effect for c in every}
+                better = self._better_of_its_family(first, [e for e in effects if e not in fitted], null)
+                alike |= {c.effect.name: [] for c in better}
+                every += better
+            else:
                 return tuple(every), redundant
-            # fitted to the end the others are no better than this rough one: it is to be fitted, too
-            names.add(first.effect.name)
-            (every[0],) = self._at_the_end([first], alike)
 
     def _is_enough(self, simple: Candidate, rough: Mapping[str, Fit], richer: Candidate) -> bool:
         """Whether a richer effect promises nothing beyond one that it contains, which leaves only noise."""
@@ -267,6 +317,12 @@ class _Start:
             return exact
         again = fit_exactly(target, exact.problem, simulators, exact.moved(best.problem, best.vector))
         return min([exact, again], key=lambda fit: fit.cost)
+
+    def _judge_by_gain(self, refit: Fit, null: np.ndarray, replaces: str = "") -> Candidate:
+        """The same of a fit that did not start from a signature."""
+        change = (refit.weight * (self._fit.residual - refit.residual)).ravel()
+        p_family = (1 + int(np.sum(null >= self._fit.cost - refit.cost))) / (1 + len(null))
+        return self._judge(refit, p_family, change / max(np.linalg.norm(change), 1e-9), replaces)
 
     def _judge(self, refit: Fit, p_family: float, signature: np.ndarray, replaces: str = "") -> Candidate:
         """What held-out grasps say of a fit with one more effect, its last one."""

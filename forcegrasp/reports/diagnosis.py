@@ -231,7 +231,8 @@ def _symptom(step: Step, before: Fit, diagnosis: Diagnosis) -> str:
     if step.is_counted:
         return rounding_words(target)
     seen = symptom_of(target, before, step.candidates[0].fit).sentence()
-    later = next((s.effects[0] for s in diagnosis.steps if s.replaces == name), "")
+    own = next(place for place, one in enumerate(diagnosis.steps) if one is step)
+    later = next((s.effects[0] for s in diagnosis.steps[own + 1 :] if s.replaces == name), "")
     return f"{seen} (later {later} took its place)" if later else seen
 
 

@@ -162,7 +162,7 @@ def test_what_takes_an_effects_place_does_so_though_another_seemed_better_at_fir
     start = _Start(study, made_up.base.fit)
     monkeypatch.setattr(start, "_to_the_end", lambda rough: rough)
     monkeypatch.setattr(start, "_judge", lambda *_: dataclasses.replace(other, gains=np.full(8, 10.0)))
-    ordered, _ = start.refine_on_reference_tier([[other], [richer]])
+    ordered, _ = start.refine_on_reference_tier([[other], [richer]], [], np.zeros(1))
     assert [(c.effect.name, c.replaces) for c in ordered] == [("back_emf", "force_limit"), ("rate_limit", "")]
 
 
@@ -187,7 +187,7 @@ def test_variants_that_rough_fits_cannot_tell_apart_are_all_fitted_to_the_end(ma
 
     monkeypatch.setattr(start, "_to_the_end", to_the_end)
     monkeypatch.setattr(start, "_judge", lambda fit, *_: dataclasses.replace(loose, fit=fit))
-    ordered, _ = start.refine_on_reference_tier([[loose, play, command]])
+    ordered, _ = start.refine_on_reference_tier([[loose, play, command]], [], np.zeros(1))
     assert [any(one is rough for one in ended) for rough in (loose.fit, play.fit, command.fit)] == [True, True, False]
     assert [c.fit.cost for c in ordered] == [pytest.approx(0.25 * play.fit.cost)]
 

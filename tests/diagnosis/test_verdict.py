@@ -321,6 +321,7 @@ def found_by(made_up, monkeypatch):
         following = iter((*steps, Step((), (), (), 1.0, 1.0)))
         base = made_up.base.fit
         monkeypatch.setattr(search, "look_further", lambda *a: next(following))
+        monkeypatch.setattr(search, "_fitted_anyway", lambda *a: None)
         monkeypatch.setattr(search, "numerical_error", lambda fit, target: (0 * fit.residual + 0.1,) * 2)
         monkeypatch.setattr(search, "Screen", lambda *a: None)
         monkeypatch.setattr(search, "with_few", lambda study, fit: study)

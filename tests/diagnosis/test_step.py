@@ -1,0 +1,110 @@
+"""What a step of the search fits though its signature promises little."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from forcegrasp.diagnosis import search
+from forcegrasp.diagnosis.few import with_few
+from forcegrasp.diagnosis.odd_grasps import OddGrasp
+from forcegrasp.diagnosis.refine import refine_anyway
+from forcegrasp.diagnosis.result import Step, kept_steps
+from forcegrasp.diagnosis.screen import Screen
+from forcegrasp.diagnosis.step import look_further
+from forcegrasp.diagnosis.study import Study
+from forcegrasp.effects.for_gripper import effect_of
+from forcegrasp.identify.cross_validation import make_folds
+from forcegrasp.identify.fit_set import fit_model
+from forcegrasp.identify.noise_floor import beyond_fit, numerical_error
+from forcegrasp.identify.progress import silent
+from tests.light_set import light_gripper, light_set
+
+SMOOTH, PRESLIDING, DELAY = (effect_of(n, light_gripper()) for n in ("smooth_friction", "presliding", "command_delay"))
+
+
+@pytest.fixture(scope="module")
+def creeping():
+    """A set with friction that vanishes smoothly at rest: what was fitted to it, and a study of it."""
+    loaded = light_set("smooth_friction force_n=0.1 creep_m_s=0.002")
+    target, simulators, base = fit_model(loaded, 0, silent)
+    numerical = beyond_fit(base.fit, numerical_error(base.fit, target))
+    return with_few(Study(target, simulators, make_folds(target.grasps), numerical), base.fit), base
+
+
+def promising(*effects: str):
+    """A screen whose signatures promise something of these effects alone."""
+
+    class Partial(Screen):
+        def look(self, *arguments):
+            look = super().look(*arguments)
+            kept = tuple(score for score in look.worth_a_fit if score.setting.effect.name in effects)
+            return dataclasses.replace(look, worth_a_fit=kept)
+
+    return Partial
+
+
+def looked(creeping, effects, *seen: str, **more) -> Step:
+    study, base = creeping
+    screen = promising(*seen)(effects, study)
+    return look_further(study, base.fit, screen, effects, np.random.default_rng(0), **more)
+
+
+def test_a_look_alike_of_its_family_is_fitted_in_the_place_of_what_leaves_more_than_noise(creeping):
+    step = looked(creeping, [PRESLIDING, SMOOTH], "presliding")
+    assert step.effects[0] == "smooth_friction"
+    assert step.error_after < 1.05 < next(c for c in step.candidates if c.effect is PRESLIDING).error_after
+
+
+def test_where_noise_alone_is_left_no_look_alike_is_fitted(creeping, monkeypatch):
+    monkeypatch.setattr("forcegrasp.diagnosis.step.refine_anyway", lambda *_: pytest.fail("fitted another"))
+    assert looked(creeping, [PRESLIDING, SMOOTH], "smooth_friction").effects == ("smooth_friction",)
+
+
+def test_what_promises_too_little_is_fitted_where_it_is_asked_for(creeping):
+    assert looked(creeping, [SMOOTH, DELAY]).effects == ()
+    step = looked(creeping, [SMOOTH, DELAY], anyway=True)
+    assert step.effects == ("smooth_friction",)
+    assert step.candidates[0].parameters()["force_n"] == pytest.approx(0.1, rel=0.1)
+
+
+def test_of_rough_fits_those_that_gain_much_less_than_the_best_one_are_left_out(creeping):
+    study, base = creeping
+    fits = refine_anyway([SMOOTH, DELAY], study, base.fit)
+    assert [fit.problem.effects[-1].effect for fit in fits] == [SMOOTH]
+    assert len(fits[0].residual) == len(base.fit.residual)
+    assert refine_anyway([DELAY], study, fits[0], "smooth_friction") == []
+
+
+def test_a_search_fits_anyway_once_and_judges_odd_grasps_again(creeping, monkeypatch):
+    study, base = creeping
+    nothing, asked = Step((), (), (), 2.0, 2.0), []
+
+    def step(*arguments, anyway=False, **_):
+        asked.append(anyway)
+        return looked(creeping, [SMOOTH, DELAY], anyway=True) if anyway and asked.count(True) == 1 else nothing
+
+    def odd(target, fit):
+        return () if fit.problem.effects else (OddGrasp("3", "thing_0", 9.0),)
+
+    monkeypatch.setattr(search, "look_further", step)
+    monkeypatch.setattr(search, "odd_grasps", odd)
+    monkeypatch.setattr(search, "_left", lambda *_: ("somewhere", None))
+    for name in ("exchange", "split"):
+        monkeypatch.setattr(search, name, lambda *_: None)
+    diagnosis = search.diagnose(study.target, base, study.simulators, [SMOOTH, DELAY], np.random.default_rng(0))
+    assert asked == [False, True, False]
+    assert diagnosis.preferred == ("smooth_friction",)
+    assert diagnosis.odd == ()
+
+
+def test_an_effect_that_comes_back_after_it_gave_way_is_kept(made_up):
+    first = made_up.diagnosis("effect").steps[0]
+    second = dataclasses.replace(
+        first, effects=("force_drift",), candidates=(dataclasses.replace(first.candidates[1], replaces="force_bias"),)
+    )
+    assert first.effects == ("force_bias",)
+    assert [step.effects[0] for step in kept_steps([first, second])] == ["force_drift"]
+    assert [step.effects[0] for step in kept_steps([first, second, first])] == ["force_drift", "force_bias"]
