@@ -48,15 +48,21 @@ def _contained(effect: type[Effect]) -> set[str]:
 
 
 def falls_back(fit: Fit, nested: Nested) -> bool:
-    """Whether the last effect of a fit can't be told from a simpler one that it contains."""
+    """Whether the last effect of a fit can't be told from a simpler one that it contains.
+
+    A time that is shorter than integrators differ by is none.
+    """
     last = len(fit.problem.effects) - 1
     effect = fit.problem.effects[last].effect
     first = fit.problem.first_entry(last)
     errors = np.sqrt(np.diag(fit.covariance())) * np.sqrt(_scale(fit))
     for name, value in nested.at.items():
         index = first + effect.index(name)
-        entry = fit.problem.entries[index]
-        if abs(fit.vector[index] - entry.coordinate(value)) > max(_STANDARD_ERRORS * errors[index], 1e-3):
+        entry, least = fit.problem.entries[index], max(_STANDARD_ERRORS * errors[index], 1e-3)
+        if effect.parameters[effect.index(name)].unit == "s":
+            step = fit.problem.gripper.integrators_differ_s
+            least = max(least, entry.coordinate(value + step) - entry.coordinate(value))
+        if abs(fit.vector[index] - entry.coordinate(value)) > least:
             return False
     return True
 

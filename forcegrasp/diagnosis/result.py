@@ -64,16 +64,10 @@ class Candidate(ShortRepr):
 
     @property
     def is_plausible(self) -> bool:
-        """Whether it is as large as it must be: columns are swapped or not, a lag is more than integrators differ by.
-
-        Where the drive samples at each step, integrators do not differ.
-        """
-        gripper, effect, size = self.fit.problem.gripper, self.effect, self.setting.values[0]
-        if size < effect.least_size:
-            return False
-        if not effect.least_steps or gripper.steps_as_its_drive:
-            return True
-        return bool(size >= effect.least_steps * gripper.compile().opt.timestep)
+        """Whether it is as large as it must be: columns are swapped or not, integrators make lags of their own."""
+        effect, size = self.effect, self.setting.values[0]
+        least = effect.least_steps * self.fit.problem.gripper.integrators_differ_s if effect.least_steps else -np.inf
+        return bool(size >= max(effect.least_size, least))
 
     @property
     def heldout_gain(self) -> float:

@@ -232,6 +232,11 @@ class Gripper(ShortRepr):
         return self.compile().opt.timestep > 0.99 * self.period_s
 
     @property
+    def integrators_differ_s(self) -> float:
+        """By how much two integrators of the scene may differ in time: a step; not at all where its drive steps so."""
+        return 0.0 if self.steps_as_its_drive else float(self.compile().opt.timestep)
+
+    @property
     def shape(self) -> str:
         """What the scene's object is: "cylinder", "sphere" or "box"; empty of a mechanism that grasps nothing."""
         if self.is_servo:

@@ -143,6 +143,20 @@ def test_a_fit_stuck_beside_the_effect_it_contains_is_fitted_again_from_there(st
     assert not families.falls_back(again, stiction.contains[0])
 
 
+@pytest.mark.parametrize(("steps", "falls"), [(0.9, True), (1.1, False)])
+def test_a_lag_of_less_than_integrators_differ_by_is_none(made_up, monkeypatch, steps, falls):
+    """A ramp simulated in finer steps bent by half a millisecond: that was a lag behind a limit of speed."""
+    lag, base = get_effect("rate_limited_lag"), made_up.base.fit
+    gripper = base.problem.gripper
+    setting = EffectSetting(lag, "", np.array([0.03, steps * gripper.integrators_differ_s]))
+    problem = Problem(gripper, base.problem.grasps, [setting])
+    slopes = np.random.default_rng(0).normal(0, 1e4, (*base.residual.shape, len(problem)))  # fixed to a microsecond
+    fit = dataclasses.replace(base, problem=problem, vector=problem.start(), jacobian=slopes)
+    assert families.falls_back(fit, lag.contains[0]) == falls
+    monkeypatch.setitem(vars(gripper), "steps_as_its_drive", True)
+    assert not families.falls_back(fit, lag.contains[0])
+
+
 def test_a_step_whose_effect_was_replaced_is_not_part_of_the_answer(made_up):
     first = made_up.diagnosis("effect").steps[0]
     richer = dataclasses.replace(first.candidates[0], replaces=first.effects[0])
