@@ -19,7 +19,7 @@ from forcegrasp.diagnosis.odd_grasps import odd_grasps
 from forcegrasp.diagnosis.result import Diagnosis, Step, kept_steps, settle_ties
 from forcegrasp.diagnosis.screen import Screen
 from forcegrasp.diagnosis.split import split
-from forcegrasp.diagnosis.step import look_further
+from forcegrasp.diagnosis.step import FAR, look_further
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.diagnosis.verdict import MUCH, conclude, explained_share
 from forcegrasp.effects import Effect
@@ -87,7 +87,8 @@ def diagnose(
         study = with_few(study, fit)
         step = look_further(study, fit, screen, untried, rng, richer)
         if not step.effects and step.error_before > _AS_GOOD_AS_NOTHING * floor:
-            found = None if tried_anyway else _fitted_anyway(study, fit, screen, untried, rng)
+            worth_it = not tried_anyway and step.error_before < FAR
+            found = _fitted_anyway(study, fit, screen, untried, rng) if worth_it else None
             found = found or exchange(study, fit, screen, untried, steps, rng)
             two = None if found else split(study, fit, screen, untried, steps, rng)
             steps, step = two or (steps, found or step)

@@ -46,8 +46,10 @@ _FITTED_ANYWAY = 12
 _REFINED = 3
 # Fitted to the end, the cost of a rough fit falls by this share of it at most, or of what the effect gained.
 _FALLS, _GAINS_MORE = 0.2, 0.1
-# An error of so many times the noise leaves nothing to look for; beyond the other, no start will find it.
-_ALL_FITTED, _FAR = 1.05, 10.0
+# An error of so many times the noise leaves nothing to look for.
+_ALL_FITTED = 1.05
+#: Beyond so many times the noise no start of a fit will find what is left: it is not one effect.
+FAR = 10.0
 
 
 def look_further(
@@ -107,7 +109,7 @@ def _least_cost(rough: Fit, without: Fit) -> float:
 
 def _leaves_more(fit: Fit, target: Target) -> bool:
     """Whether a fit leaves more than noise, but not so much that it is hopeless."""
-    return _ALL_FITTED < rms_error(fit, target) < _FAR
+    return _ALL_FITTED < rms_error(fit, target) < FAR
 
 
 def _as_good(best: Candidate, others: Sequence[Candidate]) -> list[Candidate]:
