@@ -120,7 +120,7 @@ def roughly_as_richer(container: type[Effect], fit: Fit, without: str, study: St
 
 
 def _richer_than(name: str, container: type[Effect], fit: Fit) -> list[EffectSetting]:
-    known = next(one for one in fit.problem.case(fit.vector).effects if one.effect.name == name)
+    known = next(one for one in fit.effects if one.effect.name == name)
     return richer(known, container)
 
 

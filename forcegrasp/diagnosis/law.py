@@ -102,7 +102,7 @@ def _place(term: type[Law]) -> str:
 def _as_one(before: Fit, after: Fit, target: Target) -> tuple[type[Law], Fit]:
     """The terms of a fit as one law, and the fit with that."""
     first = len(before.problem.effects)
-    found = after.problem.case(after.vector).effects
+    found = after.effects
     texts: list[str] = []
     sizes: dict[str, Size] = {}
     for number, one in enumerate(found[first:], 1):

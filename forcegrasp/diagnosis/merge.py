@@ -86,7 +86,7 @@ def _roughly_as_good(study: Study, fit: Fit, pair: Collection[str], effect: type
         return None
     without = roughly_without(pair, fit, study)
     gain, most = (float(np.nansum(study.gains(without.residual, one.residual))) for one in (less, fit))
-    return less.problem.case(less.vector).effects[-1] if nearly_as_much(gain, most) else None
+    return less.effects[-1] if nearly_as_much(gain, most) else None
 
 
 def _with_one(study: Study, steps: Sequence[Step], fit: Fit, pair: Collection[str]) -> list[Step]:
@@ -97,7 +97,7 @@ def _with_one(study: Study, steps: Sequence[Step], fit: Fit, pair: Collection[st
     error = study.error(study.heldout(fit))
     one = dataclasses.replace(
         both[1],
-        setting=fit.problem.case(fit.vector).effects[-1],
+        setting=fit.effects[-1],
         fit=fit,
         p_family=min(c.p_family for c in both),
         gains=both[0].gains + both[1].gains,

@@ -39,7 +39,7 @@ def drop_needless(study: Study, step: Step, fit: Fit, given: int) -> tuple[Step,
     error = study.error(study.heldout(less))
     last = dataclasses.replace(
         step.candidates[0],
-        setting=less.problem.case(less.vector).effects[-1],
+        setting=less.effects[-1],
         fit=less,
         error_after=error,
         replaces=name,
@@ -51,7 +51,7 @@ def drop_needless(study: Study, step: Step, fit: Fit, given: int) -> tuple[Step,
 
 def _as_simple_as_it_is(study: Study, fit: Fit) -> Fit:
     """The fit with what its last effect contains in place of that, if it has become that without the other."""
-    last = fit.problem.case(fit.vector).effects[-1]
+    last = fit.effects[-1]
     for nested in last.effect.contains:
         if falls_back(fit, nested):
             simple = refit_as(simpler(last, nested, fit.problem.gripper), fit, last.effect.name, study)
@@ -74,7 +74,7 @@ def simplify(study: Study, steps: Sequence[Step], fit: Fit, given: int) -> tuple
     """
     left = list(steps)
     for step in [step for step in steps if step.effects and step.candidates][:-1]:
-        settings = {one.effect.name: one for one in fit.problem.case(fit.vector).effects[given:]}
+        settings = {one.effect.name: one for one in fit.effects[given:]}
         known = settings.get(step.effects[0])
         if known is None or not known.effect.contains:
             continue
@@ -121,7 +121,7 @@ def chained(steps: Sequence[Step], error: float) -> list[Step]:
 def _with_simpler(step: Step, name: str, fit: Fit) -> Step:
     """A step that found this effect, which is the last of a fit, in place of one that contains it."""
     tried = next((c for c in step.candidates if c.effect.name == name), step.candidates[0])
-    first = dataclasses.replace(tried, setting=fit.problem.case(fit.vector).effects[-1])
+    first = dataclasses.replace(tried, setting=fit.effects[-1])
     others = [c for c in step.candidates if c is not tried]
     names = (name, *(n for n in step.effects[1:] if n != name))
     return dataclasses.replace(step, effects=names, candidates=(first, *others), error_after=tried.error_after)

@@ -59,7 +59,7 @@ def refine(scores: Sequence[Score], study: Study, fit: Fit, background: Backgrou
     left = [i for i in racing if not _adds_nothing(fits[i], fits)]
     tasks = []
     for few in (fits[i] for i in left):
-        setting = few.problem.case(few.vector).effects[-1]
+        setting = few.effects[-1]
         study.progress(f"refitting with {setting.effect.name} {setting.variant} on all grasps")
         tasks.append(partial(_fit_from, fit.moved(part.problem, few.vector[: len(part.problem)]), setting, study, fit))
     return [Refined(pairs[i][1], refitted) for i, refitted in zip(left, side_by_side(tasks), strict=True)]
@@ -83,7 +83,7 @@ def refine_anyway(effects: Sequence[type[Effect]], study: Study, fit: Fit, witho
         return few
     tasks = []
     for index in _in_the_race([part.cost - one.cost for one in few], _LOST_IF_FITTED):
-        setting = few[index].problem.case(few[index].vector).effects[-1]
+        setting = few[index].effects[-1]
         study.progress(f"refitting with {setting.effect.name} {setting.variant} on all grasps")
         tasks.append(partial(roughly_as, [setting], fit, without, study))
     return side_by_side(tasks)

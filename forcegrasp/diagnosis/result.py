@@ -112,8 +112,13 @@ class Step(ShortRepr):
 
 def kept_steps(steps: Sequence[Step]) -> list[Step]:
     """The steps that found something that no later step put something else in place of."""
-    replaced = [{later.replaces for later in steps[place:]} for place in range(1, len(steps) + 1)]
-    return [step for step, gone in zip(steps, replaced, strict=True) if step.effects and step.effects[0] not in gone]
+    return [step for step in steps if step.effects and not taken_over_by(step, steps)]
+
+
+def taken_over_by(step: Step, steps: Sequence[Step]) -> str:
+    """The effect that a later one of the steps put in place of what this one found; empty if none did."""
+    place = next(index for index, one in enumerate(steps) if one is step)
+    return next((later.effects[0] for later in steps[place + 1 :] if later.replaces == step.effects[0]), "")
 
 
 def settle_ties(steps: Sequence[Step]) -> list[Step]:

@@ -59,7 +59,7 @@ def split(
             best = step.candidates[0]
             if does_better(against(best, held, study)):
                 study.progress(f"{first.effect.name} and {best.effect.name} do better than {name}")
-                instead = _found_instead(old, best.fit.problem.case(best.fit.vector).effects[-2], start, fit, study)
+                instead = _found_instead(old, best.fit.effects[-2], start, fit, study)
                 if old is not steps[-1]:  # the steps after it go on from what it left
                     instead = dataclasses.replace(instead, error_after=old.error_after)
                 left = [instead if one is old else one for one in steps]
@@ -74,7 +74,7 @@ def _first_of_two(
     some, part = study.on_few(fit)
     promising = []
     for first in side_by_side([partial(roughly_as, trials([e]), part, name, some) for e in alike]):
-        setting = first.problem.case(first.vector).effects[-1]
+        setting = first.effects[-1]
         groups, _ = screen.on_few(study, some, first, _beside(setting.effect, effects))
         scores = sorted((group[0] for group in groups), key=lambda score: -score.gain)[:_SECOND]
         both = refine(scores, some, first, Background(first, some.numerical))

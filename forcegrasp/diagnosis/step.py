@@ -335,5 +335,5 @@ class _Start:
         harms = any(is_beyond_chance(-one, LEAST_RISE) for one in recordings)
         fall = max((1 - rms(after, target, w) / rms(held, target, w) for _, w in cells(target)), default=0.0)
         error, share = self._study.error(after), self._study.explained(held, after)
-        setting = refit.problem.case(refit.vector).effects[-1]
+        setting = refit.effects[-1]
         return Candidate(setting, refit, p_family, gains, error, share, fall, signature, replaces, sums, harms)

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import least_squares
 
+from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.identify.predict import predict
 from forcegrasp.identify.problem import Problem
 from forcegrasp.identify.target import Target
@@ -86,6 +87,11 @@ class Fit(ShortRepr):
     def values(self) -> np.ndarray:
         """Parameters in their own units, ``(p,)``."""
         return self.problem.values(self.vector)
+
+    @property
+    def effects(self) -> tuple[EffectSetting, ...]:
+        """The effects of the model as they were fitted."""
+        return self.problem.case(self.vector).effects
 
     @property
     def slopes(self) -> np.ndarray:

@@ -12,7 +12,7 @@ from rich.table import Table as Printed
 from rich.text import Text as Plain
 
 from forcegrasp.diagnosis.advice import Advice
-from forcegrasp.diagnosis.result import NOTHING, Candidate, Diagnosis, Step
+from forcegrasp.diagnosis.result import NOTHING, Candidate, Diagnosis, Step, taken_over_by
 from forcegrasp.effects import Effect
 from forcegrasp.effects.for_gripper import effect_of
 from forcegrasp.identify.cross_validation import rms
@@ -227,12 +227,10 @@ def lines(diagnosis: Diagnosis, advice: Advice | None) -> list[str]:
 
 def _symptom(step: Step, before: Fit, diagnosis: Diagnosis) -> str:
     """What an effect that was found changes in these data, in words."""
-    target, name = diagnosis.target, step.effects[0]
     if step.is_counted:
-        return rounding_words(target)
-    seen = symptom_of(target, before, step.candidates[0].fit).sentence()
-    own = next(place for place, one in enumerate(diagnosis.steps) if one is step)
-    later = next((s.effects[0] for s in diagnosis.steps[own + 1 :] if s.replaces == name), "")
+        return rounding_words(diagnosis.target)
+    seen = symptom_of(diagnosis.target, before, step.candidates[0].fit).sentence()
+    later = taken_over_by(step, diagnosis.steps)
     return f"{seen} (later {later} took its place)" if later else seen
 
 

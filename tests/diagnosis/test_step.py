@@ -109,6 +109,7 @@ def test_an_effect_that_comes_back_after_it_gave_way_is_kept(made_up):
     second = dataclasses.replace(
         first, effects=("force_drift",), candidates=(dataclasses.replace(first.candidates[1], replaces="force_bias"),)
     )
+    again = dataclasses.replace(first)
     assert first.effects == ("force_bias",)
     assert [step.effects[0] for step in kept_steps([first, second])] == ["force_drift"]
-    assert [step.effects[0] for step in kept_steps([first, second, first])] == ["force_drift", "force_bias"]
+    assert [step.effects[0] for step in kept_steps([first, second, again])] == ["force_drift", "force_bias"]
