@@ -31,7 +31,7 @@ from forcegrasp.effects import Effect
 from forcegrasp.identify.base_fit import rms_error
 from forcegrasp.identify.cross_validation import rms
 from forcegrasp.identify.fit import Fit, fit_exactly, fit_once
-from forcegrasp.identify.led_astray import fit_past_few
+from forcegrasp.identify.led_astray import fit_led_by_others
 from forcegrasp.identify.noise_floor import cells, excess
 from forcegrasp.identify.side_by_side import side_by_side
 from forcegrasp.identify.target import Target
@@ -300,7 +300,7 @@ class _Start:
         exact = fit_exactly(target, rough.problem, simulators, rough.vector, rough.jacobian)
         exact = look_beside(exact, target, simulators)
         if _leaves_more(exact, target):
-            exact = fit_past_few(exact, target, simulators)
+            exact = fit_led_by_others(exact, target, simulators)
         if not _leaves_more(exact, target):
             return exact
         # it may have ended where an effect's size meets a step of the simulation, or in another valley

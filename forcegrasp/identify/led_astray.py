@@ -1,4 +1,4 @@
-"""A fit that few grasps, or an object, lead astray: the others are fitted without them, and all of them from there."""
+"""A fit that some grasps lead astray: the others are fitted without them, and all of them from there."""
 
 from __future__ import annotations
 
@@ -10,19 +10,20 @@ from forcegrasp.identify.fit import Fit, Simulators, fit_exactly, fit_once
 from forcegrasp.identify.predict import predict
 from forcegrasp.identify.target import Target
 
-# Few are this share of the grasps at most, or one, or those of an object; they hold most of what a fit leaves if they
-# hold this share of it.
-_FEW, _MOST = 1 / 8, 0.6
+# Some are this share of the grasps at most, or one, or those of an object, or this larger share; they hold most of what
+# a fit leaves if they hold this share of it.
+_FEW, _THIRD, _MOST = 1 / 8, 1 / 3, 0.6
 # So often the others lead at most, for as long as the cost falls by more than this.
 _ROUNDS, _NO_BETTER = 3, 0.99
 
 
-def fit_past_few(fit: Fit, target: Target, simulators: Simulators) -> Fit:
-    """The better of a fit and one that begins where the others lead, if few grasps hold most of what the fit leaves.
+def fit_led_by_others(fit: Fit, target: Target, simulators: Simulators) -> Fit:
+    """The better of a fit and one that begins where the others lead, if some grasps hold most of what the fit leaves.
 
     A finger that is a little late meets an object that the other one has pushed, or does not: at such a place the error
     of a grasp jumps, and no slope leads across. The other grasps know the way. So they do where the parameters of one
-    object alone are in another valley, and draw the gripper's with them.
+    object alone are in another valley, and draw the gripper's with them; and where a finger that sticks and slips is
+    out of step in some grasps: their slopes are those of another slip (least trimmed squares: Rousseeuw 1984).
 
     Args:
       fit: a fit of all grasps.
@@ -64,12 +65,13 @@ def _own_anew(fit: Fit, left_out: np.ndarray, alone: Fit, target: Target, simula
 
 
 def _astray(fit: Fit, target: Target) -> np.ndarray:
-    """Indices of the few grasps, or of an object's, that hold most of what is beyond the noise; none if none do."""
+    """Indices of the fewest grasps, or an object's, that hold most of what is beyond the noise; none if none do."""
     squares = np.sum((fit.weight * fit.residual) ** 2 - (fit.weight * target.mask[..., None]) ** 2, axis=(1, 2))
-    few = np.argsort(-squares)[: max(1, int(_FEW * len(squares)))]
+    worst = np.argsort(-squares)
+    few, third = worst[: max(1, int(_FEW * len(squares)))], worst[: int(_THIRD * len(squares))]
     objects = np.array([grasp.object for grasp in target.grasps])
     of_objects = [np.flatnonzero(objects == name) for name in target.objects]
-    for some in (few, max(of_objects, key=lambda own: squares[own].sum())):
+    for some in (few, max(of_objects, key=lambda own: squares[own].sum()), third):
         if squares[some].sum() >= _MOST * squares.sum() > 0:
             return some
     return np.empty(0, int)

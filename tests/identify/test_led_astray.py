@@ -1,4 +1,4 @@
-"""A grasp that holds a fit back is left out until the others know the way."""
+"""Grasps that hold a fit back are left out until the others know the way."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ import pytest
 
 from forcegrasp.identify import led_astray
 from forcegrasp.identify.fit import Fit, Simulators
-from forcegrasp.identify.led_astray import fit_past_few
+from forcegrasp.identify.led_astray import fit_led_by_others
 
 
 @pytest.fixture
-def past_few(made_up, monkeypatch):
-    """``past_few(fit, missed)``: the function, where all grasps are missed by so many σ from where the others lead; and
-    of how many grasps fits were asked for, each of which leaves nothing."""
+def led(made_up, monkeypatch):
+    """``led(fit, missed)``: the function, where all grasps are missed by so many σ from where the others lead; and of
+    how many grasps fits were asked for, each of which leaves nothing."""
 
     def run(fit: Fit, missed: float) -> tuple[Fit, list[int]]:
         asked: list[int] = []
@@ -28,7 +28,7 @@ def past_few(made_up, monkeypatch):
         monkeypatch.setattr(led_astray, "fit_exactly", fit_exactly)
         off = made_up.target.signals + missed * made_up.target.sigma
         monkeypatch.setattr(led_astray, "predict", lambda *_: [off])
-        return fit_past_few(fit, made_up.target, Simulators(fit.problem)), asked
+        return fit_led_by_others(fit, made_up.target, Simulators(fit.problem)), asked
 
     return run
 
@@ -40,23 +40,30 @@ def leaving(made_up, per_grasp: np.ndarray) -> Fit:
 
 
 @pytest.mark.parametrize(("missed", "fitted"), [(1.0, [7, 8]), (90.0, [7])])
-def test_where_one_grasp_holds_most_of_the_error_the_others_come_first(made_up, past_few, missed, fitted):
+def test_where_one_grasp_holds_most_of_the_error_the_others_come_first(made_up, led, missed, fitted):
     """And all of them after it, if the others lead to anything better."""
     astray = leaving(made_up, np.where(np.arange(8) == 1, 50.0, 1.0))
-    fit, asked = past_few(astray, missed)
+    fit, asked = led(astray, missed)
     assert asked == fitted
     assert fit.cost == (0.0 if len(fitted) == 2 else astray.cost)
 
 
-def test_where_one_object_holds_most_of_the_error_the_others_come_first(made_up, past_few):
+def test_where_one_object_holds_most_of_the_error_the_others_come_first(made_up, led):
     objects = np.array([grasp.object for grasp in made_up.target.grasps])
     own = objects == objects[-1]
     assert 2 < own.sum() < len(own)
-    fit, asked = past_few(leaving(made_up, np.where(own, 20.0, 1.0)), 1.0)
+    fit, asked = led(leaving(made_up, np.where(own, 20.0, 1.0)), 1.0)
     assert asked == [len(own) - own.sum(), len(own)]
     assert fit.cost == 0
 
 
-def test_where_all_grasps_hold_some_none_is_left_out(made_up, past_few):
+def test_where_all_grasps_hold_some_none_is_left_out(made_up, led):
     alike = leaving(made_up, np.full(8, 50.0))
-    assert past_few(alike, 0.0) == (alike, [])
+    assert led(alike, 0.0) == (alike, [])
+
+
+def test_where_a_third_of_the_grasps_holds_most_of_the_error_the_others_come_first(made_up, led):
+    """One of each object here."""
+    fit, asked = led(leaving(made_up, np.where(np.isin(np.arange(8), [0, 1]), 20.0, 4.0)), 1.0)
+    assert asked == [6, 8]
+    assert fit.cost == 0
