@@ -11,13 +11,15 @@ class ForceHysteresis(Effect):
     """A sensor that reads more while the force falls than while it rises, at any speed.
 
     The width is the play of a constant size; the share makes the unloading curve a multiple of the loading curve.
+    ``lasting``: half the width is still read once nothing presses. ``zeroed``: where nothing presses, nothing is read,
+    and at the next touch the reading is back where it was.
     """
 
     name = "force_hysteresis"
     stage = "sensor"
     family = "force sensor"
     symptom = "loading and unloading curves differ, at any speed"
-    formula = "f₁ ← clip(f₁, f − w/2, f + w/2); f' ← max(f₁, min(f', (1 + h) f₁))"
+    formula = "f₁ ← clip(f₁, f − w/2, f + w/2); f' ← max(f₁, min(f', (1 + h) f₁)); 0 if f = 0 (zeroed)"
     source = "play and generalised play operators (Krasnosel'skii and Pokrovskii 1989)"
     look_alikes = ("backlash", "force_lag", "viscoelastic_contact")
     separates = "loading and unloading at several speeds: lag shrinks when slow, hysteresis does not"
@@ -25,6 +27,8 @@ class ForceHysteresis(Effect):
         Parameter("width_n", "width of the play w", "N", 0.0, 1.0, 0.04, follows="force"),
         Parameter("share", "excess while unloading h", "1", 0.0, 2.0, 0.15),
     )
+    variants = ("lasting", "zeroed")
+    variant_needs = {"zeroed": "pads"}  # noqa: RUF012 never changed
     order = 1
     least_channels = 1
 
@@ -40,4 +44,5 @@ class ForceHysteresis(Effect):
         state, half, share = self.state, self["width_n"] / 2, self["share"]
         state["play"] = play = np.where(half == 0, force, np.clip(state["play"], force - half, force + half))
         state["read"] = read = np.maximum(play, np.minimum(state["read"], (1 + share) * play))
-        return np.where(share == 0, play, read)
+        reading = np.where(share == 0, play, read)
+        return np.where(force == 0, 0.0, reading) if self.variant == "zeroed" else reading

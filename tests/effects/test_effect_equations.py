@@ -429,6 +429,15 @@ def test_force_hysteresis_width():
     assert out[second & ~rising & ~plateau] == pytest.approx(f[second & ~rising & ~plateau] + 0.05, abs=1e-12)
 
 
+@pytest.mark.parametrize(("variant", "released"), [("lasting", 0.05), ("zeroed", 0.0)])
+def test_force_hysteresis_once_released(variant, released):
+    """Half the width stays, or nothing; what was read of a light touch before is read of it again."""
+    f = np.concatenate([np.linspace(0, 1, 50), np.linspace(1, 0, 50), np.zeros(50), np.full(50, 0.02)])
+    out = read(make("force_hysteresis", 0.1, 0.0, variant=variant), f)[:, 0]
+    assert out[110:150] == pytest.approx(released, abs=1e-12)
+    assert out[150:] == pytest.approx(0.05, abs=1e-12)
+
+
 @pytest.mark.parametrize("speed", [0.5, 4.0])
 def test_force_hysteresis_share(speed):
     """Falling, the reading is (1 + h) times the force once it left the peak's level, at any speed."""
