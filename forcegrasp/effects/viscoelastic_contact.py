@@ -9,14 +9,18 @@ from forcegrasp.effects.touch import contact_push, depth_in_object, untouched
 
 
 class ViscoelasticContact(Effect):
-    """A Maxwell branch beside the elastic contact, which only pushes: a standard linear solid at the pad."""
+    """A Maxwell branch beside the elastic contact, which only pushes: a standard linear solid at the pad.
+
+    ``recovering``: what has yielded comes back as slowly, also once nothing presses. ``following``: what the branch
+    would hold back comes along at once, so that a touch finds it as the first one did.
+    """
 
     name = "viscoelastic_contact"
     stage = "contact"
     family = "contact"
     needs_object = True
     symptom = "force decays during a hold while the finger creeps inward; the peak depends on speed"
-    formula = "F = F_contact + max(0, k (δ − x)), τ dx/dt = δ − x, δ the depth of the pad in the object"
+    formula = "F = F_contact + max(0, k (δ − x)), τ dx/dt = δ − x, δ the depth of the pad in the object; x ≤ δ (following)"
     source = "standard linear solid, Zener's form (Fung 1965)"
     look_alikes = ("finger_compliance", "force_drift", "force_lag")
     separates = "long holds: force and position relax together, and only in contact"
@@ -36,6 +40,7 @@ class ViscoelasticContact(Effect):
             trials=(0.1, 0.4, 1.5),
         ),
     )
+    variants = ("recovering", "following")
     order = 1
 
     def init(self, which: np.ndarray) -> State:
@@ -45,6 +50,8 @@ class ViscoelasticContact(Effect):
     def act(self) -> Contribution:
         depth, before = np.maximum(depth_in_object(self, self.pad_force), 0.0), self.state["relaxed"]
         relaxed = before + first_order_weight(self.dt, self["time_constant_s"]) * (depth - before)
+        if self.variant == "following":
+            relaxed = np.minimum(relaxed, depth)
         push = self["stiffness_n_m"] * np.maximum(depth - relaxed, 0.0)
         self.state.update(relaxed=relaxed, push=push)
         return contact_push(push)

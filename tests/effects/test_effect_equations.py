@@ -174,6 +174,19 @@ def test_viscoelastic_contact_is_a_maxwell_branch_that_only_pushes(stiffness, ta
     assert added == pytest.approx(expected, abs=1e-9)
 
 
+def test_following_viscoelastic_contact_holds_nothing_back():
+    """Its force only falls by the dashpot while the pad is pressed in, and by the spring, too, while it is relieved."""
+    distance, force, depth = depth_of((1.0, 0.4))
+    added = press(make("viscoelastic_contact", 100.0, 0.2, variant="following"), distance, force, 0 * T)
+    expected, keep = np.zeros_like(added), np.exp(-DT / 0.2)
+    pressed = np.maximum(depth, 0)
+    for now in range(1, len(T)):
+        further = pressed[now] - pressed[now - 1]
+        expected[now] = np.maximum(keep * (expected[now - 1] + 100.0 * further), 0.0)
+    assert (expected[depth > 0] == 0).any()
+    assert added == pytest.approx(expected, abs=1e-9)
+
+
 def test_viscoelastic_force_of_a_sudden_squeeze_is_an_exponential():
     squeeze, tau = 0.0005, 0.2
     distance = np.full((1000, 2), 0.02)
