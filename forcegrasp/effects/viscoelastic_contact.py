@@ -20,7 +20,9 @@ class ViscoelasticContact(Effect):
     family = "contact"
     needs_object = True
     symptom = "force decays during a hold while the finger creeps inward; the peak depends on speed"
-    formula = "F = F_contact + max(0, k (δ − x)), τ dx/dt = δ − x, δ the depth of the pad in the object; x ≤ δ (following)"
+    formula = (
+        "F = F_contact + max(0, k (δ − x)), τ dx/dt = δ − x, δ the depth of the pad in the object; x ≤ δ (following)"
+    )
     source = "standard linear solid, Zener's form (Fung 1965)"
     look_alikes = ("finger_compliance", "force_drift", "force_lag")
     separates = "long holds: force and position relax together, and only in contact"

@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from forcegrasp.effects import Effect
+
 
 @dataclass(frozen=True)
 class Prior:
@@ -19,13 +21,19 @@ class Prior:
     high: float
     why: str
     fixed: Mapping[str, float] = field(default_factory=dict)  #: parameters that are alike for all robots
+    variants: tuple[str, ...] = ()  #: which it may be, all of them alike; any if none is said
+
+    def variants_of(self, effect: type[Effect]) -> tuple[str, ...]:
+        """The variants of an effect that robots may have."""
+        return self.variants or effect.variants
 
 
 #: By effect of the catalogue. No robot has what is not here: mistakes of a measurement set, effects of drives alone,
 #: smooth_friction, which coulomb_friction and presliding stand for, lest a robot rubs three times,
 #: smooth_object_friction, which object_friction stands for, rate_limited_lag, which rate_limit and actuator_lag do,
 #: contact_friction, which is a part of object_body, and
-#: hunt_crossley_contact, for robots keep the scene's contact and stiffen it.
+#: hunt_crossley_contact, for robots keep the scene's contact and stiffen it. Nor has one a variant that came to an
+#: effect later, lest robots change that policies were compared on.
 EFFECTS = {
     "command_deadband": Prior(0.3, 1 / 3, 3, "the paper's robot: its driver sends no command below 0.3 mm"),
     "command_delay": Prior(0.6, 0.1, 0.7, "assumed: from a bus cycle to one control step of 40 ms"),
@@ -47,11 +55,15 @@ EFFECTS = {
     "stiffening_contact": Prior(
         0.5, 0.3, 2, "round and soft bodies stiffen as they are pressed (Hertz: power 1.5)", fixed={"spring_power": 3.0}
     ),
-    "viscoelastic_contact": Prior(0.3, 0.2, 1, "assumed: foam and rubber creep, hard objects do not"),
+    "viscoelastic_contact": Prior(
+        0.3, 0.2, 1, "assumed: foam and rubber creep, hard objects do not", variants=("recovering",)
+    ),
     "adhesion": Prior(0.1, 0.2, 1, "assumed: soft pads stick a little, rarely"),
     "object_friction": Prior(0.7, 0.3, 5, "μ m g of 10 to 170 g at μ 0.3, on what the object stands on"),
     "force_crosstalk": Prior(0.3, 0.2, 2, "assumed: 2 to 16 %"),
-    "force_hysteresis": Prior(0.3, 0.3, 2, "assumed: 5 to 30 %; data sheets of force-sensing resistors say 10 %"),
+    "force_hysteresis": Prior(
+        0.3, 0.3, 2, "assumed: 5 to 30 %; data sheets of force-sensing resistors say 10 %", variants=("lasting",)
+    ),
     "force_gain_asymmetry": Prior(0.5, 0.2, 2, "assumed: sensors calibrated to 2 to 20 %"),
     "force_lag": Prior(0.5, 0.1, 1.25, "assumed: filters of 1.6 to 20 Hz"),
     "force_delay": Prior(0.3, 0.1, 0.7, "assumed: as that of commands"),

@@ -70,9 +70,10 @@ def draw_robots(gripper: Gripper, rng: np.random.Generator, count: int) -> Robot
             base[name] = values if ranged else np.clip(p.nominal * _factors(rng, GAINS, count), p.low, p.high)
     effects = []
     for effect, prior in _possible(gripper):
-        chosen = rng.uniform(size=count) / prior.chance * len(effect.variants)
+        variants = prior.variants_of(effect)
+        chosen = rng.uniform(size=count) / prior.chance * len(variants)
         sizes = np.stack([_sizes(rng, effect, p, prior, count) for p in effect.parameters], axis=1)
-        for number, variant in enumerate(effect.variants):
+        for number, variant in enumerate(variants):
             present = (number <= chosen) & (chosen < number + 1)
             effects.append(EffectSetting(effect, variant, np.where(present[:, None], sizes, effect.null_values())))
     return Robots(gripper, tuple(effects), base, _factors(rng, NOISE, (count, 2)))
@@ -141,7 +142,7 @@ class DrawnRobots:
         """Prepares a plant, once."""
         self._plant, self._attached = plant, {}
         self.readings = np.zeros((plant.n, 4))  #: see :attr:`Robots.readings`, ``(rows, 4)``
-        kinds = [(e, variant, prior) for e, prior in _possible(self.gripper) for variant in e.variants]
+        kinds = [(e, variant, prior) for e, prior in _possible(self.gripper) for variant in prior.variants_of(e)]
         self._settings = [EffectSetting(e, v, np.repeat(e.null_values()[None], plant.n, axis=0)) for e, v, _ in kinds]
         self._largest = [np.array([_range(e, p, prior)[1] for p in e.parameters]) for e, _, prior in kinds]
 
