@@ -78,12 +78,14 @@ def test_every_effect_of_a_robot_has_a_prior():
 def test_robots_of_any_gripper_are_within_bounds_and_have_effects_as_often_as_they_should(name):
     robots = draw_robots(load_gripper(name), np.random.default_rng(1), 2000)
     for setting in robots.effects:
+        prior = EFFECTS[setting.effect.name]
         present = (setting.values != setting.effect.null_values()).any(axis=1)
         for p, values in zip(setting.effect.parameters, setting.values.T, strict=True):
             assert ((p.low <= values[present]) & (values[present] <= p.high)).all()
-            fixed = EFFECTS[setting.effect.name].fixed.get(p.name)
+            fixed = prior.fixed.get(p.name)
             assert fixed is None or (values[present] == fixed).all()
-        share = EFFECTS[setting.effect.name].chance / len(setting.effect.variants)
+        share = prior.chance / len(prior.variants_of(setting.effect))
+        assert setting.variant in prior.variants_of(setting.effect)
         assert present.mean() == pytest.approx(share, abs=0.04)
     for parameter, values in robots.base.items():
         assert values.std() > 0
