@@ -19,6 +19,7 @@ from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.identify.base_fit import BaseFit
 from forcegrasp.identify.cross_validation import heldout_residual
 from forcegrasp.identify.fit import Fit
+from forcegrasp.identify.noise_floor import beyond_fit, numerical_floor
 from forcegrasp.identify.target import Target
 from forcegrasp.identify.verdict import Verdict
 from forcegrasp.short_repr import ShortRepr, counted, some
@@ -144,7 +145,7 @@ class Diagnosis(ShortRepr):
     error_before: float
     error_after: float
     numerical: tuple[np.ndarray, ...] = field(default=())  #: of the final fit, each ``(G, S, C)``
-    floor: float = 1.0  #: error that sensor noise and the model's own numerical error leave
+    floor: float = 1.0  #: error that sensor noise and the base model's own numerical error leave
     left: str = ""  #: where there is more than that, in words; empty if nowhere
     odd: tuple[OddGrasp, ...] = ()  #: grasps that a fit of all others misses by far
     noise: Noise | None = None  #: what the noise is, if the residuals show that it is not as assumed
@@ -162,6 +163,13 @@ class Diagnosis(ShortRepr):
     def fault_is_rival(self) -> bool:
         """Whether the set may be wrong instead, and these data can't tell."""
         return self.fault is not None and self.fault.name in self.effects[1:]
+
+    @property
+    def floor_of_model(self) -> float:
+        """The floor with the numerical error of the final model, whose fingers may slip a step early or late."""
+        if not self.numerical:  # nothing was looked for: the base model is the final one
+            return self.floor
+        return numerical_floor(beyond_fit(self.fit, self.numerical), self.target)
 
     @property
     def explained(self) -> float:

@@ -92,6 +92,7 @@ def diagnosis_json(diagnosis: Diagnosis, advice: Advice | None, tried: Sequence[
         "error_after": diagnosis.error_after,
         "floor_ratio": diagnosis.error_after,
         "floor": diagnosis.floor,
+        "floor_of_model": diagnosis.floor_of_model,
         "next_grasp": None if advice is None else {
             **advice.next_grasp.model_dump(),
             "tells_apart": list(advice.rivals),

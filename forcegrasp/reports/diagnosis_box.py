@@ -16,6 +16,7 @@ from forcegrasp.reports.diagnosis_words import (
     lacks,
     left_sentence,
     left_share,
+    no_better_foretold,
     noise_words,
     odd_words,
     percent,
@@ -84,7 +85,8 @@ def certainty(diagnosis: Diagnosis) -> str:
     which = f"{name}, the weakest, is clear" if several else "Clear"
     others = "no effect but those that contain it does" if _containing(weakest) else "no other effect does"
     clear = f"{which} {judged}: {others} as well, and {noise}."
-    return f"{clear} But not all is found." if is_not_all(d) else clear
+    perhaps = "perhaps " if no_better_foretold(d) else ""
+    return f"{clear} But {perhaps}not all is found." if is_not_all(d) else clear
 
 
 def weakest_step(diagnosis: Diagnosis) -> Step | None:

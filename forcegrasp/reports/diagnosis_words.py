@@ -172,9 +172,22 @@ def _but(diagnosis: Diagnosis) -> str:
     d = diagnosis
     if not is_not_all(d):
         return ""
+    no_better = no_better_foretold(d)
     return (
-        f"Not all is found: {d.error_after:.2f} × the sensor noise is left on held-out {d.target.part}s where"
-        f" {d.floor:.2f} would be noise ({percent(d.explained)} of the mean square beyond it is explained). "
+        f"{'Perhaps not' if no_better else 'Not'} all is found: {d.error_after:.2f} × the sensor noise is left on"
+        f" held-out {d.target.part}s where {d.floor:.2f} would be noise ({percent(d.explained)} of the mean square"
+        f" beyond it is explained){no_better}. "
+    )
+
+
+def no_better_foretold(diagnosis: Diagnosis) -> str:
+    """That what is left is no more than what the final model can't tell itself; empty if it is more, or noise."""
+    d = diagnosis
+    if not d.left or d.error_after > d.floor_of_model:
+        return ""
+    return (
+        f"; {d.floor_of_model:.2f} × is the floor of the model with what was found: half its physics step changes what"
+        " it foretells by so much, as where a finger slips, or a drive switches, a moment early or late"
     )
 
 
@@ -188,7 +201,7 @@ def left_sentence(diagnosis: Diagnosis) -> str:
     goes = f", of which {share:.0%} goes with {covariate_words(name)}" if share > 0.05 else ""
     return (
         f"what is left is largest in {place}{goes}; a better model could explain {rest['explainable']:.0%} of the"
-        " remaining mean square error at most"
+        f" remaining mean square error at most{no_better_foretold(diagnosis)}"
     )
 
 

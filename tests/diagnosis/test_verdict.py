@@ -24,6 +24,7 @@ from forcegrasp.effects import get_effect
 from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.identify.verdict import Verdict
 from forcegrasp.reports import diagnosis as diagnosis_report
+from forcegrasp.reports.diagnosis_box import certainty
 
 
 def candidate(made_up, **changed: Any):
@@ -301,6 +302,19 @@ def test_much_that_is_left_is_said_first(made_up, before, after, left, said):
     first = diagnosis_report.answer(diagnosis).partition(". ")[0]
     assert said in first
     assert first.startswith("Not all" if said else "The model lacks")
+
+
+def test_what_the_model_found_cant_foretell_itself_may_be_all_that_is_left(made_up):
+    """Half the physics step moves its predictions by as much as is left, in directions that no parameter follows."""
+    shaken = np.zeros((2, *made_up.base.fit.residual.shape))
+    shaken[:, :, ::2] = np.where(made_up.target.mask[:, ::2, None], 1.0, 0.0)
+    for size, said in ((0.1, "Not all is found: 1.60 ×"), (2.0, "Perhaps not all is found: 1.60 ×")):
+        diagnosis = two_steps(made_up, error_after=1.6, left="in all", numerical=tuple(size * shaken))
+        answer = diagnosis_report.answer(diagnosis)
+        assert answer.startswith(said)
+        assert ("a moment early or late" in answer) == (size == 2.0)
+        alone = dataclasses.replace(diagnosis, steps=diagnosis.steps[1:], effects=("force_bias",))
+        assert certainty(alone).endswith(f"But {'perhaps ' if size == 2.0 else ''}not all is found.")
 
 
 def test_little_explained_is_unknown_and_says_what_it_would_take_off(made_up):
