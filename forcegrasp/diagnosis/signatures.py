@@ -101,6 +101,12 @@ class Signatures:
         return list(found.values())
 
 
+def of_best_effects(scores: Sequence[Score], most: int) -> list[Score]:
+    """Of scores, the best first, those of so many effects: variants of one must not crowd out other effects."""
+    effects = list(dict.fromkeys(score.setting.effect for score in scores))[:most]
+    return [score for score in scores if score.setting.effect in effects]
+
+
 def share_together(scores: Sequence[Score], fit: Fit, beyond: float) -> float:
     """Share of the squares beyond the noise that signatures explain all together, of whatever size and sign.
 

@@ -13,7 +13,7 @@ from forcegrasp.diagnosis.families import may_join, roughly_as, roughly_without
 from forcegrasp.diagnosis.refine import refine
 from forcegrasp.diagnosis.result import Step
 from forcegrasp.diagnosis.screen import Screen
-from forcegrasp.diagnosis.signatures import Background, trials
+from forcegrasp.diagnosis.signatures import Background, of_best_effects, trials
 from forcegrasp.diagnosis.step import look_further
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.effects import Effect
@@ -76,7 +76,7 @@ def _first_of_two(
     for first in side_by_side([partial(roughly_as, trials([e]), part, name, some) for e in alike]):
         setting = first.effects[-1]
         groups, _ = screen.on_few(study, some, first, _beside(setting.effect, effects))
-        scores = sorted((group[0] for group in groups), key=lambda score: -score.gain)[:_SECOND]
+        scores = of_best_effects(sorted((group[0] for group in groups), key=lambda score: -score.gain), _SECOND)
         both = refine(scores, some, first, Background(first, some.numerical))
         promising.append((min((pair.fit.cost for pair in both), default=np.inf), setting))
     most = at_most(part, some)

@@ -25,7 +25,7 @@ from forcegrasp.diagnosis.other_starts import other_starts
 from forcegrasp.diagnosis.refine import NO_BETTER, refine, refine_anyway
 from forcegrasp.diagnosis.result import Candidate, Step
 from forcegrasp.diagnosis.screen import MAX_GAIN_FACTOR, Screen
-from forcegrasp.diagnosis.signatures import Background, Score
+from forcegrasp.diagnosis.signatures import Background, Score, of_best_effects
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.effects import Effect
 from forcegrasp.identify.base_fit import rms_error
@@ -81,7 +81,7 @@ def look_further(
     if anyway:
         candidates = start.fit_anyway(look.scores, look.null)
     else:
-        candidates = start.refit(look.worth_a_fit[:_REFITTED], look.null)
+        candidates = start.refit(of_best_effects(look.worth_a_fit, _REFITTED), look.null)
     candidates = [one for one in candidates if _least_cost(one.fit, fit) < most]
     candidates += start.refit_richer(richer, look.null)
     variants: dict[str, list[Candidate]] = {}

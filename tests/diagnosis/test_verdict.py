@@ -18,7 +18,7 @@ from forcegrasp.diagnosis.evidence import (
     with_close_rivals,
 )
 from forcegrasp.diagnosis.result import Diagnosis, Step, settle_ties
-from forcegrasp.diagnosis.signatures import share_together
+from forcegrasp.diagnosis.signatures import Score, of_best_effects, share_together
 from forcegrasp.diagnosis.verdict import conclude, explained_share
 from forcegrasp.effects import get_effect
 from forcegrasp.effects.setting import EffectSetting
@@ -322,6 +322,19 @@ def test_little_explained_is_unknown_and_says_what_it_would_take_off(made_up):
     first = diagnosis_report.answer(diagnosis).partition(". ")[0]
     assert "none of the effects I know" in first
     assert "348.00 × the sensor noise, and coulomb_friction and force_bias would only take it down to 173.00 ×" in first
+
+
+# --- what is fitted ------------------------------------------------------------------------------------------------
+
+
+def test_variants_do_not_crowd_out_other_effects():
+    """Three effects are fitted, with as many of their variants as come before a fourth effect or after it."""
+    kinds = [("backlash", "play"), ("backlash", "loose"), ("stiction", ""), ("force_lag", ""), ("force_bias", ""),
+             ("backlash", "command")]  # fmt: skip
+    scores = [Score(EffectSetting.typical(get_effect(name), variant), 1.0, np.ones(1)) for name, variant in kinds]
+    assert [score.setting.kind[0].name for score in of_best_effects(scores, 3)] == [
+        "backlash", "backlash", "stiction", "force_lag", "backlash",
+    ]  # fmt: skip
 
 
 # --- the search ----------------------------------------------------------------------------------------------------
