@@ -25,6 +25,11 @@ from tests.light_set import light_set
 GRASPS, SAMPLES, SEED = 6, 70, 2
 #: What an object's friction with the table may be taken for.
 LIKE_FRICTION = ["object_friction", *get_effect("object_friction").look_alikes]
+#: What changes the motors' forces, or what is read of where they stand.
+LIKE_COGGING = [
+    "coulomb_friction", "stiction", "presliding", "direction_friction", "motor_offset", "position_deadband", "backlash",
+    "encoder_bias", "readout_skew", "command_delay",
+]  # fmt: skip
 
 
 def silent(text: str) -> None:
@@ -71,7 +76,7 @@ def test_finds_nothing_where_nothing_is_hidden(tmp_path):
 
 
 def test_does_not_name_an_effect_for_one_that_it_does_not_know(tmp_path):
-    diagnosis = diagnosed(recorded(tmp_path, {"motor_cogging": "medium"}))
+    diagnosis = diagnosed(recorded(tmp_path, {"motor_cogging": "medium"}), LIKE_COGGING)
     assert (diagnosis.verdict, diagnosis.effects) == ("unknown", ())
     assert diagnosis.left
 

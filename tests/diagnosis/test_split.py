@@ -11,16 +11,22 @@ from forcegrasp.diagnosis.screen import Screen
 from forcegrasp.diagnosis.split import split
 from forcegrasp.diagnosis.step import look_further
 from forcegrasp.diagnosis.study import Study
-from forcegrasp.effects import get_effect
-from forcegrasp.effects.for_gripper import effects_of
+from forcegrasp.effects.for_gripper import effect_of
 from forcegrasp.identify.cross_validation import make_folds
 from forcegrasp.identify.fit_set import fit_model
 from forcegrasp.identify.noise_floor import beyond_fit, numerical_error
 from forcegrasp.identify.progress import silent
 from tests.light_set import light_gripper, light_set
 
-CATALOGUE = [e for e in effects_of(light_gripper()).values() if e.stage in ("command", "actuator", "sensor")]
-DELAY = get_effect("command_delay")
+# what comes late, and a little besides
+CATALOGUE = [
+    effect_of(name, light_gripper())
+    for name in (
+        "command_delay", "rate_limit", "actuator_lag", "force_hysteresis", "force_lag", "force_delay", "force_bias",
+        "readout_skew",
+    )
+]  # fmt: skip
+DELAY = CATALOGUE[0]
 
 
 def split_delay(*hidden: str):

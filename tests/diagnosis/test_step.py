@@ -30,7 +30,7 @@ SMOOTH, PRESLIDING, DELAY, OFFSET = (
 @pytest.fixture(scope="module")
 def creeping():
     """A set with friction that vanishes smoothly at rest: what was fitted to it, and a study of it."""
-    loaded = light_set("smooth_friction force_n=0.1 creep_m_s=0.002")
+    loaded = light_set("smooth_friction force_n=0.1 creep_m_s=0.002", samples=48)
     target, simulators, base = fit_model(loaded, 0, silent)
     numerical = beyond_fit(base.fit, numerical_error(base.fit, target))
     return with_few(Study(target, simulators, make_folds(target.grasps), numerical), base.fit), base
