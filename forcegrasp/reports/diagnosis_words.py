@@ -172,11 +172,13 @@ def _but(diagnosis: Diagnosis) -> str:
     d = diagnosis
     if not is_not_all(d):
         return ""
-    no_better = no_better_foretold(d)
+    begins, ends = "Not", ""
+    if no_better_foretold(d):
+        begins, ends = "Perhaps not", ", which the model with what was found may not foretell any better"
     return (
-        f"{'Perhaps not' if no_better else 'Not'} all is found: {d.error_after:.2f} × the sensor noise is left on"
+        f"{begins} all is found: {d.error_after:.2f} × the sensor noise is left on"
         f" held-out {d.target.part}s where {d.floor:.2f} would be noise ({percent(d.explained)} of the mean square"
-        f" beyond it is explained){no_better}. "
+        f" beyond it is explained){ends}. "
     )
 
 

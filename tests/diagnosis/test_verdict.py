@@ -25,6 +25,7 @@ from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.identify.verdict import Verdict
 from forcegrasp.reports import diagnosis as diagnosis_report
 from forcegrasp.reports.diagnosis_box import certainty
+from forcegrasp.reports.diagnosis_words import left_sentence
 
 
 def candidate(made_up, **changed: Any):
@@ -312,7 +313,8 @@ def test_what_the_model_found_cant_foretell_itself_may_be_all_that_is_left(made_
         diagnosis = two_steps(made_up, error_after=1.6, left="in all", numerical=tuple(size * shaken))
         answer = diagnosis_report.answer(diagnosis)
         assert answer.startswith(said)
-        assert ("a moment early or late" in answer) == (size == 2.0)
+        assert ("may not foretell any better" in answer) == (size == 2.0)
+        assert ("a moment early or late" in left_sentence(diagnosis)) == (size == 2.0)
         alone = dataclasses.replace(diagnosis, steps=diagnosis.steps[1:], effects=("force_bias",))
         assert certainty(alone).endswith(f"But {'perhaps ' if size == 2.0 else ''}not all is found.")
 
