@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -164,7 +165,7 @@ class Diagnosis(ShortRepr):
         """Whether the set may be wrong instead, and these data can't tell."""
         return self.fault is not None and self.fault.name in self.effects[1:]
 
-    @property
+    @cached_property
     def floor_of_model(self) -> float:
         """The floor with the numerical error of the final model, whose fingers may slip a step early or late."""
         if not self.numerical:  # nothing was looked for: the base model is the final one

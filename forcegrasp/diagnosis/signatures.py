@@ -103,8 +103,13 @@ class Signatures:
 
 def of_best_effects(scores: Sequence[Score], most: int) -> list[Score]:
     """Of scores, the best first, those of so many effects: variants of one must not crowd out other effects."""
-    effects = list(dict.fromkeys(score.setting.effect for score in scores))[:most]
+    effects = best_effects(scores, most)
     return [score for score in scores if score.setting.effect in effects]
+
+
+def best_effects(scores: Sequence[Score], most: int) -> list[type[Effect]]:
+    """The effects of scores, the best first, so many at most."""
+    return list(dict.fromkeys(score.setting.effect for score in scores))[:most]
 
 
 def share_together(scores: Sequence[Score], fit: Fit, beyond: float) -> float:

@@ -25,7 +25,7 @@ from forcegrasp.diagnosis.other_starts import other_starts
 from forcegrasp.diagnosis.refine import NO_BETTER, refine, refine_anyway
 from forcegrasp.diagnosis.result import Candidate, Step
 from forcegrasp.diagnosis.screen import MAX_GAIN_FACTOR, Screen
-from forcegrasp.diagnosis.signatures import Background, Score, of_best_effects
+from forcegrasp.diagnosis.signatures import Background, Score, best_effects, of_best_effects
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.effects import Effect
 from forcegrasp.identify.base_fit import rms_error
@@ -199,7 +199,7 @@ class _Start:
 
     def fit_anyway(self, scores: Sequence[Score], null: np.ndarray) -> list[Candidate]:
         """Rough fits with the effects of these signatures, whatever little they promise."""
-        effects = list(dict.fromkeys(score.setting.effect for score in scores))[:_FITTED_ANYWAY]
+        effects = best_effects(scores, _FITTED_ANYWAY)
         for effect in effects:
             self._study.progress(f"fitting {effect.name} to few grasps, though it promises little")
         return [self._judge_by_gain(fit, null) for fit in refine_anyway(effects, self._study, self._fit)]

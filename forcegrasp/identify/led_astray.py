@@ -10,8 +10,8 @@ from forcegrasp.identify.fit import Fit, Simulators, fit_exactly, fit_once
 from forcegrasp.identify.predict import predict
 from forcegrasp.identify.target import Target
 
-# Some are this share of the grasps at most, or one, or those of an object, or this larger share; they hold most of what
-# a fit leaves if they hold this share of it.
+# Left out is this share of the grasps, but one at least, or those of an object, or else this larger share: whichever
+# comes first of those that hold this much of what a fit leaves.
 _FEW, _THIRD, _MOST = 1 / 8, 1 / 3, 0.6
 # So often the others lead at most, for as long as the cost falls by more than this.
 _ROUNDS, _NO_BETTER = 3, 0.99

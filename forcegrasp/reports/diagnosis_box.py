@@ -12,11 +12,11 @@ from forcegrasp.reports.diagnosis import answer
 from forcegrasp.reports.diagnosis_words import (
     besides_sentence,
     fault_words,
+    foretells_no_better,
     is_not_all,
     lacks,
     left_sentence,
     left_share,
-    no_better_foretold,
     noise_words,
     odd_words,
     percent,
@@ -85,7 +85,7 @@ def certainty(diagnosis: Diagnosis) -> str:
     which = f"{name}, the weakest, is clear" if several else "Clear"
     others = "no effect but those that contain it does" if _containing(weakest) else "no other effect does"
     clear = f"{which} {judged}: {others} as well, and {noise}."
-    perhaps = "perhaps " if no_better_foretold(d) else ""
+    perhaps = "perhaps " if foretells_no_better(d) else ""
     return f"{clear} But {perhaps}not all is found." if is_not_all(d) else clear
 
 

@@ -173,7 +173,7 @@ def _but(diagnosis: Diagnosis) -> str:
     if not is_not_all(d):
         return ""
     begins, ends = "Not", ""
-    if no_better_foretold(d):
+    if foretells_no_better(d):
         begins, ends = "Perhaps not", ", which the model with what was found may not foretell any better"
     return (
         f"{begins} all is found: {d.error_after:.2f} × the sensor noise is left on"
@@ -182,15 +182,9 @@ def _but(diagnosis: Diagnosis) -> str:
     )
 
 
-def no_better_foretold(diagnosis: Diagnosis) -> str:
-    """That what is left is no more than what the final model can't tell itself; empty if it is more, or noise."""
-    d = diagnosis
-    if not d.left or d.error_after > d.floor_of_model:
-        return ""
-    return (
-        f"; {d.floor_of_model:.2f} × is the floor of the model with what was found: half its physics step changes what"
-        " it foretells by so much, as where a finger slips, or a drive switches, a moment early or late"
-    )
+def foretells_no_better(diagnosis: Diagnosis) -> bool:
+    """Whether something is left, but no more than what the final model can't tell itself."""
+    return bool(diagnosis.left) and diagnosis.error_after <= diagnosis.floor_of_model
 
 
 def left_sentence(diagnosis: Diagnosis) -> str:
@@ -201,9 +195,13 @@ def left_sentence(diagnosis: Diagnosis) -> str:
         return f"what is left is noise; it is largest in {place}"
     name, share = next(iter(rest["explained_by"].items()))
     goes = f", of which {share:.0%} goes with {covariate_words(name)}" if share > 0.05 else ""
+    no_better = (
+        f"; {diagnosis.floor_of_model:.2f} × is the floor of the model with what was found: half its physics step"
+        " changes what it foretells by so much, as where a finger slips, or a drive switches, a moment early or late"
+    )
     return (
         f"what is left is largest in {place}{goes}; a better model could explain {rest['explainable']:.0%} of the"
-        f" remaining mean square error at most{no_better_foretold(diagnosis)}"
+        f" remaining mean square error at most{no_better if foretells_no_better(diagnosis) else ''}"
     )
 
 
