@@ -132,6 +132,12 @@ class ActionConfig:
         0.1, "φ of a finger that waits for the other", source="paper, eq. 7", low=0, high=1
     )
     bias_floor: float = option(0.9, "smallest φ with both fingers in contact", source="paper, eq. 7", low=0, high=1)
+    gentle_touch: float = option(
+        0.0,
+        "goal, as a share of the gripper's largest force, below which the last finger to touch closes slower; 0: never",
+        low=0,
+        high=1,
+    )
 
 
 @dataclass

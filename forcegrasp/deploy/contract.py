@@ -77,6 +77,7 @@ class Contract:
     force_reading_n: tuple[float, float]  #: readings beyond this can't be true
     gap_s: tuple[float, float]  #: shortest and longest time from one reading to the next
     memory: int = 0  #: numbers that the network remembers from one step of a grasp to the next
+    gentle_n: float = 0.0  #: goal below which the last finger to touch closes slower, by √(goal / this); 0: never
 
     def __post_init__(self) -> None:
         unknown = [part for part in self.parts if part not in PARTS]
@@ -94,6 +95,8 @@ class Contract:
             raise ValueError(f"frames={self.frames}: must be at least 1")
         if self.memory < 0:
             raise ValueError(f"memory={self.memory}: must not be negative")
+        if self.gentle_n < 0:
+            raise ValueError(f"gentle_n={self.gentle_n}: must not be negative")
         _check_finite(self)
         for name in ("bias_one_contact", "bias_floor"):
             if not 0 <= getattr(self, name) <= 1:

@@ -53,8 +53,9 @@ def write_contract(folder: Path, contract: Contract, decides: bytes | ForcePIGai
     """
     control = dataclasses.asdict(contract)
     content = {"format": FORMAT, "policy": FORCE_PI, "gripper": control.pop("gripper")}
-    if not contract.memory:
-        del control["memory"]  # versions that know of none read it, too
+    for later in ("memory", "gentle_n"):
+        if not control[later]:
+            del control[later]  # versions that know of none read it, too
     if isinstance(decides, ForcePIGains):
         content["gains"] = dataclasses.asdict(decides)
     else:

@@ -211,7 +211,10 @@ class GraspController:
             error = np.abs(parts["force_error"])
             near_goal = 1 - (error if one_to_one else error.mean()) / np.float32(self.goal_n)
             return np.maximum(near_goal, np.float32(contract.bias_floor))
-        return np.where(touched, np.float32(contract.bias_one_contact), np.float32(1)) if one_to_one else np.float32(1)
+        closing = np.float32(1)
+        if contract.gentle_n and touched.any():
+            closing = np.minimum(np.sqrt(np.float32(self.goal_n) / np.float32(contract.gentle_n)), closing)
+        return np.where(touched, np.float32(contract.bias_one_contact), closing) if one_to_one else closing
 
     def _hold(self, position: np.ndarray | None, fault: str) -> np.ndarray:
         """The last command again; before the first one, the position where the fingers stand."""

@@ -101,7 +101,8 @@ def build_env(
         CatFrames(observation.frames, dim=-1, in_keys=["observation"], padding="same"),
     ]
     if action.inductive_bias:
-        transforms.append(InductiveBias(action.bias_one_contact, action.bias_floor))
+        gentle_n = action.gentle_touch * gripper.training.largest_force_n
+        transforms.append(InductiveBias(action.bias_one_contact, action.bias_floor, gentle_n))
     transforms.append(ActionScale(action.max_delta_m))
     env = TransformedEnv(grasps, Compose(transforms))
     seed_env(env, seed)

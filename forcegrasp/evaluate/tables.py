@@ -29,7 +29,7 @@ METRICS = (
     ("reach_s", "time until within 2 σ_f of the goal, s", 2),
     ("settled_s", "time from which within 2 σ_f of it, s", 2),
     ("final_force_error_n", "force error over the last second, N", 4),
-    ("final_net_force_n", "net force on the object over the last second, N", 4),
+    ("final_force_difference_n", "difference between the fingers over the last second, N", 4),
     ("command_effort", "effort of the commands, m or rad", 5),
     ("action_change", "change of the actions", 2),
     ("crushed_percent", "crushed (> 1.5 × goal for > 40 ms), % of the grasps", 1),

@@ -126,9 +126,14 @@ class Training(ShortRepr):
         return np.clip(1 - (force_scale - soft) / (hard - soft), 0.0, 1.0)
 
     @property
+    def largest_force_n(self) -> float:
+        """Static force of a finger at the largest command step, on the object that it presses hardest."""
+        return self.max_force_n * float(np.max(self.force_scale(np.array([0.0, 1.0]))))
+
+    @property
     def ceiling_n(self) -> float:
         """Force above which a policy that was trained with this may close no further: a third above what it reaches."""
-        return self.max_force_n * float(np.max(self.force_scale(np.array([0.0, 1.0])))) * 4 / 3
+        return self.largest_force_n * 4 / 3
 
     def force_scale(self, kappa: Softness) -> Softness:
         """f_α of an object of softness κ; 1 where it does not depend on it."""

@@ -142,6 +142,7 @@ def contract_of(config: TrainConfig, ceiling_n: float | None = None) -> Contract
         ceiling_n=ceiling if ceiling_n is None else ceiling_n,
         position_reading_m=(-beyond, gripper.stroke + beyond),
         force_reading_n=(-highest if gripper.force == "motor" else lowest, highest),
+        gentle_n=action.gentle_touch * training.largest_force_n,
         gap_s=(_GAP[0] * gripper.period_s, _GAP[1] * gripper.period_s),
     )
 

@@ -39,6 +39,7 @@ TRAIN_CASES: dict[str, Any] = {
     "action.inductive_bias": False,
     "action.bias_one_contact": 0.5,
     "action.bias_floor": 0.5,
+    "action.gentle_touch": 1.0,
     "reward.form": "goal_normalised",
     "reward.force_weight": 2.0,
     "reward.object_weight": 2.0,

@@ -34,6 +34,7 @@ VARIANTS = {
         "action": ActionConfig(0.005, bias_one_contact=0.5, bias_floor=0.2),
         "observation": ObservationConfig(["had_contact", "last_action", "force_error", "force", "position"], 4),
     },
+    "a gentle last finger": {"action": ActionConfig(bias_one_contact=0.0, gentle_touch=1.0)},
     "other sensors, two frames, parts left out": {
         "sensors": SensorConfig(0.0, 0.002, contact_threshold_n=0.02),
         "observation": ObservationConfig(["force_error", "had_contact"], 2),

@@ -21,11 +21,8 @@ from tests.light_set import light_gripper, light_set
 # what comes late, and a little besides
 CATALOGUE = [
     effect_of(name, light_gripper())
-    for name in (
-        "command_delay", "rate_limit", "actuator_lag", "force_hysteresis", "force_lag", "force_delay", "force_bias",
-        "readout_skew",
-    )
-]  # fmt: skip
+    for name in ("command_delay", "actuator_lag", "force_lag", "force_delay", "readout_skew")
+]
 DELAY = CATALOGUE[0]
 
 

@@ -147,7 +147,7 @@ def test_exact_sensors_read_the_truth():
 
 @pytest.mark.parametrize(
     "config",
-    [ActionConfig(), ActionConfig(inductive_bias=False), ActionConfig(0.002, True, 0.3, 0.5)],
+    [ActionConfig(), ActionConfig(inductive_bias=False), ActionConfig(0.002, True, 0.3, 0.5, 0.9)],
     ids=["paper", "no bias", "other"],
 )
 def test_actions_are_clipped_biased_and_scaled(config):
@@ -155,8 +155,10 @@ def test_actions_are_clipped_biased_and_scaled(config):
     had = rollout.get("had_contact").numpy() > 0.5
     error, goal = (rollout.get(key).double().numpy() for key in ("force_error", "goal_force"))
     both = had.all(-1, keepdims=True)
+    last = had.any(-1, keepdims=True) & (config.gentle_touch > 0)
+    closing = np.where(last, np.minimum(1, np.sqrt(goal / (config.gentle_touch * 1.5 + 1e-12))), 1)
     phi = np.where(
-        both, np.maximum(config.bias_floor, 1 - np.abs(error) / goal), np.where(had, config.bias_one_contact, 1)
+        both, np.maximum(config.bias_floor, 1 - np.abs(error) / goal), np.where(had, config.bias_one_contact, closing)
     )
     phi = phi if config.inductive_bias else np.ones_like(phi)
     largest = complete(config, default_gripper()).max_delta_m
@@ -271,7 +273,13 @@ OTHER = {
     },
     "sensors": {"position_std_m": 1e-4, "force_std_n": 0.1, "contact_threshold_n": 0.1},
     "observation": {"parts": ["force"], "frames": 2},
-    "action": {"max_delta_m": 0.002, "inductive_bias": False, "bias_one_contact": 0.5, "bias_floor": 0.2},
+    "action": {
+        "max_delta_m": 0.002,
+        "inductive_bias": False,
+        "bias_one_contact": 0.5,
+        "bias_floor": 0.2,
+        "gentle_touch": 1.0,
+    },
     "reward": {
         "form": "goal_normalised",
         "force_weight": 2.0,

@@ -109,7 +109,7 @@ def _slow(rollout: TensorDict, sensors: SensorConfig, period: float) -> dict[str
         figures["impact_impulse_ns"].append(max(impulse))
         figures["final_force_error_n"].append(sum(errors) / len(errors))
         net = [abs(force[i, t, 0] - force[i, t, 1]) for t in last]
-        figures["final_net_force_n"].append(sum(net) / len(net))
+        figures["final_force_difference_n"].append(sum(net) / len(net))
         figures["command_effort"].append(effort**0.5)
         figures["crushed_percent"].append(100 * (long * period > 0.04 + 1e-9))
         slipped = any(force[i, t, finger] <= sensors.contact_threshold_n for t in last for finger in (0, 1))

@@ -88,6 +88,26 @@ def test_two_motors_with_one_reading_move_alike() -> None:
     np.testing.assert_allclose(bias, [[0.96, 0.96], [1, 1]], rtol=1e-6)
 
 
+@pytest.mark.parametrize(
+    ("h", "motors", "want"),
+    [
+        ([0, 0], 2, [1, 1]),  # nothing is near
+        ([1, 0], 2, [0.1, 0.5]),
+        ([0, 1], 2, [0.5, 0.1]),
+        ([1, 1], 2, [1, 1]),
+        ([0, 1], 1, [0.5]),
+        ([0], 1, [1]),
+    ],
+)
+def test_the_last_finger_closes_slower_where_little_is_asked_for(h: list, motors: int, want: list) -> None:
+    h, error = [h], [[0.0] * len(h)]
+    bias = contact_bias(*tensors(h, error, [[0.05]]), 0.1, 0.9, motors, gentle_n=0.2)
+    np.testing.assert_allclose(bias, [want], rtol=1e-6)
+    for goal in (0.2, 1.5):  # nor slower than its policy says where more is asked for
+        bias = contact_bias(*tensors(h, error, [[goal]]), 0.1, 0.9, motors, gentle_n=0.2)
+        assert torch.equal(bias, contact_bias(*tensors(h, error, [[goal]]), 0.1, 0.9, motors))
+
+
 def test_never_reverses_with_floor_zero() -> None:
     bias = contact_bias(*tensors([[1, 1]], [[9.0, -9.0]], [[0.5]]), 0.0, 0.0, 2)
     assert bias.tolist() == [[0.0, 0.0]]

@@ -55,6 +55,7 @@ CHANGED = [
     (ActionChangePenalty, "out_key", "penalty"),
     (InductiveBias, "one", 0.2),
     (InductiveBias, "floor", 0.5),
+    (InductiveBias, "gentle_n", 5.0),
     (InductiveBias, "delta_key", "spare"),
     (InductiveBias, "had_contact_key", "spare"),
     (InductiveBias, "force_error_key", "spare"),

@@ -14,6 +14,8 @@ from forcegrasp.physics.gripper import Gripper
 
 #: By how much a cautious student may close harder than its teacher at no further cost: noise must not make it let go.
 FREE = 0.1
+# What closes fast is taught a little more than full speed, which is no more: a student that errs closes as fast then.
+_CLOSING = 1.2
 
 
 class Teacher:
@@ -22,7 +24,8 @@ class Teacher:
     Args:
       gripper: what grasps.
       feedback: K; once every reading has shown contact, the action that holds the goal is multiplied by
-        1 + K (1 − f / f_goal), with the mean f of the true forces.
+        1 + K κ (1 − f / f_goal), with the mean f of the true forces. The softer an object (κ), the slower its force
+        follows, and the more a harder push at first helps; a hard one's force would shoot beyond the goal.
     """
 
     def __init__(self, gripper: Gripper, feedback: float) -> None:
@@ -37,8 +40,9 @@ class Teacher:
         state = batch.select(*self.controller.in_keys)
         action, goal, force = self.controller(state)["action"], state["goal_force"], batch["force"]
         grasped = state.get("had_contact").bool().all(-1, keepdim=True)
-        correction = 1 + self.feedback * (1 - force.mean(-1, keepdim=True) / goal)
-        taught = torch.where(grasped, (action * correction).clamp(-1, 1), action)
+        softness = state["grasp_parameters"][..., :1]
+        correction = 1 + self.feedback * softness * (1 - force.mean(-1, keepdim=True) / goal)
+        taught = torch.where(grasped, (action * correction).clamp(-1, 1), action * _CLOSING)
         unit = torch.where(grasped, -self.controller.hold(goal, state["grasp_parameters"]), 1.0)
         batch.set("taught_action", taught).set("taught_unit", unit.expand_as(action))
 

@@ -77,8 +77,7 @@ def _parameter_ranges(gripper: Gripper) -> list[tuple[float, float]]:
 
 def _large_force(gripper: Gripper) -> float:
     """Two thirds of the largest force of any object, newtons: few goals lie above."""
-    training = gripper.training
-    return training.max_force_n * max(float(training.force_scale(kappa)) for kappa in (0.0, 1.0)) / 3 * 2
+    return gripper.training.largest_force_n / 3 * 2
 
 
 def make_value(observation_size: int, config: PPOConfig, gripper: Gripper | None = None) -> TensorDictModule:
