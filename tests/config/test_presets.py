@@ -166,7 +166,6 @@ def test_recommended_differs_from_ib_in_what_its_file_says():
         "reward.form": "goal_normalised",
         "reward.overshoot_weight": 2.0,
         "curriculum.enabled": False,
-        "ppo.total_frames": 3_000_000,
         "ppo.grasps": 128,
         "ppo.minibatch": 256,
         "ppo.hidden": [100, 100],
