@@ -21,8 +21,12 @@ from forcegrasp.models.variation import read_model_of
 from forcegrasp.physics import load_gripper
 from forcegrasp.runs import checkpoint, metrics_file
 from forcegrasp.runs.config_file import MODEL, fingerprint, read_config, read_options
+from forcegrasp.runs.history import flat
 from forcegrasp.runs.lock import only_writer
 from forcegrasp.runs.provenance import provenance
+
+#: Of so many options that differ each is told; more are another training altogether.
+_FEW = 3
 
 
 class RunDir:
@@ -52,7 +56,8 @@ class RunDir:
             with run.only_writer():
                 if run.config_path.exists() and (run.has_checkpoint or not run._is_of(config)):
                     raise CheckpointError(
-                        f"{run.path}: already holds a run; continue it with resume={run.path}, or name another"
+                        f"{run.path}: already holds a run{run._other_options(config)};"
+                        f" continue it with resume={run.path}, or name another"
                     )
                 for folder in (run.checkpoints, run.tensorboard, run.figures):
                     folder.mkdir(parents=True, exist_ok=True)
@@ -74,6 +79,15 @@ class RunDir:
     def has_checkpoint(self) -> bool:
         """Whether there is something to go on from; a run that has none begins at its first batch."""
         return any(self.checkpoints.glob("*.safetensors"))
+
+    def _other_options(self, config: TrainConfig) -> str:
+        """In words, which options of the run that is here are not those of a configuration."""
+        try:
+            here = flat(dataclasses.asdict(self.config()))
+        except CheckpointError:
+            return ""
+        names = [name for name, value in flat(dataclasses.asdict(config)).items() if here.get(name) != value]
+        return f" with another {' and '.join(names)}" if 0 < len(names) <= _FEW else ""
 
     def _is_of(self, config: TrainConfig) -> bool:
         try:

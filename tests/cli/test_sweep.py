@@ -136,7 +136,9 @@ def test_the_same_sweep_again_goes_on(tiny, monkeypatch, capsys):
     assert capsys.readouterr().out.count("already trained to the end") == 1
     assert main(["train", "seed=1", *options, "hydra.run.dir=alone"]) == 0
     assert final(RunDir("cut/ib_s1_1")) == final(RunDir("alone"))
-    with pytest.raises(CheckpointError, match="already holds a run"):  # not the same: left alone
+    with pytest.raises(
+        CheckpointError, match=r"already holds a run with another ppo\.epochs; "
+    ):  # not the same: left alone
         begin_or_resume(Path("alone"), compose("train", [*options, "seed=1", "ppo.epochs=3"]), [])
 
 
