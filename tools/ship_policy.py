@@ -62,7 +62,7 @@ def _card(name: str, what: str, made: dict, frames: int, report: dict, figures: 
         "time to the goal force, ± 2 σ_f [s]": cell("reach_s", 2),
         "time from which the force stays there [s]": cell("settled_s", 2),
         "force error over the last second [mN]": cell("final_force_error_n", 1, 1e3),
-        "net force on the object over the last second [mN]": cell("final_force_difference_n", 1, 1e3),
+        "difference between the fingers over the last second [mN]": cell("final_force_difference_n", 1, 1e3),
         "crushed: beyond 1.5 × the goal for more than 40 ms [% of grasps]": cell("crushed_percent", 1),
         "lost: not held throughout the last second [% of grasps]": cell("lost_percent", 1),
     }

@@ -47,7 +47,7 @@ _ROWS = {
     "reach_s": ("time until within 2 σ_f of the goal [s]", 2, 1.0),
     "settled_s": ("time from which it stays there [s]", 2, 1.0),
     "final_force_error_n": ("force error over the last second [mN]", 1, 1e3),
-    "final_force_difference_n": ("net force on the object over the last second [mN]", 1, 1e3),
+    "final_force_difference_n": ("difference between the fingers over the last second [mN]", 1, 1e3),
     "command_effort": ("effort of the commands [mm]", 2, 1e3),
     "action_change": ("change of the actions", 2, 1.0),
     "displacement_until_grasped_mm": ("object moved until both touch [mm]", 3, 1.0),
