@@ -180,8 +180,10 @@ def test_recommended_differs_from_ib_in_what_its_file_says():
 
 def test_quick_differs_from_recommended_in_frames_and_steps():
     assert changed(train("experiment=recommended"), train("experiment=quick")) == {
-        "ppo.total_frames": 480_000,
+        "ppo.total_frames": 400_000,
+        "ppo.epochs": 6,
         "ppo.learning_rate": 0.001,
+        "ppo.teacher_caution": 1.0,
     }
 
 
