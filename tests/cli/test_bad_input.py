@@ -198,7 +198,10 @@ MISTAKES = [
     (["train", "resume=broken"], "config.yaml: not a valid configuration"),
     (["train", "resume=damaged"], "damaged"),
     (["train", "hydra.run.dir=finished"], "already holds a run; continue it with resume=finished"),
-    (["train", "seed=3", "hydra.run.dir=started"], "already holds a run with another seed; continue it with resume=started"),
+    (
+        ["train", "seed=3", "hydra.run.dir=started"],
+        "already holds a run with another seed; continue it with resume=started",
+    ),
     (["train", "hydra.run.dir=file/run"], "could not make the run directory"),
     (["train", "hydra.run.dir=file"], "could not make the run directory"),
     (["evaluate", "policies=[]"], "must not be empty"),

@@ -21,14 +21,17 @@ from tests.light_set import light_gripper, light_set
 # what comes late, and a little besides
 CATALOGUE = [
     effect_of(name, light_gripper())
-    for name in ("command_delay", "actuator_lag", "force_lag", "force_delay", "readout_skew")
-]
+    for name in (
+        "command_delay", "rate_limit", "actuator_lag", "force_hysteresis", "force_lag", "force_delay", "force_bias",
+        "readout_skew",
+    )
+]  # fmt: skip
 DELAY = CATALOGUE[0]
 
 
 def split_delay(*hidden: str):
     """What takes the place of a late command in a set with these effects hidden; and the step that had found it."""
-    loaded = light_set(*hidden, grasps=7, samples=60)
+    loaded = light_set(*hidden, grasps=9)
     target, simulators, base = fit_model(loaded, 0, silent)
     numerical = beyond_fit(base.fit, numerical_error(base.fit, target))
     study = with_few(Study(target, simulators, make_folds(target.grasps), numerical), base.fit)
