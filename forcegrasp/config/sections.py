@@ -134,7 +134,8 @@ class ActionConfig:
     bias_floor: float = option(0.9, "smallest φ with both fingers in contact", source="paper, eq. 7", low=0, high=1)
     gentle_touch: float = option(
         0.0,
-        "goal, as a share of the gripper's largest force, below which the last finger to touch closes slower; 0: never",
+        "goal, as a share of the gripper's largest force, below which the last finger closes slower on a hard object;"
+        " 0: never",
         low=0,
         high=1,
     )

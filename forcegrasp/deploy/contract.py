@@ -11,6 +11,9 @@ from dataclasses import dataclass
 from forcegrasp.errors import closest
 from forcegrasp.observation import PARTS
 
+#: How many times harder than the first finger the last one is taken to touch: the object can't give way any more.
+LAST_TOUCH = 2.0
+
 
 @dataclass(frozen=True)
 class GripperInterface:
@@ -77,7 +80,7 @@ class Contract:
     force_reading_n: tuple[float, float]  #: readings beyond this can't be true
     gap_s: tuple[float, float]  #: shortest and longest time from one reading to the next
     memory: int = 0  #: numbers that the network remembers from one step of a grasp to the next
-    gentle_n: float = 0.0  #: goal below which the last finger to touch closes slower, by √(goal / this); 0: never
+    gentle_n: float = 0.0  #: goal below which the last finger to touch closes slower on a hard object; 0: never
 
     def __post_init__(self) -> None:
         unknown = [part for part in self.parts if part not in PARTS]

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from forcegrasp.assets import DEFAULT_GRIPPER
-from forcegrasp.deploy.contract import Contract
+from forcegrasp.deploy.contract import LAST_TOUCH, Contract
 from forcegrasp.deploy.contract_file import baseline_folder, read_contract
 from forcegrasp.deploy.policies import ForcePI, Policy, load_policy
 from forcegrasp.errors import DeployError
@@ -110,6 +110,7 @@ class GraspController:
         size = self.contract.action_size
         self.action, self.delta_m = np.zeros(size, np.float32), np.zeros(size)
         self._had_contact: np.ndarray | None = None  # None until the first good reading
+        self._touch_force = np.float32(0)  # the largest force that was read of a finger with contact
         self._position: np.ndarray | None = None  # of the last good reading
         self._commanded: np.ndarray | None = None
         self._time: float | None = None  # of the last good reading
@@ -195,6 +196,7 @@ class GraspController:
             if contract.stall is not None:  # an effort that moves the motor says nothing of contact
                 contact &= np.abs(position - self._position) < contract.stall
             self._had_contact = np.maximum(self._had_contact, contact).astype(np.float32)
+            self._touch_force = np.maximum(self._touch_force, np.max(force * self._had_contact))
         self._position = position
         scale, offset = np.float32(contract.position_scale_per_m), np.float32(contract.position_offset)
         goal = np.float32(self.goal_n)
@@ -213,7 +215,8 @@ class GraspController:
             return np.maximum(near_goal, np.float32(contract.bias_floor))
         closing = np.float32(1)
         if contract.gentle_n and touched.any():
-            closing = np.minimum(np.sqrt(np.float32(self.goal_n) / np.float32(contract.gentle_n)), closing)
+            hard = np.minimum(np.float32(LAST_TOUCH) * self._touch_force, np.float32(contract.gentle_n))
+            closing = np.minimum(np.sqrt(np.float32(self.goal_n) / hard), closing)
         return np.where(touched, np.float32(contract.bias_one_contact), closing) if one_to_one else closing
 
     def _hold(self, position: np.ndarray | None, fault: str) -> np.ndarray:

@@ -39,6 +39,7 @@ from forcegrasp.transforms import (
     InductiveBias,
     LastAction,
     ObservationNoise,
+    TouchForce,
 )
 
 
@@ -102,6 +103,8 @@ def build_env(
     ]
     if action.inductive_bias:
         gentle_n = action.gentle_touch * gripper.training.largest_force_n
+        if gentle_n:
+            transforms.append(TouchForce())
         transforms.append(InductiveBias(action.bias_one_contact, action.bias_floor, gentle_n))
     transforms.append(ActionScale(action.max_delta_m))
     env = TransformedEnv(grasps, Compose(transforms))

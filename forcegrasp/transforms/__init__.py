@@ -4,9 +4,10 @@ from forcegrasp.transforms.action_change_penalty import ActionChangePenalty
 from forcegrasp.transforms.action_scale import ActionScale
 from forcegrasp.transforms.force_error import ForceError
 from forcegrasp.transforms.had_contact import HadContact
-from forcegrasp.transforms.inductive_bias import InductiveBias, contact_bias
+from forcegrasp.transforms.inductive_bias import InductiveBias, contact_bias, gentle_closing
 from forcegrasp.transforms.last_action import LastAction
 from forcegrasp.transforms.observation_noise import ObservationNoise
+from forcegrasp.transforms.touch_force import TouchForce
 
 __all__ = [
     "ActionChangePenalty",
@@ -16,5 +17,7 @@ __all__ = [
     "InductiveBias",
     "LastAction",
     "ObservationNoise",
+    "TouchForce",
     "contact_bias",
+    "gentle_closing",
 ]

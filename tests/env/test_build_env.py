@@ -155,8 +155,11 @@ def test_actions_are_clipped_biased_and_scaled(config):
     had = rollout.get("had_contact").numpy() > 0.5
     error, goal = (rollout.get(key).double().numpy() for key in ("force_error", "goal_force"))
     both = had.all(-1, keepdims=True)
+    force = rollout.get("sensed_force").double().numpy()
+    touch = np.maximum.accumulate(np.where(had, force, 0).max(-1, keepdims=True), axis=1)
     last = had.any(-1, keepdims=True) & (config.gentle_touch > 0)
-    closing = np.where(last, np.minimum(1, np.sqrt(goal / (config.gentle_touch * 1.5 + 1e-12))), 1)
+    hard = np.minimum(config.gentle_touch * 1.5, 2 * touch)
+    closing = np.where(last, np.minimum(1, np.sqrt(goal / np.maximum(hard, 1e-12))), 1)
     phi = np.where(
         both, np.maximum(config.bias_floor, 1 - np.abs(error) / goal), np.where(had, config.bias_one_contact, closing)
     )

@@ -12,7 +12,7 @@ from tensordict import TensorDict
 from torchrl.envs import TransformedEnv
 from torchrl.envs.transforms import Compose
 
-from forcegrasp.transforms import ActionScale, ForceError, HadContact, InductiveBias, contact_bias
+from forcegrasp.transforms import ActionScale, ForceError, HadContact, InductiveBias, contact_bias, gentle_closing
 
 UNIT = st.floats(0, 1, width=32)
 ROWS = 5
@@ -91,21 +91,33 @@ def test_two_motors_with_one_reading_move_alike() -> None:
 @pytest.mark.parametrize(
     ("h", "motors", "want"),
     [
-        ([0, 0], 2, [1, 1]),  # nothing is near
+        ([0, 0], 2, [0.5, 0.5]),  # gentle_closing has 1 there
         ([1, 0], 2, [0.1, 0.5]),
         ([0, 1], 2, [0.5, 0.1]),
         ([1, 1], 2, [1, 1]),
         ([0, 1], 1, [0.5]),
-        ([0], 1, [1]),
+        ([0], 1, [0.5]),
     ],
 )
-def test_the_last_finger_closes_slower_where_little_is_asked_for(h: list, motors: int, want: list) -> None:
-    h, error = [h], [[0.0] * len(h)]
-    bias = contact_bias(*tensors(h, error, [[0.05]]), 0.1, 0.9, motors, gentle_n=0.2)
+def test_only_what_still_closes_does_so_slower(h: list, motors: int, want: list) -> None:
+    bias = contact_bias(*tensors([h], [[0.0] * len(h)], [[0.05]]), 0.1, 0.9, motors, closing=torch.tensor([[0.5]]))
     np.testing.assert_allclose(bias, [want], rtol=1e-6)
-    for goal in (0.2, 1.5):  # nor slower than its policy says where more is asked for
-        bias = contact_bias(*tensors(h, error, [[goal]]), 0.1, 0.9, motors, gentle_n=0.2)
-        assert torch.equal(bias, contact_bias(*tensors(h, error, [[goal]]), 0.1, 0.9, motors))
+
+
+@pytest.mark.parametrize(
+    ("goal", "touch", "want"),
+    [
+        (0.05, 0.0, 1.0),  # nothing was touched
+        (0.05, 0.02, 1.0),  # too soft to press beyond the goal
+        (0.05, 0.04, 0.625**0.5),
+        (0.05, 5.0, 0.5),  # up to a goal of 0.2 N alone
+        (0.2, 5.0, 1.0),
+        (1.5, 5.0, 1.0),
+    ],
+)
+def test_closes_slower_on_hard_objects_where_little_is_asked_for(goal: float, touch: float, want: float) -> None:
+    closing = gentle_closing(*tensors([[goal]], [[touch]]), gentle_n=0.2)
+    np.testing.assert_allclose(closing, [[want]], rtol=1e-6)
 
 
 def test_never_reverses_with_floor_zero() -> None:

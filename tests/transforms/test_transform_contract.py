@@ -31,11 +31,12 @@ from forcegrasp.transforms import (
     InductiveBias,
     LastAction,
     ObservationNoise,
+    TouchForce,
 )
 
 WORKERS, STEPS = 2, 9  # long enough for every row to end once
 REFUSAL = "needs the step before: append it to an environment"
-MEMORY = (HadContact, LastAction, ActionChangePenalty)
+MEMORY = (HadContact, TouchForce, LastAction, ActionChangePenalty)
 INVERSE = (InductiveBias, ActionScale)
 
 ALONE = {
@@ -44,6 +45,7 @@ ALONE = {
     ),
     "ObservationNoise in place": lambda: ObservationNoise(["force"], ["force"], [0.02]),
     "HadContact": lambda: HadContact(0.1, in_key="force"),
+    "TouchForce": lambda: TouchForce(force_key="force", had_contact_key="touching"),
     "ForceError": lambda: ForceError(force_key="force"),
     "ForceError in place": lambda: ForceError(force_key="force", out_key="force"),
     "LastAction": lambda: LastAction(action_key="joint_delta"),

@@ -20,6 +20,7 @@ from forcegrasp.transforms import (
     InductiveBias,
     LastAction,
     ObservationNoise,
+    TouchForce,
 )
 
 BASE = {
@@ -27,6 +28,7 @@ BASE = {
     HadContact: {"threshold": 0.3},
     ForceError: {},
     LastAction: {},
+    TouchForce: {},
     ActionChangePenalty: {"weight": 0.5},
     InductiveBias: {"floor": 0.1},
     ActionScale: {"max_delta": 0.003},
@@ -49,6 +51,9 @@ CHANGED = [
     (LastAction, "action_key", "spare"),
     (LastAction, "out_key", "before"),
     (LastAction, "like", "goal_force"),
+    (TouchForce, "force_key", "spare"),
+    (TouchForce, "had_contact_key", "spare"),
+    (TouchForce, "out_key", "spare_goal"),
     (ActionChangePenalty, "weight", 1.0),
     (ActionChangePenalty, "last_action_key", "spare"),
     (ActionChangePenalty, "reward_key", "bonus"),
@@ -60,16 +65,17 @@ CHANGED = [
     (InductiveBias, "had_contact_key", "spare"),
     (InductiveBias, "force_error_key", "spare"),
     (InductiveBias, "goal_key", "spare_goal"),
+    (InductiveBias, "touch_key", "spare_goal"),
     (ActionScale, "max_delta", 0.004),
     (ActionScale, "delta_key", "spare_delta"),
     (ActionScale, "action_key", "spare"),
 ]
 #: What else has to be given for an option to matter.
-NEEDED = {(HadContact, "position_key"): {"stall": 0.2}}
+NEEDED = {(HadContact, "position_key"): {"stall": 0.2}, (InductiveBias, "touch_key"): {"gentle_n": 5.0}}
 SIZES = {
     **dict.fromkeys(["joint_position", "sensed_position", "force", "sensed_force", "force_error"], 2),
     **dict.fromkeys(["last_action", "had_contact", "spare"], 2),
-    **dict.fromkeys(["goal_force", "spare_goal"], 1),
+    **dict.fromkeys(["goal_force", "spare_goal", "touch_force"], 1),
 }
 
 

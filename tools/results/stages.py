@@ -14,6 +14,8 @@ from tools.results.stage import Stage
 STEPS, SOFTNESS, OBJECTS, TRIALS, ON_OBJECT, FEW = 150, 11, 6, 200, 20, 50
 #: Seed of the grasps on which the shipped seed is chosen: others than those that pages show.
 DEVELOPMENT = 2000
+#: As many trainings at once as there are cores, a core each: one alone leaves cores idle while it learns.
+_SIDE_BY_SIDE = ("hydra/launcher=joblib", "physics.threads=1")
 #: Nobody looks at these while it trains.
 _NO_PICTURES = ("log.video_every=0", "log.figures_every=0")
 
@@ -40,7 +42,7 @@ def _train(folder: str, options: str, settings: Settings) -> tuple[tuple[str, ..
     algorithm, count = _asked_for(tuple(word for word in options.split() if not word.startswith("model=")))
     budget = (f"{algorithm.name}.total_frames={settings.frames}",) if settings.frames else ()
     command = (
-        *("forcegrasp", "train", "-m", *options.split(), _seeds(settings), *_NO_PICTURES, *budget),
+        *("forcegrasp", "train", "-m", *options.split(), _seeds(settings), *_SIDE_BY_SIDE, *_NO_PICTURES, *budget),
         f"hydra.sweep.dir={settings.shown(folder)}",
     )
     runs = count * settings.seeds
