@@ -120,6 +120,7 @@ def test_each_policy_and_sweep_is_trained_and_evaluated_with_five_seeds(every):
     for name in [policy.name for policy in POLICIES] + list(SWEEPS):
         command = every[f"train-{name}"].commands[0]
         assert "seed=1,2,3,4,5" in command
+        assert {"hydra/launcher=joblib", "physics.threads=1"} <= set(command)  # a core each
         assert every[f"evaluate-{name}"].needs[-1] == f"train-{name}"
     assert every["train-ib"].trained == 5 * 4_500_000
     assert [every[f"train-{sweep}"].trained // 22_500_000 for sweep in ("ablation", "parts", "printed")] == [1, 4, 3]
