@@ -45,6 +45,6 @@ class TouchForce(Transform):
 
     def transform_observation_spec(self, observation_spec: Composite) -> Composite:
         force = observation_spec[self.in_keys[0]]
-        shape = (*force.shape[:-1], 1)
+        shape = torch.Size([*force.shape[:-1], 1])
         observation_spec[self.out_keys[0]] = Unbounded(shape=shape, dtype=force.dtype, device=force.device)
         return observation_spec
