@@ -35,7 +35,7 @@ POLICIES = (
         "recommended",
         "experiment=recommended",
         "What to put on a robot (`experiment=recommended`): it sees ten frames, squeezes with both fingers alike,"
-        " touches gently where little is asked for, pays for force beyond the goal, and learned from a teacher that"
+        " touches hard objects gently where little is asked for, pays for force beyond the goal, and learned from a teacher that"
         " knows how hard the object is.",
     ),
     Policy(
