@@ -35,8 +35,8 @@ POLICIES = (
         "recommended",
         "experiment=recommended",
         "What to put on a robot (`experiment=recommended`): it sees ten frames, squeezes with both fingers alike,"
-        " touches hard objects gently where little is asked for, pays for force beyond the goal, and learned from a teacher that"
-        " knows how hard the object is.",
+        " touches hard objects gently where little is asked for, pays for force beyond the goal, and learned from a"
+        " teacher that knows how hard the object is.",
     ),
     Policy(
         "ib",
