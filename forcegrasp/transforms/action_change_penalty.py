@@ -6,10 +6,11 @@ import torch
 from tensordict import TensorDictBase
 from tensordict.utils import NestedKey
 from torchrl.data import Composite, Unbounded
-from torchrl.envs.transforms import Transform
+
+from forcegrasp.transforms.step_transform import StepTransform
 
 
-class ActionChangePenalty(Transform):
+class ActionChangePenalty(StepTransform):
     """Writes r_act and adds α₃ r_act to the reward. Both actions are the policy's own, clipped to [−1, 1].
 
     The first action of an episode is compared with 0.
@@ -41,9 +42,6 @@ class ActionChangePenalty(Transform):
     def _reset(self, tensordict: TensorDictBase, tensordict_reset: TensorDictBase) -> TensorDictBase:
         like = tensordict_reset[self.last_action_key]
         return tensordict_reset.set(self.term_key, torch.zeros_like(like[..., :1]))
-
-    def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
-        raise RuntimeError("ActionChangePenalty needs the step before: append it to an environment")
 
     def transform_reward_spec(self, reward_spec: Composite) -> Composite:
         like = reward_spec[self.in_keys[0]]

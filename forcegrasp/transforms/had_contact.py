@@ -8,10 +8,11 @@ import torch
 from tensordict import TensorDictBase
 from tensordict.utils import NestedKey
 from torchrl.data import Binary, Composite
-from torchrl.envs.transforms import Transform
+
+from forcegrasp.transforms.step_transform import StepTransform
 
 
-class HadContact(Transform):
+class HadContact(StepTransform):
     """Writes, per finger, 1 once the force has exceeded the threshold in this episode, else 0.
 
     The memory lives in the tensordict: h(t+1) is written from f(t+1) and h(t), so partial resets and batched envs need
@@ -51,11 +52,6 @@ class HadContact(Transform):
 
     def _reset(self, tensordict: TensorDictBase, tensordict_reset: TensorDictBase) -> TensorDictBase:
         return tensordict_reset.set(self.out_keys[0], torch.zeros_like(tensordict_reset[self.in_keys[0]]))
-
-    def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
-        raise RuntimeError(
-            "HadContact needs the step before: append it to an environment, it can't work on single frames"
-        )
 
     def transform_observation_spec(self, observation_spec: Composite) -> Composite:
         force = observation_spec[self.in_keys[0]]

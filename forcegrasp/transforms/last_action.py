@@ -6,10 +6,11 @@ import torch
 from tensordict import TensorDictBase
 from tensordict.utils import NestedKey
 from torchrl.data import Bounded, Composite
-from torchrl.envs.transforms import Transform
+
+from forcegrasp.transforms.step_transform import StepTransform
 
 
-class LastAction(Transform):
+class LastAction(StepTransform):
     """Writes the action that led to this state, as the policy gave it, clipped to [−1, 1].
 
     Args:
@@ -30,11 +31,6 @@ class LastAction(Transform):
 
     def _reset(self, tensordict: TensorDictBase, tensordict_reset: TensorDictBase) -> TensorDictBase:
         return tensordict_reset.set(self.out_keys[0], torch.zeros_like(tensordict_reset[self.in_keys[0]]))
-
-    def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
-        raise RuntimeError(
-            "LastAction needs the step before: append it to an environment, it can't work on single frames"
-        )
 
     def transform_observation_spec(self, observation_spec: Composite) -> Composite:
         like = observation_spec[self.in_keys[0]]

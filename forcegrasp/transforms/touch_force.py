@@ -6,10 +6,11 @@ import torch
 from tensordict import TensorDictBase
 from tensordict.utils import NestedKey
 from torchrl.data import Composite, Unbounded
-from torchrl.envs.transforms import Transform
+
+from forcegrasp.transforms.step_transform import StepTransform
 
 
-class TouchForce(Transform):
+class TouchForce(StepTransform):
     """Writes the largest force reading of the episode, of fingers that had contact: 0 until one has touched.
 
     At the speed of an approach a hard object is touched with more force than a soft one, so that the first finger's
@@ -37,11 +38,6 @@ class TouchForce(Transform):
 
     def _reset(self, tensordict: TensorDictBase, tensordict_reset: TensorDictBase) -> TensorDictBase:
         return tensordict_reset.set(self.out_keys[0], torch.zeros_like(tensordict_reset[self.in_keys[0]][..., :1]))
-
-    def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
-        raise RuntimeError(
-            "TouchForce needs the step before: append it to an environment, it can't work on single frames"
-        )
 
     def transform_observation_spec(self, observation_spec: Composite) -> Composite:
         force = observation_spec[self.in_keys[0]]
