@@ -68,7 +68,9 @@ def diagnose_set(
     def as_said() -> tuple[Diagnosis, Simulators]:
         target, simulators, base = said
         found = search(target, simulators, base)
-        further = go_on_with_moved(found, loaded, lambda t, s, fit, steps: search(t, s, base, (fit, steps)), progress)
+        further = go_on_with_moved(
+            found, loaded, lambda t, s, bare, fit, steps: search(t, s, bare, (fit, steps)), progress
+        )
         return further or (within_tolerance_after_all(found, loaded), simulators)
 
     said = fitted(loaded)

@@ -32,7 +32,7 @@ def with_fault(found: Diagnosis, fault: Fault, said: _Fitted) -> Diagnosis:
     """The diagnosis of a set put right: its fault comes first among what was found, the error before is the set's."""
     before = rms(_held(*said), said[0])
     if fault.moved is not None:
-        return dataclasses.replace(found, fault=fault, error_before=before)
+        return dataclasses.replace(found, fault=fault, error_before=before, error_moved=found.error_before)
     if found.verdict is Verdict.EXPLAINED:
         return dataclasses.replace(found, verdict=Verdict.DATA, effects=(fault.name,), fault=fault, error_before=before)
     effects = (fault.name, *found.effects) if found.verdict.names_effects else ()

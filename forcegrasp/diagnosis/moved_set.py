@@ -6,12 +6,14 @@ import dataclasses
 from collections.abc import Callable, Sequence
 
 from forcegrasp.diagnosis.evidence import LEAST_LEAD, LEAST_SHARE, is_beyond_chance
+from forcegrasp.diagnosis.families import refit_without
 from forcegrasp.diagnosis.faults import Fault, within_tolerance
 from forcegrasp.diagnosis.needless import drop_all_needless
 from forcegrasp.diagnosis.result import Diagnosis, Step, kept_steps
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.diagnosis.tolerance import all_radii
 from forcegrasp.effects.object_size import ObjectSize
+from forcegrasp.identify.base_fit import BaseFit
 from forcegrasp.identify.cross_validation import evidence_folds
 from forcegrasp.identify.fit import Fit, Simulators, fit_exactly
 from forcegrasp.identify.loading import Loaded
@@ -22,8 +24,8 @@ from forcegrasp.identify.target import Target
 from forcegrasp.identify.verdict import Verdict
 from forcegrasp.measure import MeasurementSet
 
-#: Searches on from a fit and the steps that found its effects.
-SearchOn = Callable[[Target, Simulators, Fit, Sequence[Step]], Diagnosis]
+#: Searches on from a base model, a fit with effects besides, and the steps that found these.
+SearchOn = Callable[[Target, Simulators, BaseFit, Fit, Sequence[Step]], Diagnosis]
 
 
 def within_tolerance_after_all(found: Diagnosis, loaded: Loaded[MeasurementSet]) -> Diagnosis:
@@ -80,5 +82,29 @@ def go_on_with_moved(
         return None
     given = len(found.base.fit.problem.effects)
     steps, fit = drop_all_needless(study, kept_steps(found.steps), fit, given)
-    again = search_on(target, simulators, fit, steps)
-    return dataclasses.replace(again, fault=fault, error_before=found.error_before), simulators
+    steps, bare = _one_after_the_other(study, steps, fit)
+    again = search_on(target, simulators, dataclasses.replace(found.base, fit=bare), fit, steps)
+    before, moved = found.error_before, again.error_before
+    return dataclasses.replace(again, fault=fault, error_before=before, error_moved=moved), simulators
+
+
+def _one_after_the_other(study: Study, steps: Sequence[Step], fit: Fit) -> tuple[list[Step], Fit]:
+    """The steps with what each effect explains of what the move of the set leaves; and a fit without any of them.
+
+    Args:
+      study: the measurements, as moved.
+      steps: that found the effects.
+      fit: with all effects.
+    """
+    error, found = study.error(study.heldout(fit)), list(steps)
+    for place, step in reversed(list(enumerate(steps))):
+        if step.is_counted:
+            found[place] = dataclasses.replace(step, error_before=error, error_after=error)
+            continue
+        setting = next(one for one in fit.effects if one.effect.name == step.effects[0])
+        first = dataclasses.replace(step.candidates[0], setting=setting, fit=fit, error_after=error)
+        fit, after = refit_without(step.effects[0], fit, study), error
+        error = study.error(study.heldout(fit))
+        candidates = (first, *step.candidates[1:])
+        found[place] = dataclasses.replace(step, candidates=candidates, error_before=error, error_after=after)
+    return found, fit

@@ -153,6 +153,7 @@ class Diagnosis(ShortRepr):
     law: FoundLaw | None = None  #: that explains what no effect does, if one was looked for and found
     law_sought: bool = False  #: whether one was looked for
     fault: Fault | None = None  #: of the set: put right in all of the above; or else the last of the rivals
+    error_moved: float | None = None  #: without any effect, with what the set gives moved; None if nothing was
     alone: str = ""  #: the one grasp that shows more than noise, in words, where all others show none; empty if none
 
     @property
@@ -173,10 +174,15 @@ class Diagnosis(ShortRepr):
         return numerical_floor(beyond_fit(self.fit, self.numerical), self.target)
 
     @property
+    def error_of_base(self) -> float:
+        """The error before any effect, once what the set gives was moved: effects get no credit for that."""
+        return self.error_before if self.error_moved is None else self.error_moved
+
+    @property
     def explained(self) -> float:
         """Share of the held-out mean square beyond the noise that the effects found explain."""
         noise = self.error_after if self.noise is not None and not self.left else 1.0
-        return float(np.clip(explained_share(self.error_before, self.error_after, noise), 0.0, 1.0))
+        return float(np.clip(explained_share(self.error_of_base, self.error_after, noise), 0.0, 1.0))
 
     def shares(self) -> dict[str, float]:
         """Share of the held-out mean square beyond the noise that each effect of the final model explains.

@@ -89,6 +89,7 @@ def diagnosis_json(diagnosis: Diagnosis, advice: Advice | None, tried: Sequence[
             for effect, found in found_parameters(diagnosis).items()
         },
         "error_before": diagnosis.error_before,
+        "error_moved": diagnosis.error_moved,
         "error_after": diagnosis.error_after,
         "floor_ratio": diagnosis.error_after,
         "floor": diagnosis.floor,
@@ -128,10 +129,11 @@ def answer(diagnosis: Diagnosis) -> str:
 
 def _missed_objects(d: Diagnosis) -> str:
     """Why held-out error is left though nothing is missing; empty if none is."""
-    if d.left or d.noise is not None or d.error_after < AT_FLOOR * d.floor:
+    fitted = rms(d.fit.residual, d.target)
+    if d.left or d.noise is not None or d.error_after < AT_FLOOR * max(d.floor, fitted):
         return ""
     return (
-        f" A fit of all {d.target.part}s leaves {rms(d.fit.residual, d.target):.2f} ×: where few are left to fit an"
+        f" A fit of all {d.target.part}s leaves {fitted:.2f} ×: where few are left to fit an"
         " object by, those held out are missed."
     )
 
@@ -143,7 +145,7 @@ def _of_model(diagnosis: Diagnosis) -> str:
     if d.verdict is Verdict.DATA and not d.steps:  # labels
         return lacks(d)
     if d.verdict.names_effects:
-        change = f"from {d.error_before:.2f} to {d.error_after:.2f} ×"
+        change = f"from {d.error_of_base:.2f} to {d.error_after:.2f} ×"
         with_found = f"{found} put right" if d.verdict is Verdict.DATA else found
         fall = f"With {with_found} the error on held-out {d.target.part}s falls {change}"
         rest = f"What is left is largest in {place}." if d.left else noise
@@ -161,7 +163,7 @@ def _of_model(diagnosis: Diagnosis) -> str:
         best = f"{found} would only take it down to {d.error_after:.2f} ×" if found else "no effect explains it"
         return (
             f"Something is missing, and it is none of the effects I know: the error on held-out {d.target.part}s is"
-            f" {d.error_before:.2f} × the sensor noise, and {best}. Look at {place}."
+            f" {d.error_of_base:.2f} × the sensor noise, and {best}. Look at {place}."
         )
     return f"No diagnosis, for the base model is not fitted: {d.base.reason}. To do: {ADVICE}."
 
@@ -259,7 +261,8 @@ def _view(diagnosis: Diagnosis) -> Section:
     """The base model's predictions beside those of the final model."""
     models = {"base model": diagnosis.base.fit.predicted}
     if diagnosis.fit is not diagnosis.base.fit:
-        models[f"model with {listed(diagnosis.preferred)}"] = diagnosis.fit.predicted
+        added = listed(diagnosis.preferred) if diagnosis.preferred else "what the set gives moved"
+        models[f"model with {added}"] = diagnosis.fit.predicted
     return view_section(diagnosis.target, models)
 
 

@@ -38,7 +38,7 @@ def answer_box(diagnosis: Diagnosis, advice: Advice | None, commands: Sequence[C
     d, found = diagnosis, diagnosis.verdict.names_effects
     shares = d.shares() if found else {}
     shares |= {"left" if d.left else "noise": left_share(d)} if shares else {}
-    fall = f"{d.error_before:.2f} → {d.error_after:.2f} × the sensor noise on held-out {d.target.part}s"
+    fall = f"{d.error_of_base:.2f} → {d.error_after:.2f} × the sensor noise on held-out {d.target.part}s"
     left = left_sentence(d).removeprefix("what is left is ")
     # of rivals the next command tells which grasp to record
     record = advice.sentence().removeprefix("record next: ") if advice and d.verdict is not Verdict.ONE_OF else ""

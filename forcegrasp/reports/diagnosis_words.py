@@ -56,8 +56,11 @@ def fault_words(diagnosis: Diagnosis) -> str:
         return ""
     named = _named(diagnosis.fault)
     if diagnosis.fault.moved is not None and diagnosis.fault.name not in diagnosis.effects:
-        as_given = f"as given the error is {diagnosis.error_before:.2f} × noise"
-        return f"What the set gives was moved within its tolerance: {diagnosis.fault.words}; {as_given}."
+        moved = f"What the set gives was moved within its tolerance: {diagnosis.fault.words}"
+        if diagnosis.error_moved is None:
+            return f"{moved}; as given the error is {diagnosis.error_before:.2f} × noise."
+        change = f"from {diagnosis.error_before:.2f} to {diagnosis.error_moved:.2f} × noise"
+        return f"{moved}. That alone takes the error {change}."
     if diagnosis.fault_is_rival:
         not_there = f"there is no {diagnosis.fault.instead_of}" if diagnosis.fault.instead_of else "nothing is missing"
         return f"Or the set is wrong, and {not_there}: {named}; these data can't tell which."

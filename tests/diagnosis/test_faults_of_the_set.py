@@ -27,7 +27,7 @@ from forcegrasp.identify.loading import Loaded
 from forcegrasp.identify.problem import Problem
 from forcegrasp.identify.verdict import Verdict
 from forcegrasp.models.model_file import Model
-from forcegrasp.reports.diagnosis import answer, diagnosis_json
+from forcegrasp.reports.diagnosis import answer, diagnosis_json, sections
 from forcegrasp.reports.diagnosis_box import answer_box
 from forcegrasp.reports.diagnosis_words import fault_words
 from tests.light_set import light_set
@@ -345,13 +345,44 @@ def test_a_search_goes_on_with_what_is_given_moved(sound, radius_std_m, moves):
 
     found = search(target, simulators, base)
     assert found.left
-    again = go_on_with_moved(found, inexactly, lambda t, s, fit, steps: search(t, s, base, start=(fit, steps)), silent)
+    again = go_on_with_moved(found, inexactly, lambda t, s, bare, fit, steps: search(t, s, bare, (fit, steps)), silent)
     assert (again is not None) == moves
     if again is not None:
         diagnosis, _ = again
         assert (diagnosis.left, diagnosis.verdict) == ("", "explained")
         assert diagnosis.error_before == found.error_before > 1.1 * diagnosis.error_after
         assert f"radius of {name} by -0." in answer(diagnosis)
+
+
+@pytest.mark.parametrize("names", [[], ["force_crosstalk"]])
+def test_an_effect_gets_no_credit_for_what_was_moved_and_none_need_be_found(names):
+    loaded, model = with_model(light_set("force_crosstalk share=0.07"))
+    name = loaded.measured.grasps[0].object
+    inexactly = dataclasses.replace(loaded, measured=inexact(name, 6e-4, 0.0, 2.5e-4)(loaded.measured))
+    target, simulators, base = apply_model(inexactly, model, silent, refit=True)
+    catalogue = [get_effect(name) for name in names]
+
+    def search(target, simulators, base, start=None):
+        return diagnose(target, base, simulators, catalogue, np.random.default_rng(0), start=start)
+
+    found = search(target, simulators, base)
+    again = go_on_with_moved(found, inexactly, lambda t, s, bare, fit, steps: search(t, s, bare, (fit, steps)), silent)
+    assert again is not None
+    diagnosis, _ = again
+    assert diagnosis.preferred == tuple(names)
+    assert diagnosis.error_before > 1.1 * diagnosis.error_moved
+    assert not diagnosis.base.fit.problem.effects
+    assert diagnosis.base.fit.problem.grasps is diagnosis.fit.problem.grasps
+    assert f"from {diagnosis.error_before:.2f} to {diagnosis.error_moved:.2f} × noise" in answer(diagnosis)
+    page = sections(diagnosis, None, catalogue)
+    if not names:
+        assert (diagnosis.verdict, diagnosis.error_after) == ("unknown", diagnosis.error_moved)
+        return
+    step = diagnosis.steps[0]
+    assert (step.error_before, step.error_after) == (diagnosis.error_moved, diagnosis.error_after)
+    assert sum(diagnosis.shares().values()) == pytest.approx(diagnosis.explained, abs=0.02)
+    assert step.candidates[0].fit.problem.grasps is diagnosis.fit.problem.grasps
+    assert len(page) > 1
 
 
 def test_a_sound_set_has_neither_suspects_nor_odd_grasps(sound, refitted):

@@ -26,10 +26,7 @@ GRASPS, SAMPLES, SEED = 6, 70, 2
 #: What an object's friction with the table may be taken for.
 LIKE_FRICTION = ["object_friction", *get_effect("object_friction").look_alikes]
 #: What changes the motors' forces, or what is read of where they stand.
-LIKE_COGGING = [
-    "coulomb_friction", "stiction", "presliding", "direction_friction", "motor_offset", "position_deadband", "backlash",
-    "encoder_bias", "readout_skew", "command_delay",
-]  # fmt: skip
+LIKE_COGGING = ["coulomb_friction", "stiction", "motor_offset", "position_deadband", "encoder_bias"]
 
 
 def silent(text: str) -> None:

@@ -22,8 +22,7 @@ from tests.light_set import light_gripper, light_set
 CATALOGUE = [
     effect_of(name, light_gripper())
     for name in (
-        "command_delay", "rate_limit", "actuator_lag", "force_hysteresis", "force_lag", "force_delay", "force_bias",
-        "readout_skew",
+        "command_delay", "actuator_lag", "force_lag", "force_delay", "readout_skew",
     )
 ]  # fmt: skip
 DELAY = CATALOGUE[0]
