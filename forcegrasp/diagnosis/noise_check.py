@@ -33,6 +33,8 @@ _SLOWEST, _BY_STATE = 0.95, 0.05
 # Nor is it noise if it is so many times what was assumed. Of a servo it never is: its state, which repeats no motion,
 # foretells little of what a lag or an elastic load leaves.
 _MOST_SLOW = 4.0
+# Groups of several partitions overlap: each is made level so many times.
+_LEVELLED = 3
 # Random features, what a unit of their weights costs, and folds of grasps.
 _FEATURES, _RIDGE, _FOLDS = 100, 1.0, 4
 # Half of a normal distribution lies within so many σ.
@@ -105,6 +107,42 @@ def unexpected_noise(
         return None
     has_stray = np.asarray(stray.any(axis=(0, 1)))
     return Noise(ratio, core, has_stray, np.zeros(count), has_stray)
+
+
+def is_uneven_noise(
+    residual: np.ndarray, numerical: Sequence[np.ndarray], target: Target, predicted: np.ndarray
+) -> bool:
+    """Whether all beyond the noise is white in time and foretold by nothing, but larger in some states than in others.
+
+    Noise that grows with speed or force is so, and so are readings at uneven times, which show in motion. A law of
+    forces is not: what it leaves repeats itself with the state.
+
+    Args:
+      residual, numerical, target, predicted: as for :func:`unexpected_noise`.
+    """
+    clean = residual.copy()
+    for k in range(residual.shape[-1]):
+        signal, state = np.arange(residual.shape[-1]) == k, predicted[..., target.axis.side_of(k)]
+        groups, ratio = _partitions(target, state), rms(residual, target, signal)
+        if ratio <= numerical_floor(numerical, target, signal):
+            continue
+        level = _levelled(np.where(target.mask, residual[..., k], np.nan), groups)
+        scores = _normal_scores(level, _present(level, target))
+        if _is_white(scores, 1 - 1 / ratio**2, groups) and foretold(scores, state, target) < _BY_STATE:
+            clean[..., k] = scores
+    return not excess(clean, numerical, target)
+
+
+def _levelled(values: np.ndarray, partitions: Sequence[np.ndarray]) -> np.ndarray:
+    """Values ``(G, S)`` ÷ their rms in each group of each partition."""
+    level = values.copy()
+    for _ in range(_LEVELLED):
+        for partition in partitions:
+            for group in range(partition.max() + 1):
+                inside = (partition == group) & np.isfinite(level)
+                if inside.any():
+                    level[inside] /= max(float(np.sqrt(np.mean(level[inside] ** 2))), 1e-12)
+    return level
 
 
 def _present(values: np.ndarray, target: Target) -> np.ndarray:

@@ -11,7 +11,7 @@ import numpy as np
 
 from forcegrasp.diagnosis.faults import Fault
 from forcegrasp.diagnosis.found_law import FoundLaw
-from forcegrasp.diagnosis.noise_check import Noise
+from forcegrasp.diagnosis.noise_check import Noise, is_uneven_noise
 from forcegrasp.diagnosis.odd_grasps import OddGrasp
 from forcegrasp.diagnosis.signatures import Score
 from forcegrasp.diagnosis.verdict import explained_share
@@ -177,6 +177,14 @@ class Diagnosis(ShortRepr):
     def error_of_base(self) -> float:
         """The error before any effect, once what the set gives was moved: effects get no credit for that."""
         return self.error_before if self.error_moved is None else self.error_moved
+
+    @cached_property
+    def is_uneven_noise(self) -> bool:
+        """Whether what is left looks like noise that is larger in some states than in others."""
+        if not self.left or not self.numerical:
+            return False
+        numerical = beyond_fit(self.fit, self.numerical)
+        return is_uneven_noise(self.heldout(), numerical, self.target, self.fit.predicted)
 
     @property
     def explained(self) -> float:

@@ -10,6 +10,7 @@ from forcegrasp.errors import MeasurementError
 from forcegrasp.measure.check_commands import refuse_copied_command
 from forcegrasp.measure.check_copies import check_copies
 from forcegrasp.measure.check_liveness import check_liveness
+from forcegrasp.measure.check_repeats import check_repeats
 from forcegrasp.measure.check_signs import PadsAt, check_signs
 from forcegrasp.measure.check_units import check_force_noise, check_forces, check_units
 from forcegrasp.measure.folder import show
@@ -69,7 +70,7 @@ def check_set(
     check_signs(measured, open_m, closed_m, pads_at, half_opening_m)
     if len(measured.grasps) == 1:
         warnings.append(f"{show(measured.path)}: {ALONE}")
-    return [*measured.notes, *warnings, *_gaps(measured), *check_copies(measured)]
+    return [*measured.notes, *warnings, *_gaps(measured), *check_copies(measured), *check_repeats(measured)]
 
 
 def check_table(table: FinalForceTable, open_m: float) -> list[str]:

@@ -81,6 +81,7 @@ def diagnosis_json(diagnosis: Diagnosis, advice: Advice | None, tried: Sequence[
         "law": law_json(diagnosis.law),
         "odd_grasps": [dataclasses.asdict(grasp) for grasp in diagnosis.odd],
         "alone": diagnosis.alone,
+        "uneven_noise": diagnosis.is_uneven_noise,
         "steps": [_step_json(step, diagnosis) for step in diagnosis.steps],
         "ranking": ranking(diagnosis),
         "no_trace": no_trace(diagnosis, tried),
@@ -161,8 +162,11 @@ def _of_model(diagnosis: Diagnosis) -> str:
         )
     if d.verdict is Verdict.UNKNOWN:
         best = f"{found} would only take it down to {d.error_after:.2f} ×" if found else "no effect explains it"
+        missing = "Something is missing, and it is none of the effects I know"
+        if d.is_uneven_noise:
+            missing += ", or the noise grows with speed or force"
         return (
-            f"Something is missing, and it is none of the effects I know: the error on held-out {d.target.part}s is"
+            f"{missing}: the error on held-out {d.target.part}s is"
             f" {d.error_of_base:.2f} × the sensor noise, and {best}. Look at {place}."
         )
     return f"No diagnosis, for the base model is not fitted: {d.base.reason}. To do: {ADVICE}."

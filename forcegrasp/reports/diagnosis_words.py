@@ -196,6 +196,12 @@ def left_sentence(diagnosis: Diagnosis) -> str:
     place = f"{words(rest['signal'])}, {words(rest['phase'])}: {rest['ratio']:.1f} × noise"
     if not diagnosis.left:
         return f"what is left is noise; it is largest in {place}"
+    if diagnosis.is_uneven_noise:
+        return (
+            f"what is left is largest in {place}; it is white in time and nothing foretells it, though larger in some"
+            " states than in others: noise that grows with speed or force is so, and so are readings at uneven times;"
+            " to tell, log the same motion twice"
+        )
     name, share = next(iter(rest["explained_by"].items()))
     goes = f", of which {share:.0%} goes with {covariate_words(name)}" if share > 0.05 else ""
     no_better = (

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from forcegrasp.diagnosis.noise_check import Noise, unexpected_noise
+from forcegrasp.diagnosis.noise_check import Noise, is_uneven_noise, unexpected_noise
 from forcegrasp.diagnosis.search import _left, _left_by_many
 from forcegrasp.diagnosis.signatures import Score, null_gains
 from forcegrasp.effects import get_effect
@@ -238,6 +238,26 @@ def test_an_effect_is_not_taken_for_noise(spoil, seed):
     residual = spoil(normal(seed))
     assert excess(residual, NOTHING, make())
     assert unexpected_noise(residual, NOTHING, make(), GRASPS) is None
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(
+    ("spoil", "uneven"),
+    [
+        (louder_in_one_phase, True),
+        (louder_when_pressed, True),
+        (louder_with_the_force, True),
+        (twice_and_more_in_motion, True),
+        (level, False),
+        (wave, False),
+        (slow, False),
+        (slow_and_a_law, False),
+        (slow_where_pressed, False),
+        (too_slow, False),
+    ],
+)
+def test_noise_that_grows_with_the_state_is_told_from_a_law(spoil, uneven, seed):
+    assert is_uneven_noise(spoil(normal(seed)), NOTHING, make(), GRASPS) is uneven
 
 
 def test_in_doubt_it_is_not_noise():

@@ -1,0 +1,62 @@
+"""Readings that a log repeats where none arrived are told; those of sensors that round or rest are not."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from measured_rig import OPEN_M, change, make_set, standard_grasps
+
+from forcegrasp.measure import check_set
+
+RNG = np.random.default_rng(3)
+
+
+def noisy(grasps):
+    return [
+        change(
+            g,
+            position_m=g.position_m + 2.7e-5 * RNG.standard_normal(g.position_m.shape),
+            force_n=g.force_n + 0.013 * RNG.standard_normal(g.force_n.shape),
+        )
+        for g in grasps
+    ]
+
+
+def held(grasps, share=0.05):
+    """The left force reads what it did before, now and then."""
+    out = []
+    for g in grasps:
+        force = g.force_n.copy()
+        for row in np.flatnonzero(RNG.random(len(force)) < share):
+            force[row : row + 2, 0] = force[max(row - 1, 0), 0]
+        out.append(change(g, force_n=force))
+    return out
+
+
+def rounded(grasps):
+    return [change(g, force_n=np.round(g.force_n, 2), position_m=np.round(g.position_m, 5)) for g in grasps]
+
+
+def at_rest(grasps):
+    """A dead zone reads nothing in free air."""
+    return [change(g, force_n=np.where(g.force_n < 0.05, 0.0, g.force_n)) for g in grasps]
+
+
+def told(grasps) -> list[str]:
+    return [line for line in check_set(make_set(grasps), OPEN_M) if "once more, to the last bit" in line]
+
+
+def test_held_readings_are_told_with_place_and_share():
+    (line,) = told(held(noisy(standard_grasps())))
+    assert "column f_l_n" in line
+    assert "grasp 'g0'" in line
+    assert "% of all rows" in line
+
+
+@pytest.mark.parametrize("change_grasps", [list, rounded, at_rest])
+def test_what_rounds_rests_or_is_as_it_should_be_is_not_told(change_grasps):
+    assert told(change_grasps(noisy(standard_grasps()))) == []
+
+
+def test_a_simulation_without_noise_is_not_told():
+    assert told(standard_grasps()) == []
