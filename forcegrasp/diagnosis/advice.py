@@ -144,7 +144,8 @@ def rivals_of(diagnosis: Diagnosis) -> tuple[Candidate, Candidate] | None:
     steps = kept_steps(diagnosis.steps) or (diagnosis.steps if len(diagnosis.steps) == 1 else ())
     tied_last = sorted(steps, key=lambda step: len(step.effects) > 1)
     for step in reversed(tied_last):
-        tied_first = sorted(step.candidates, key=lambda c: c.effect.name not in step.effects)
+        likely = [c for c in step.candidates if c.is_plausible or c.effect.name in step.effects]
+        tied_first = sorted(likely, key=lambda c: c.effect.name not in step.effects)
         if len(tied_first) > 1:
             return tied_first[0], tied_first[1]
     return None

@@ -103,7 +103,8 @@ def _leads(step: Step) -> tuple[float, float]:
 
 def _best_other(step: Step) -> Candidate | None:
     """The best of the effects that were not found; not of those that contain what was found, and fit as well."""
-    others = [c for c in step.candidates if c.effect.name not in step.effects and c not in _containing(step)]
+    others = [c for c in step.candidates if c.effect.name not in step.effects and c.is_plausible]
+    others = [c for c in others if c not in _containing(step)]
     return max(others, key=lambda c: c.heldout_gain, default=None)
 
 

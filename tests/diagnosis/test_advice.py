@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 
+import numpy as np
 import pytest
 
 from forcegrasp.diagnosis.advice import advise, rivals_of
 from forcegrasp.diagnosis.result import Diagnosis, Step
 from forcegrasp.effects import get_effect
+from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.replay.plans import MENU, OFF_CENTRE
 
 
@@ -20,6 +22,8 @@ def with_steps(made_up):
     for name in ("force_lag", "backlash"):
         setting = dataclasses.replace(one.setting, effect=get_effect(name))
         fits[name] = dataclasses.replace(other, setting=setting)
+    swapped = EffectSetting(get_effect("swapped_forces"), "", np.array([0.05]))
+    fits["swapped_forces"] = dataclasses.replace(other, setting=swapped)
 
     def diagnosis(*steps: tuple[tuple[str, ...], tuple[str, ...]]) -> Diagnosis:
         made = tuple(Step(found, tuple(fits[name] for name in tried), (), 2.0, 1.5) for found, tried in steps)
@@ -50,6 +54,8 @@ def with_steps(made_up):
             ],
             ("force_lag", "backlash"),
         ),
+        # columns that would be swapped by 5 %: something else
+        ([(("force_bias",), ("force_bias", "swapped_forces", "force_drift"))], ("force_bias", "force_drift")),
         # nothing found: the two that came nearest to it
         ([((), ("backlash", "force_drift"))], ("backlash", "force_drift")),
     ],
