@@ -94,6 +94,7 @@ def test_an_error_of_all_radii_within_their_tolerance_is_no_fault(sound, refitte
     assert (alone.verdict, alone.effects, alone.steps) == ("explained", (), ())
     assert (besides.verdict, besides.effects, besides.steps) == ("effect", ("backlash",), (one,))
     assert "What the set gives was moved within its tolerance: all radii by +0.08 mm" in fault_words(besides)
+    assert sections(alone, None, [])  # a report that names no effect beside the model that was moved
     for larger_or_not_enough in (*named(1.2e-4), *named(8e-5, left="much")):
         assert within_tolerance_after_all(larger_or_not_enough, loaded) is larger_or_not_enough
 
