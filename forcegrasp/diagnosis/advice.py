@@ -143,8 +143,10 @@ def rivals_of(diagnosis: Diagnosis) -> tuple[Candidate, Candidate] | None:
     """Two effects of the last tie; without one, of the last step that found something the best two."""
     steps = kept_steps(diagnosis.steps) or (diagnosis.steps if len(diagnosis.steps) == 1 else ())
     tied_last = sorted(steps, key=lambda step: len(step.effects) > 1)
+    found = {step.effects[0] for step in steps if step.effects}
     for step in reversed(tied_last):
-        likely = [c for c in step.candidates if c.is_plausible or c.effect.name in step.effects]
+        # what another step has found is there besides, and not instead
+        likely = [c for c in step.candidates if c.is_plausible and c.effect.name not in found - {*step.effects}]
         tied_first = sorted(likely, key=lambda c: c.effect.name not in step.effects)
         if len(tied_first) > 1:
             return tied_first[0], tied_first[1]

@@ -92,18 +92,21 @@ def certainty(diagnosis: Diagnosis) -> str:
 def weakest_step(diagnosis: Diagnosis) -> Step | None:
     """The step on which the verdict rests least firmly; None if none was fitted."""
     fitted = [step for step in kept_steps(diagnosis.steps) if step.candidates]
-    return max(fitted, key=lambda s: (len(s.effects) > 1, s.candidates[0].p_family, *_leads(s)), default=None)
+    return max(
+        fitted, key=lambda s: (len(s.effects) > 1, s.candidates[0].p_family, *_leads(s, diagnosis)), default=None
+    )
 
 
-def _leads(step: Step) -> tuple[float, float]:
+def _leads(step: Step, diagnosis: Diagnosis) -> tuple[float, float]:
     """What the best effect that was not found gains, of what the one that was found gains; and how little that is."""
-    other, gain = _best_other(step), step.candidates[0].heldout_gain
+    other, gain = _best_other(step, diagnosis), step.candidates[0].heldout_gain
     return max(0.0, other.heldout_gain) / max(gain, 1e-9) if other else 0.0, -gain
 
 
-def _best_other(step: Step) -> Candidate | None:
-    """The best of the effects that were not found; not of those that contain what was found, and fit as well."""
-    others = [c for c in step.candidates if c.effect.name not in step.effects and c.is_plausible]
+def _best_other(step: Step, diagnosis: Diagnosis) -> Candidate | None:
+    """The best of the effects that no step has found; not of those that contain what was found, and fit as well."""
+    found = {*step.effects, *diagnosis.preferred}
+    others = [c for c in step.candidates if c.effect.name not in found and c.is_plausible]
     others = [c for c in others if c not in _containing(step)]
     return max(others, key=lambda c: c.heldout_gain, default=None)
 
@@ -122,7 +125,7 @@ def runner_up(diagnosis: Diagnosis) -> str:
     if rivals:
         left = [f"{c.effect.name} leaves {c.error_after:.2f} × noise" for c in rivals]
         return f"{listed(left)}, {first.effect.name} {first.error_after:.2f}."
-    other, richer = _best_other(step), [c.effect.name for c in _containing(step)]
+    other, richer = _best_other(step, diagnosis), [c.effect.name for c in _containing(step)]
     contains = f" {listed(richer)} would add little to {first.effect.name}, contained in it." if richer else ""
     if other is None or other.heldout_gain <= 0:
         return f"None: no other effect explains any of what {first.effect.name} does.{contains}"

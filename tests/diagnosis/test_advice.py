@@ -54,6 +54,14 @@ def with_steps(made_up):
             ],
             ("force_lag", "backlash"),
         ),
+        # one that another step has found is no rival
+        (
+            [
+                (("force_bias",), ("force_bias", "force_lag", "force_drift")),
+                (("force_lag",), ("force_lag",)),
+            ],
+            ("force_bias", "force_drift"),
+        ),
         # columns that would be swapped by 5 %: something else
         ([(("force_bias",), ("force_bias", "swapped_forces", "force_drift"))], ("force_bias", "force_drift")),
         # nothing found: the two that came nearest to it

@@ -98,6 +98,15 @@ def test_an_answer_is_as_sure_as_its_weakest_step(made_up):
     assert tie["Runner-up"] == "force_drift leaves 1.28 × noise, force_bias 1.00."
 
 
+def test_what_another_step_has_found_is_no_runner_up(made_up):
+    one = made_up.diagnosis("effect")
+    (first,), drift = one.steps, one.steps[0].candidates[1]
+    other = dataclasses.replace(first, effects=("force_drift",), candidates=(drift,))
+    two = dataclasses.replace(one, effects=("force_bias", "force_drift"), steps=(first, other))
+    rows = dict(box(two).rows)
+    assert rows["Runner-up"].startswith("None: no other effect")
+
+
 def test_what_may_be_there_besides_is_said_and_can_be_tried(made_up):
     much = dataclasses.replace(made_up.diagnosis("effect"), left="in all", floor=0.5)
     last = dataclasses.replace(much.steps[0], effects=())
