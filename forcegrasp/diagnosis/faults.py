@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from forcegrasp.diagnosis.felt_sizes import SEEN_M, doubtful_radii
+from forcegrasp.diagnosis.late_side import command_row_later, late_side
 from forcegrasp.diagnosis.signatures import Background
 from forcegrasp.diagnosis.tolerance import MOST, WORTH, Moved, move_given, wanted_moves
 from forcegrasp.identify.base_fit import rms_error
@@ -105,6 +106,14 @@ def suspects(loaded: Loaded[MeasurementSet], target: Target, fit: Fit) -> list[F
         words = f"{listed(early)} are what was read one row later{late}"
         check = "which row each column was written to, and its clock"
         found.append(Fault("early_row", words, check, _changed(loaded, lambda _, g: _one_row_later(g, early))))
+    if (side := late_side(target, fit)) is not None:
+        words = f"what {measured.columns.command[side]} commands is done one row later, and by the other motor at once"
+        check = "which row each motor's command was written to, and whether both get theirs at once"
+
+        def right_side(_: int, grasp: MeasuredGrasp) -> MeasuredGrasp:
+            return dataclasses.replace(grasp, command_m=command_row_later(grasp.command_m, side))
+
+        found.append(Fault("late_side", words, check, _changed(loaded, right_side)))
     # rows that do not keep step with commands make a clock seem off: that must not hide the rest
     moved = wanted_moves(measured, target, fit) if all(one.name == "time_scale" for one in found) else None
     most = None if moved is None or moved.is_within else _most_radii(loaded, moved.radii_apart())

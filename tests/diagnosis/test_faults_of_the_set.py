@@ -203,6 +203,12 @@ def row_early(values: np.ndarray) -> np.ndarray:
             "forces are what was read one row later",
             lambda i, g: {"force_n": row_early(g.force_n)},
         ),
+        (
+            "sound",
+            "late_side",
+            "what qdes_r_m commands is done one row later",
+            lambda i, g: {"command_m": np.column_stack([g.command_m[:, 0], row_early(g.command_m[:, 1])])},
+        ),
         ("pressed_harder", "early_row", "positions and forces are", lambda i, g: {"command_m": row_late(g.command_m)}),
     ],
 )

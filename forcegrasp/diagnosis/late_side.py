@@ -1,0 +1,45 @@
+"""Which of two motors follows its command a row late while the other does not: no effect makes one side late alone."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from forcegrasp.diagnosis.signatures import Background
+from forcegrasp.identify.fit import Fit
+from forcegrasp.identify.target import Target
+
+# It is worth a fit if it takes this share off the squares that a fit leaves beyond the noise.
+_WORTH = 0.5
+
+
+def late_side(target: Target, fit: Fit) -> int | None:
+    """The side whose readings fit what was simulated one row before, if those of the other side do not; else None.
+
+    Args:
+      target: the measurements.
+      fit: of the base model.
+    """
+    sides, motors = target.axis.sides, target.axis.positions.stop
+    if motors < 2 or len({channel for side in sides for channel in side}) < sum(map(len, sides)):
+        return None  # a motor for both sides, or a reading
+    background = Background(fit, ())
+
+    def left(channels: list[int]) -> float:
+        """What is beyond the noise once these readings are taken as one row earlier."""
+        signals = target.signals.copy()
+        signals[:, :-1, channels] = target.signals[:, 1:, channels]
+        clean = background.remove(dataclasses.replace(target, signals=signals).residual(fit.predicted).ravel())
+        return max(0.0, float(clean @ clean) - target.readings)
+
+    of_sides, of_all = [left(side) for side in sides], left([channel for side in sides for channel in side])
+    best = int(np.argmin(of_sides))
+    return best if of_sides[best] < (1 - _WORTH) * min(left([]), of_all) else None
+
+
+def command_row_later(command_m: np.ndarray, side: int) -> np.ndarray:
+    """Commands ``(T, motors)`` with those of one side one row later; the first one stays."""
+    moved = command_m.copy()
+    moved[1:, side] = command_m[:-1, side]
+    return moved
