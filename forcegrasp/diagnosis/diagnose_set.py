@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from forcegrasp.diagnosis.doubt import leaves_less, more_likely, with_fault
-from forcegrasp.diagnosis.faults import Fault, leaves_nothing, suspects
+from forcegrasp.diagnosis.faults import Fault, besides, leaves_nothing, suspects
 from forcegrasp.diagnosis.late_rows import may_be_late_rows
 from forcegrasp.diagnosis.law import find_law
 from forcegrasp.diagnosis.moved_set import go_on_with_moved, within_tolerance_after_all
@@ -65,12 +65,13 @@ def diagnose_set(
     ) -> Diagnosis:
         return diagnose(target, base, simulators, chosen, np.random.default_rng(seed + 1), progress, start)
 
+    def search_on(target: Target, simulators: Simulators, base: BaseFit, fit: Fit, steps: Sequence[Step]) -> Diagnosis:
+        return search(target, simulators, base, (fit, steps))
+
     def as_said() -> tuple[Diagnosis, Simulators]:
         target, simulators, base = said
         found = search(target, simulators, base)
-        further = go_on_with_moved(
-            found, loaded, lambda t, s, bare, fit, steps: search(t, s, bare, (fit, steps)), progress
-        )
+        further = go_on_with_moved(found, loaded, search_on, progress)
         return further or (within_tolerance_after_all(found, loaded), simulators)
 
     said = fitted(loaded)
@@ -96,6 +97,11 @@ def diagnose_set(
         if (better := put_right(suspect)) is not None:
             fault, right = better
             further = search(*right)
+            # what is a little off besides shows once the fault does not hide it
+            on_moved = None if fault.moved else go_on_with_moved(further, fault.put_right, search_on, progress)
+            if on_moved is not None:
+                further, simulators = on_moved
+                right, fault = (further.target, simulators, further.base), besides(fault, further.fault)
             if not fault.is_borne_out(further.fit):  # an effect had made it seem so
                 continue
             found = with_fault(further, fault.told_by(further.fit), (said[0], said[2].fit))

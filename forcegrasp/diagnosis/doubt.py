@@ -30,13 +30,14 @@ def leaves_less(fault: Fault, right: _Fitted, said: _Fitted) -> bool:
 
 def with_fault(found: Diagnosis, fault: Fault, said: _Fitted) -> Diagnosis:
     """The diagnosis of a set put right: its fault comes first among what was found, the error before is the set's."""
-    before = rms(_held(*said), said[0])
+    before, right = rms(_held(*said), said[0]), found.error_of_base
+    found = dataclasses.replace(found, fault=fault, error_before=before, error_moved=right)
     if fault.moved is not None:
-        return dataclasses.replace(found, fault=fault, error_before=before, error_moved=found.error_before)
+        return found
     if found.verdict is Verdict.EXPLAINED:
-        return dataclasses.replace(found, verdict=Verdict.DATA, effects=(fault.name,), fault=fault, error_before=before)
+        return dataclasses.replace(found, verdict=Verdict.DATA, effects=(fault.name,))
     effects = (fault.name, *found.effects) if found.verdict.names_effects else ()
-    return dataclasses.replace(found, effects=effects, fault=fault, error_before=before)
+    return dataclasses.replace(found, effects=effects)
 
 
 def more_likely(right: Diagnosis, said: Diagnosis) -> Diagnosis:

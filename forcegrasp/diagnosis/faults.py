@@ -73,6 +73,14 @@ def _radii(fit: Fit) -> dict[str, float]:
     return {name.removeprefix("radius_m of "): value for name, value in named if name.startswith("radius_m of ")}
 
 
+def besides(fault: Fault, moved: Fault | None) -> Fault:
+    """The fault, with words of what was moved within its tolerance once it was put right."""
+    if moved is None:
+        return fault
+    words = f"{fault.words}; then, within its tolerance, {moved.words}"
+    return dataclasses.replace(fault, words=words, put_right=moved.put_right)
+
+
 def leaves_nothing(fit: Fit, target: Target) -> bool:
     """Whether a fit leaves too little for the set to be doubted."""
     return rms_error(fit, target) < _NOTHING

@@ -153,7 +153,7 @@ class Diagnosis(ShortRepr):
     law: FoundLaw | None = None  #: that explains what no effect does, if one was looked for and found
     law_sought: bool = False  #: whether one was looked for
     fault: Fault | None = None  #: of the set: put right in all of the above; or else the last of the rivals
-    error_moved: float | None = None  #: without any effect, with what the set gives moved; None if nothing was
+    error_moved: float | None = None  #: before any effect, with the set moved or put right; None if it was not
     alone: str = ""  #: the one grasp that shows more than noise, in words, where all others show none; empty if none
 
     @property
@@ -175,8 +175,10 @@ class Diagnosis(ShortRepr):
 
     @property
     def error_of_base(self) -> float:
-        """The error before any effect, once what the set gives was moved: effects get no credit for that."""
-        return self.error_before if self.error_moved is None else self.error_moved
+        """The error before what was found: effects get no credit for a set that was moved or put right."""
+        if self.error_moved is None or self.verdict is Verdict.DATA:
+            return self.error_before
+        return self.error_moved
 
     @cached_property
     def is_uneven_noise(self) -> bool:
