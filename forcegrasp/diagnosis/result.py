@@ -183,7 +183,7 @@ class Diagnosis(ShortRepr):
     @cached_property
     def is_uneven_noise(self) -> bool:
         """Whether what is left looks like noise that is larger in some states than in others."""
-        if not self.left or not self.numerical:
+        if not self.left or not self.numerical or self.error_after <= self.floor_of_model:
             return False
         numerical = beyond_fit(self.fit, self.numerical)
         return is_uneven_noise(self.heldout(), numerical, self.target, self.fit.predicted)
