@@ -74,6 +74,9 @@ def certainty(diagnosis: Diagnosis) -> str:
         return f"No effect lowers the error {judged} by more than chance. Effects that leave no trace are not excluded."
     if d.verdict is Verdict.UNKNOWN:
         return f"Sure that something is missing: the error {judged} is far beyond the noise. What it is, is not known."
+    if weakest is None and d.fault is not None:
+        share = f"{d.error_after / d.error_before:.0%} of the error that they had"
+        return f"Judged {judged}: with the set put right {share} is left, and no effect lowers it by more than chance."
     if weakest is None:
         return f"Judged by a fit of all other {d.target.part}s." if d.odd else "Counted, not fitted: it is certain."
     name, p = weakest.effects[0], weakest.candidates[0].p_family

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import yaml
 
+from forcegrasp.diagnosis.faults import Fault
 from forcegrasp.diagnosis.odd_grasps import OddGrasp
 from forcegrasp.diagnosis.result import Diagnosis
 from forcegrasp.effects import get_effect
@@ -193,6 +194,19 @@ def test_labels_that_are_wrong_are_put_right_before_anything_is_fitted(made_up):
     assert told["How sure"] == "Judged by a fit of all other grasps."
     assert not {"Explains", "Error", "Runner-up"} & set(told)
     assert [c.purpose for c in answer.commands] == ["put the set right, and diagnose again"]
+
+
+def test_a_set_that_was_put_right_is_judged_by_what_that_leaves(made_up):
+    found = made_up.diagnosis("explained")
+    fault = Fault("late_side", "one is late", "the rows", found.fit)
+    told = dict(
+        box(
+            dataclasses.replace(
+                found, verdict=Verdict.DATA, effects=(fault.name,), fault=fault, error_before=6.0, error_after=1.2
+            )
+        ).rows
+    )
+    assert told["How sure"].startswith("Judged on grasps held out of the fit: with the set put right 20% of the error")
 
 
 def test_a_comparison_says_where_and_what_to_do(made_up):
