@@ -10,6 +10,7 @@ import numpy as np
 
 from forcegrasp.diagnosis.felt_sizes import SEEN_M, doubtful_radii
 from forcegrasp.diagnosis.late_side import command_row_later, late_side
+from forcegrasp.diagnosis.shifted_rows import WORTH_A_FIT, left_by_shift
 from forcegrasp.diagnosis.signatures import Background
 from forcegrasp.diagnosis.tolerance import MOST, WORTH, Moved, move_given, wanted_moves
 from forcegrasp.identify.base_fit import rms_error
@@ -21,8 +22,6 @@ from forcegrasp.measure.check_givens import Tare, clock_factor, find_tare, times
 from forcegrasp.measure.schema import MeasuredGrasp, MeasurementSet
 from forcegrasp.short_repr import ShortRepr, cut
 
-# A row's shift is worth a fit if it takes this share off the squares that a fit leaves beyond the noise.
-_WORTH = 0.5
 # What a linear step makes of a change of zero is believed if it differs by no more than this share.
 _OTHERWISE = 0.2
 # A set of which a fit leaves less than so many times the noise is not doubted.
@@ -231,16 +230,11 @@ def _early_readings(target: Target, fit: Fit) -> tuple[str, ...]:
     No effect makes a reading early. Where positions and forces both are, the commands may be late.
     """
     background = Background(fit, ())
-    clean = background.remove(fit.residual.ravel())
-    least, best = (1 - _WORTH) * max(0.0, float(clean @ clean) - target.readings), ()
+    least, best = (1 - WORTH_A_FIT) * max(0.0, left_by_shift(target, fit, background, [], later=True)), ()
     for kinds in (("position",), ("force",), ("position", "force")):
-        signals = target.signals.copy()
-        for kind in kinds:
-            part = target.axis.kinds.get(kind, slice(0, 0))
-            signals[:, 1:, part] = target.signals[:, :-1, part]
-        shifted = dataclasses.replace(target, signals=signals).residual(fit.predicted)
-        clean = background.remove(shifted.ravel())
-        left = float(clean @ clean) - target.readings
+        parts = [target.axis.kinds.get(kind, slice(0, 0)) for kind in kinds]
+        channels = [channel for part in parts for channel in range(part.start, part.stop)]
+        left = left_by_shift(target, fit, background, channels, later=True)
         if left < least:
             least, best = left, tuple(f"{kind}s" for kind in kinds)
     return best

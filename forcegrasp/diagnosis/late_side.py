@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import dataclasses
-
 import numpy as np
 
+from forcegrasp.diagnosis.shifted_rows import WORTH_A_FIT, left_by_shift
 from forcegrasp.diagnosis.signatures import Background
 from forcegrasp.identify.fit import Fit
 from forcegrasp.identify.target import Target
-
-# It is worth a fit if it takes this share off the squares that a fit leaves beyond the noise.
-_WORTH = 0.5
 
 
 def late_side(target: Target, fit: Fit) -> int | None:
@@ -28,14 +24,11 @@ def late_side(target: Target, fit: Fit) -> int | None:
 
     def left(channels: list[int]) -> float:
         """What is beyond the noise once these readings are taken as one row earlier."""
-        signals = target.signals.copy()
-        signals[:, :-1, channels] = target.signals[:, 1:, channels]
-        clean = background.remove(dataclasses.replace(target, signals=signals).residual(fit.predicted).ravel())
-        return max(0.0, float(clean @ clean) - target.readings)
+        return max(0.0, left_by_shift(target, fit, background, channels, later=False))
 
     of_sides, of_all = [left(side) for side in sides], left([channel for side in sides for channel in side])
     best = int(np.argmin(of_sides))
-    return best if of_sides[best] < (1 - _WORTH) * min(left([]), of_all) else None
+    return best if of_sides[best] < (1 - WORTH_A_FIT) * min(left([]), of_all) else None
 
 
 def command_row_later(command_m: np.ndarray, side: int) -> np.ndarray:
