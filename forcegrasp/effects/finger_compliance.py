@@ -20,7 +20,7 @@ class FingerCompliance(Effect):
     symptom = "the encoder runs ahead of the pad by an amount that grows with the force"
     formula = "p = m + c F_pad"
     source = "series elasticity (Pratt and Williamson 1995), quasi-static"
-    look_alikes = ("stiffening_contact", "viscoelastic_contact", "encoder_bias")
+    look_alikes = ("finger_creep", "stiffening_contact", "viscoelastic_contact", "encoder_bias")
     separates = "objects of several softnesses: the finger's deflection is the same for all at one force"
     parameters = (
         Parameter(

@@ -27,6 +27,7 @@ _SHIPPED = (
     "elastic_transmission",
     "encoder_bias",
     "finger_compliance",
+    "finger_creep",
     "force_bias",
     "force_crosstalk",
     "force_deadzone",

@@ -24,7 +24,7 @@ class ViscoelasticContact(Effect):
         "F = F_contact + max(0, k (δ − x)), τ dx/dt = δ − x, δ the depth of the pad in the object; x ≤ δ (following)"
     )
     source = "standard linear solid, Zener's form (Fung 1965)"
-    look_alikes = ("finger_compliance", "force_drift", "force_lag")
+    look_alikes = ("finger_compliance", "finger_creep", "force_drift", "force_lag")
     separates = "long holds: force and position relax together, and only in contact"
     parameters = (
         Parameter(

@@ -113,8 +113,10 @@ def warnings(fit: Fit, errors: np.ndarray) -> list[str]:
     entries, lines = fit.problem.entries, []
     for entry, value in zip(entries, fit.values, strict=True):
         bound = reached_bound(float(value), entry.low, entry.high, entry.logarithmic, entry.null)
-        if bound is not None:
-            lines.append(f"{entry.name} ended at its bound {bound:g} {entry.unit}: widen it or doubt the model")
+        pure = entry.unit == "1"
+        if bound is not None and not (pure and bound in (0.0, 1.0)):  # a share has all or nothing as its natural limits
+            unit = "" if pure else f" {entry.unit}"
+            lines.append(f"{entry.name} ended at its bound {bound:g}{unit}: widen it or doubt the model")
     loose = [entry.name for entry, wide in zip(entries, hardly_fixed(fit, errors), strict=True) if wide]
     if loose:
         lines.append(f"{listed(loose)} {'is' if len(loose) == 1 else 'are'} hardly fixed by these data")

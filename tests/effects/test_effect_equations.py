@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy.signal import lfilter
@@ -106,6 +108,31 @@ def test_finger_compliance_deflects_in_proportion_to_force(compliance):
     pad = np.interp(force[0], *np.array([(p.pad_force[0, 0], p.position[0, 0]) for p in rigid][::-1]).T)
     assert plant.position[0, 0] + compliance * force[0] == pytest.approx(pad, abs=1e-5)
     assert plant.position[0, 0] < rigid[4].position[0, 0]  # the encoder runs ahead
+
+
+@pytest.mark.parametrize(("share", "time_constant"), [(0.0, 0.4), (0.6, 0.4), (0.0, 1.5)])
+def test_finger_creep_deflects_with_time_and_comes_to_what_a_spring_does(share, time_constant):
+    compliance = 0.001
+    creeps = make("finger_creep", compliance, share, time_constant)
+    squeeze = np.concatenate([np.full(1000, 0.8), np.zeros(1000)])  # 2 s of it, then 2 s of rest
+    creeps.plant = SimpleNamespace(press_n=np.zeros((1, 2)))
+    shift = []
+    for force in squeeze:
+        creeps.plant.press_n[:] = force
+        shift.append(creeps.act().pad_shift_m[0, 0])
+    t = np.arange(1, 1001) * creeps.dt
+    slow = 1 - np.exp(-t / time_constant)
+    settled = t > 0.1  # what comes at once has settled by then
+    expected = compliance * 0.8 * (share + (1 - share) * slow)
+    assert np.array(shift)[:1000][settled] == pytest.approx(expected[settled], rel=1e-3)
+    after = compliance * 0.8 * (1 - share) * slow[-1] * (1 - slow)
+    assert np.array(shift)[1000:][settled] == pytest.approx(after[settled], abs=1e-8)
+    # in the plant, held for long enough, it is the spring to the last digits that matter
+    plant, spring = (
+        settle(name, values, *[0.0215] * round(10 * time_constant))
+        for name, values in (("finger_creep", creeps.values[0]), ("finger_compliance", (compliance,)))
+    )
+    assert plant.pad_force[0] == pytest.approx(spring.pad_force[0], rel=3e-3)
 
 
 class Pads:

@@ -94,7 +94,12 @@ def test_warning_at_a_bound(value, bound):
 def test_no_warning_where_an_effect_is_simply_not_there():
     fit = fit_at(random_slopes(7), noise(), "stiffening_contact", spring_n=0.0, extra_power=8.0)
     lines = warnings(fit, np.full(7, 0.01))
-    assert lines == ["stiffening_contact.extra_power ended at its bound 8 1: widen it or doubt the model"]
+    assert lines == ["stiffening_contact.extra_power ended at its bound 8: widen it or doubt the model"]
+
+
+def test_no_warning_of_a_share_that_is_all_or_nothing():
+    fit = fit_at(random_slopes(7), noise(), "finger_creep", at_once_share=0.0)
+    assert warnings(fit, np.full(7, 0.01)) == []
 
 
 def test_warning_of_a_parameter_that_nothing_fixes():
