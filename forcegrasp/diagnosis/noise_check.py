@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import ndtr, ndtri
 
+from forcegrasp.diagnosis.slow_noise import fit_slow_part, innovations
 from forcegrasp.diagnosis.stray_readings import stray_readings
 from forcegrasp.identify.cross_validation import rms
 from forcegrasp.identify.noise_floor import excess, numerical_floor
@@ -29,7 +30,7 @@ _SMALLER = 0.8
 _HEAVY = 1.2
 # Noise may lean on the reading before it by so much; slower, it can't be told from a model's error. Of noise that does
 # the state may explain this share of the mean square.
-_SLOWEST, _BY_STATE = 0.95, 0.05
+_SLOWEST, _BY_STATE = 0.98, 0.05
 # Nor is it noise if it is so many times what was assumed. Of a servo it never is: its state, which repeats no motion,
 # foretells little of what a lag or an elastic load leaves.
 _MOST_SLOW = 4.0
@@ -48,7 +49,10 @@ class Noise:
     ratio: np.ndarray  #: rms of the residuals ÷ the assumed noise, ``(C,)``
     core: np.ndarray  #: the same of the middle half of them, which tails don't reach, ``(C,)``
     affected: np.ndarray  #: which signals it concerns, ``(C,)``
-    memory: np.ndarray  #: correlation of each reading's noise with that of the reading before; 0 if white, ``(C,)``
+    #: Correlation of the slow part of each reading's noise with that of the reading before, and that part's share of
+    #: the variance, ``(C,)``; 0 if white.
+    memory: np.ndarray
+    slow_share: np.ndarray
     has_stray: np.ndarray | bool = False  #: whether single readings that are far off are all that is odd, ``(C,)``
 
     @property
@@ -83,8 +87,9 @@ def unexpected_noise(
     core = np.array([_core(residual[..., k][_present(residual[..., k], target)]) for k in range(count)])
     if not excess(residual, numerical, target):
         smaller = ratio < _SMALLER
-        return Noise(ratio, core, smaller, np.zeros(count)) if smaller.any() else None
-    clean, affected, memory = residual.copy(), np.zeros(count, bool), np.zeros(count)
+        return Noise(ratio, core, smaller, np.zeros(count), np.zeros(count)) if smaller.any() else None
+    clean, affected = residual.copy(), np.zeros(count, bool)
+    memory, slow_share = np.zeros((2, count))
     states = [predicted[..., target.axis.side_of(k)] for k in range(count)]
     partitions = [_partitions(target, state) for state in states]
     for k, (signal, state, groups) in enumerate(zip(one, states, partitions, strict=True)):
@@ -97,16 +102,17 @@ def unexpected_noise(
             continue
         if target.gripper.is_servo or ratio[k] > _MOST_SLOW:
             continue
-        new, leaning = _innovations(scores)
+        leaning, share = fit_slow_part(scores)
+        new = innovations(scores, leaning, share)
         if 0 < leaning < _SLOWEST and _is_white(new, beyond, groups) and foretold(scores, state, target) < _BY_STATE:
-            clean[..., k], affected[k], memory[k] = new, True, leaning
+            clean[..., k], affected[k], memory[k], slow_share[k] = new, True, leaning, share
     if not excess(clean, numerical, target):
-        return Noise(ratio, core, affected, memory)
+        return Noise(ratio, core, affected, memory, slow_share)
     stray = stray_readings(np.where(target.mask[..., None], residual, np.nan), partitions)
     if not stray.any() or excess(np.where(stray, np.nan, residual), numerical, target):
         return None
     has_stray = np.asarray(stray.any(axis=(0, 1)))
-    return Noise(ratio, core, has_stray, np.zeros(count), has_stray)
+    return Noise(ratio, core, has_stray, np.zeros(count), np.zeros(count), has_stray)
 
 
 def is_uneven_noise(
@@ -202,16 +208,6 @@ def _is_white(scores: np.ndarray, beyond: float, partitions: Sequence[np.ndarray
         if _at_most(float(differing), 2 * len(groups) / count, len(groups)) > _BETWEEN_GROUPS * beyond:
             return False
     return True
-
-
-def _innovations(scores: np.ndarray) -> tuple[np.ndarray, float]:
-    """What of each score ``(G, S)`` the one before does not tell, of variance 1; and their correlation."""
-    before = np.roll(scores, 1, axis=1)
-    before[:, 0] = np.nan
-    both = np.isfinite(scores) & np.isfinite(before)
-    leaning = float(np.clip(np.mean(scores[both] * before[both]), -0.99, 0.99))
-    new = np.where(both, (scores - leaning * before) / np.sqrt(1 - leaning**2), scores)
-    return new, leaning
 
 
 def foretold(values: np.ndarray, state: np.ndarray, target: Target) -> float:

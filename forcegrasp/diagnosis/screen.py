@@ -76,7 +76,7 @@ class Screen:
             few,
             rng,
             noise=None if noise is None else np.maximum(noise.ratio, 1.0),
-            memory=None if noise is None else (noise.memory, part.residual.shape[1]),
+            slow=None if noise is None else (noise.memory, noise.slow_share, part.residual.shape[1]),
         )
         beyond = some.target.beyond_noise(part.residual)
         least = _RESIMULATE_RATIO * _least_gain(few, null, beyond)

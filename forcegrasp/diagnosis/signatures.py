@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from forcegrasp.diagnosis.slow_noise import through_filter
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.effects import Effect
 from forcegrasp.effects.setting import EffectSetting
@@ -191,7 +192,7 @@ def null_gains(
     rng: np.random.Generator,
     draws: int = 400,
     noise: np.ndarray | None = None,
-    memory: tuple[np.ndarray, int] | None = None,
+    slow: tuple[np.ndarray, np.ndarray, int] | None = None,
 ) -> np.ndarray:
     """Largest gain of any signature when nothing but sensor noise is left, ``(draws,)``.
 
@@ -202,7 +203,7 @@ def null_gains(
       rng: draws the noise.
       draws: how often.
       noise: what it is ÷ what was assumed, of each signal, ``(C,)``; as assumed by default.
-      memory: correlation of each signal's noise with the reading before, ``(C,)``, and samples per grasp; by default
+      slow: memory and share of the slow part of each signal's noise, ``(C,)`` each, and samples per grasp; by default
         it is white.
     """
     if not scores:
@@ -210,24 +211,14 @@ def null_gains(
     signatures = np.stack([s.signature for group in scores for s in group], axis=1).astype(np.float32)
     if noise is not None:  # a signature adds up many readings: of heavy tails nothing is left but their variance
         signatures *= np.tile(noise, len(signatures) // len(noise))[:, None].astype(np.float32)
-    if memory is not None:
-        signatures = _through_filter(signatures, *memory)
+    if slow is not None:
+        signatures = through_filter(signatures, *slow)
     gains = np.empty(draws)
     for low in range(0, draws, 50):
         count = min(50, draws - low)
         noise = rng.standard_normal((count, len(signatures)), dtype=np.float32)
         gains[low : low + count] = np.max((noise @ signatures) ** 2, axis=1)
     return gains
-
-
-def _through_filter(signatures: np.ndarray, memory: np.ndarray, samples: int) -> np.ndarray:
-    """Signatures ``(G · samples · C, k)`` that meet white noise as these meet noise with a memory."""
-    channels = len(memory)
-    back = signatures.reshape(-1, samples, channels, signatures.shape[1])[:, ::-1].copy()
-    for sample in range(1, samples):
-        back[:, sample] += memory[:, None].astype(np.float32) * back[:, sample - 1]
-    back *= np.sqrt(1 - memory[:, None].astype(np.float32) ** 2)
-    return back[:, ::-1].reshape(signatures.shape)
 
 
 def _kinds(tried: Sequence[EffectSetting]) -> dict[tuple[type[Effect], str], list[int]]:

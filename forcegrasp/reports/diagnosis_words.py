@@ -23,6 +23,9 @@ _WHOLE = 0.1
 # Of all that is left, a phase that has so much is where it is.
 _NEARLY_ALL = 0.8
 
+# Noise is slow altogether if its slow part has so much of the variance.
+_ALL_SLOW = 0.8
+
 
 def lacks(diagnosis: Diagnosis) -> str:
     """The effects that were found, what else they could be, and how much they leave, in one sentence."""
@@ -243,8 +246,11 @@ def noise_words(diagnosis: Diagnosis) -> str:
     again = "give position_std_m and force_std_n as they are in meta.yaml, and diagnose again: a small effect may show"
     if not noise.stronger:
         return f"But the noise is smaller than that: {sizes}. What is smaller than the noise can't be seen; {again}."
-    names = [words(name) for name, leaning in zip(names, noise.memory, strict=True) if leaning > 0]
-    shape = "white in time" if not names else f"slow, as behind a filter ({', '.join(names)}), foretold by nothing"
+    slow = [k for k in range(len(names)) if noise.memory[k] > 0]
+    shape = "white in time"
+    if slow:
+        part = "in part " if min(noise.slow_share[slow]) < _ALL_SLOW else ""
+        shape = f"{part}slow, as behind a filter ({', '.join(words(names[k]) for k in slow)}), foretold by nothing"
     return (
         f"But the noise is not what was {source}: {sizes}. The residuals are {shape} and alike in all phases,"
         f" which no missing effect makes. To do: {again}."

@@ -88,6 +88,7 @@ def noise_json(diagnosis: Diagnosis) -> dict[str, Any] | None:
             "core": float(noise.core[k]),
             "heavy_tails": bool(noise.heavy_tails[k]),
             "memory": float(noise.memory[k]),
+            "slow_share": float(noise.slow_share[k]),
         }
         for k, signal in enumerate(diagnosis.target.axis.names)
         if noise.affected[k]

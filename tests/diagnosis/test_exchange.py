@@ -138,7 +138,7 @@ def test_the_search_goes_on_where_noise_seems_to_be_stronger_than_said(rubbing, 
     """An effect that is missing may look like such noise, and then it would never be looked for."""
     _, target, simulators, base = rubbing
     signals = np.ones(target.signals.shape[-1])
-    noise = Noise(times * signals, times * signals, signals > 0, 0 * signals)
+    noise = Noise(times * signals, times * signals, signals > 0, 0 * signals, 0 * signals)
     monkeypatch.setattr("forcegrasp.diagnosis.search._left", lambda *_: ("", noise))
     looked = []
 

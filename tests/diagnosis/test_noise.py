@@ -167,7 +167,7 @@ def wave(residual):
 def slow(residual, memory=0.7):
     """Each reading leans on the one before, as behind a filter."""
     out = residual.copy()
-    for k in range(1, S):
+    for k in range(1, residual.shape[1]):
         out[:, k] += memory * out[:, k - 1]
     return out
 
@@ -200,9 +200,23 @@ def test_slow_noise(seed):
     noise = unexpected_noise(residual, NOTHING, make(), GRASPS)
     assert noise is not None
     assert noise.memory[:3].tolist() == [0, 0, 0]
-    assert noise.memory[3] == pytest.approx(0.7, abs=0.05)
+    assert noise.memory[3] * noise.slow_share[3] == pytest.approx(0.7, abs=0.05)
     assert noise.ratio == pytest.approx([3, 3, 3, 1.4], rel=0.1)
     assert noise.stronger
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(("memory", "slow_std"), [(0.8, 0.8), (0.9, 0.7), (0.9, 1.5), (0.95, 0.8)])
+def test_slow_noise_beside_white(memory, slow_std, seed):
+    rng = np.random.default_rng(seed)
+    white, wandering = rng.standard_normal((2, MANY, S + 100, 4))
+    residual = (white + slow_std * np.sqrt(1 - memory**2) * slow(wandering, memory))[:, 100:]
+    nothing = (0 * residual,) * 2
+    assert excess(residual, nothing, make(MANY))
+    noise = unexpected_noise(residual, nothing, make(MANY), np.tile(GRASPS[:1], (MANY, 1, 1)))
+    assert noise is not None
+    assert noise.memory == pytest.approx(memory, abs=0.08)
+    assert noise.slow_share == pytest.approx(slow_std**2 / (1 + slow_std**2), abs=0.12)
 
 
 def test_chance_gains_more_where_noise_is_slow():
@@ -211,7 +225,8 @@ def test_chance_gains_more_where_noise_is_slow():
     signature[..., 3] = 1 / np.sqrt(G * S)
     scores = [[Score(EffectSetting.typical(get_effect("force_bias")), 1.0, signature.ravel())]]
     memory = np.array([0.9, 0.0, 0.0, 0.6])
-    white, as_is = (null_gains(scores, np.random.default_rng(0), 4000, memory=m) for m in (None, (memory, S)))
+    slow = (memory, np.ones(4), S)
+    white, as_is = (null_gains(scores, np.random.default_rng(0), 4000, slow=s) for s in (None, slow))
     assert as_is.mean() / white.mean() == pytest.approx(1.6 / 0.4, rel=0.05)
 
 
@@ -283,7 +298,7 @@ def test_chance_gains_as_much_as_the_noise_that_there_is(channel, times):
 
 
 def of(made_up, verdict: str, times: list[float], core: list[float], unlike: list[bool], memory=None, **changed):
-    noise = Noise(np.array(times), np.array(core), np.array(unlike), np.array(memory or [0.0] * 4))
+    noise = Noise(np.array(times), np.array(core), np.array(unlike), np.array(memory or [0.0] * 4), np.ones(4))
     return dataclasses.replace(made_up.diagnosis(verdict), noise=noise, left="", **changed)
 
 
@@ -299,8 +314,20 @@ def test_the_answer_tells_the_noise(made_up):
     assert "none of the effects" not in answer
     found = diagnosis_report.diagnosis_json(diagnosis, None, made_up.tried, "s")
     assert set(found["noise"]) == {"position_l", "position_r", "force_r"}
-    assert found["noise"]["force_r"] == {"times_stated": 1.7, "core": 1.1, "heavy_tails": True, "memory": 0.0}
+    assert found["noise"]["force_r"] == {
+        "times_stated": 1.7,
+        "core": 1.1,
+        "heavy_tails": True,
+        "memory": 0.0,
+        "slow_share": 1.0,
+    }
     assert found["where"]["explainable"] == 0
+
+
+def test_noise_that_is_slow_in_part_is_called_so(made_up):
+    diagnosis = of(made_up, "explained", [2.0] * 4, [2.0] * 4, [True] * 4, [0.0, 0.0, 0.9, 0.9])
+    diagnosis.noise.slow_share[:] = 0.3
+    assert "in part slow, as behind a filter (force left, force right)" in diagnosis_report.answer(diagnosis)
 
 
 def test_slow_noise_is_called_so(made_up):

@@ -20,7 +20,7 @@ from forcegrasp.reports.diagnosis_box import answer_box
 from forcegrasp.reports.next_step import after_diagnosis
 
 VERDICTS = [verdict.value for verdict in Verdict]
-NOISE = Noise(np.full(4, 1.5), np.full(4, 1.5), np.ones(4, bool), np.zeros(4))
+NOISE = Noise(np.full(4, 1.5), np.full(4, 1.5), np.ones(4, bool), np.zeros(4), np.zeros(4))
 ODD = (OddGrasp("g3", "thing 1", 9.0, "thing 0", 1.1),)
 
 
