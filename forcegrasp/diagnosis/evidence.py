@@ -111,14 +111,21 @@ def with_close_rivals(step: Step) -> Step:
 
 
 def add_nothing(candidates: Sequence[Candidate]) -> set[str]:
-    """Names of effects that contain another one of which held-out grasps say that it is enough, or nearly so."""
+    """Names of effects that contain another one of which held-out grasps say that it is enough, or nearly so.
+
+    Or that have become it: what they gain then is a quirk of how they are simulated.
+    """
     found = {c.effect.name: c for c in candidates}
     return {
         c.effect.name
         for c in candidates
         for nested in c.effect.contains
         if (simple := found.get(nested.effect)) is not None
-        and (not _leads(c, simple) or nearly_as_much(simple.heldout_gain, c.heldout_gain))
+        and (
+            not _leads(c, simple)
+            or nearly_as_much(simple.heldout_gain, c.heldout_gain)
+            or families.is_the_simpler(c.setting, nested)
+        )
     }
 
 

@@ -23,6 +23,8 @@ from forcegrasp.physics.gripper import Gripper
 
 # An effect is the simpler one if what it has beyond it is within so many standard errors of doing nothing.
 _STANDARD_ERRORS = 2.0
+# This share of a size worth noticing can't be seen.
+_NEXT_TO_NOTHING = 1e-3
 # A fit has stalled if it is worse than one of what it contains by this share.
 _WORSE = 1e-3
 
@@ -63,6 +65,17 @@ def falls_back(fit: Fit, nested: Nested) -> bool:
             step = fit.problem.gripper.integrators_differ_s
             least = max(least, entry.coordinate(value + step) - entry.coordinate(value))
         if abs(fit.vector[index] - entry.coordinate(value)) > least:
+            return False
+    return True
+
+
+def is_the_simpler(setting: EffectSetting, nested: Nested) -> bool:
+    """Whether an effect of this size is the simpler one, but for what an integrator makes of next to nothing."""
+    for name, value in nested.at.items():
+        index = setting.effect.index(name)
+        parameter = setting.effect.parameters[index]
+        apart = setting.values[index] - np.clip(value, parameter.low, parameter.high)
+        if abs(apart) > _NEXT_TO_NOTHING * parameter.typical:
             return False
     return True
 

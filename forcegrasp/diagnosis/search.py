@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from forcegrasp.diagnosis import families
+from forcegrasp.diagnosis.ask_again import ask_again
 from forcegrasp.diagnosis.evidence import LEAST_SHARE_TOGETHER, with_close_rivals
 from forcegrasp.diagnosis.exchange import exchange
 from forcegrasp.diagnosis.few import with_few
@@ -117,6 +118,9 @@ def diagnose(
     error_after, (left, noise, alone) = study.error(study.heldout(fit)), _left_by_many(study, fit)
     much_left = bool(left) and error_after > MUCH * floor
     steps = settle_ties([with_close_rivals(step) for step in steps] if much_left else steps)
+    if not much_left:  # what is still missing could decide between them again
+        steps, fit = ask_again(study, steps, fit)
+        error_after, (left, noise, alone) = study.error(study.heldout(fit)), _left_by_many(study, fit)
     found = kept_steps(steps)
     # a missing effect makes the error rough, and the base fit stop short: then only what leaves nothing is an answer
     if not base.converged and (not found or (left and error_after > _AS_GOOD_AS_NOTHING * floor)):

@@ -82,6 +82,16 @@ def test_an_effect_must_explain_more_than_the_one_it_contains(made_up, lead, red
     assert add_nothing([rich, candidate("backlash", np.full(4, 100.0))]) == set()
 
 
+@pytest.mark.parametrize(("creep", "redundant"), [(0.0, True), (1e-7, True), (5e-6, False)])
+def test_an_effect_that_has_become_the_one_it_contains_adds_nothing_whatever_it_gains(made_up, creep, redundant):
+    """Friction that fell below 0.2 µm/s held the finger for some steps, as a delay does, and was taken for it."""
+    good = made_up.diagnosis("effect").steps[0].candidates[0]
+    simple = dataclasses.replace(good, setting=EffectSetting.typical(get_effect("coulomb_friction")))
+    smooth = EffectSetting(get_effect("smooth_friction"), "", np.array([0.03, creep]))
+    rich = dataclasses.replace(good, setting=smooth, gains=2 * good.gains)
+    assert add_nothing([simple, rich]) == ({"smooth_friction"} if redundant else set())
+
+
 def jaw_with(effect: str, **values: float) -> Loaded:
     """The commands of the starter set, on a jaw with this effect: read by an encoder, with a little noise."""
     measured, gripper = example_set(), load_gripper("so101_jaw")

@@ -1,0 +1,81 @@
+"""Asks again between effects that could not be told apart, once all that was missing besides is in the model."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from functools import partial
+
+import numpy as np
+
+from forcegrasp.diagnosis.evidence import indistinguishable
+from forcegrasp.diagnosis.exchange import steps_of
+from forcegrasp.diagnosis.families import may_join, refit_as, refit_without, roughly_as
+from forcegrasp.diagnosis.needless import chained
+from forcegrasp.diagnosis.result import Candidate, Step
+from forcegrasp.diagnosis.signatures import trials
+from forcegrasp.diagnosis.study import Study
+from forcegrasp.identify.fit import Fit
+from forcegrasp.identify.side_by_side import side_by_side
+
+
+def ask_again(study: Study, steps: Sequence[Step], fit: Fit) -> tuple[list[Step], Fit]:
+    """The steps less those rivals that the whole model tells apart, or with one in the first one's place; and the fit.
+
+    Two effects may have fitted alike only because what was still missing hid the difference. Of the step that found
+    the last effect all was in the model already.
+
+    Args:
+      study: the measurements.
+      steps: that found the effects.
+      fit: with all effects.
+    """
+    left = list(steps)
+    for step in steps_of(fit, steps)[:-1]:
+        if len(step.effects) == 1:
+            continue
+        asked, fit = _asked(study, step, fit)
+        left[left.index(step)] = asked
+    return (left if left == list(steps) else chained(left, study.error(study.heldout(fit)))), fit
+
+
+def _asked(study: Study, step: Step, fit: Fit) -> tuple[Step, Fit]:
+    """A step with those of its rivals that the whole model can't tell apart; and the model with the first of them."""
+    own = step.effects[0]
+    others = [one.effect for one in fit.problem.effects if one.effect.name != own]
+    rivals = [c for c in step.candidates[1:] if c.effect.name in step.effects[1:] and may_join(c.effect, others)]
+    study.progress(f"asking again whether {' or '.join([own, *(c.effect.name for c in rivals)])}")
+    without = study.heldout(refit_without(own, fit, study))
+    fits = side_by_side([partial(_with_rival, one, fit, own, study) for one in rivals])
+    first = _judged(step.candidates[0], fit, without, study)
+    judged = [_judged(one, rival, without, study) for one, rival in zip(rivals, fits, strict=True)]
+    best = max([first, *judged], key=lambda c: c.heldout_gain)
+    if best is not first and indistinguishable(best, first):
+        best = first
+    apart = {c.effect.name for c in (first, *judged) if c is not best and not indistinguishable(best, c)}
+    names = [best.effect.name, *(n for n in step.effects if n != best.effect.name and n not in apart)]
+    as_found = sorted(
+        step.candidates, key=lambda c: names.index(c.effect.name) if c.effect.name in names else len(names)
+    )
+    return dataclasses.replace(step, effects=tuple(names), candidates=tuple(as_found)), best.fit
+
+
+def _with_rival(rival: Candidate, fit: Fit, own: str, study: Study) -> Fit:
+    """The whole model with a rival in an effect's place, from the best of the sizes that a diagnosis tries."""
+    rough = roughly_as([rival.setting, *trials([rival.effect])], fit, own, study)
+    return refit_as(rough.effects[-1], fit, own, study)
+
+
+def _judged(candidate: Candidate, fit: Fit, without: np.ndarray, study: Study) -> Candidate:
+    """A candidate by what it gains in a whole model, ``without`` being the held-out residuals of one that lacks it."""
+    held = study.heldout(fit)
+    gains = study.gains(without, held)
+    recordings = study.of_recordings(gains)
+    return dataclasses.replace(
+        candidate,
+        fit=fit,
+        gains=gains,
+        of_recordings=np.array([one.sum() for one in recordings]) if recordings else None,
+        share=study.explained(without, held),
+        error_after=study.error(held),
+    )
