@@ -109,6 +109,8 @@ _PLANS = {
         "squeezes of growing strength, and a slow release",
         ((23.8, 0.02, 0.4), (22, 0.02, 0.4), (20, 0.02, 0.4), (18, 0.02, 0.4), (26.5, 0.01, 0.2)),
     ),
+    "motor_asymmetry": _STEPS,
+    "encoder_scale": _STEPS,
     "finger_creep": Show(
         "a fast squeeze, a long hold, a partial release, another hold",
         ((26, 0.02, 0.1), (19, JUMP, 2.0), (21.5, JUMP, 1.6), (27, 0.02, 0.2)),

@@ -101,6 +101,7 @@ class Effect:
     least_steps: ClassVar[float] = 0.0  #: of its first parameter, a time, fewer physics steps are the integrator's own
     base_parameter: ClassVar[str] = ""  #: one that says the same; where a gripper has it, the effect is left out
     least_channels: ClassVar[int] = 0  #: force readings that the gripper must have for it to make a difference
+    least_motors: ClassVar[int] = 1  #: that move fingers of their own
     # of the gripper, see for_gripper
     motors: ClassVar[int] = 2
     channels: ClassVar[int] = 2

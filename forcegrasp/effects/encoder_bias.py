@@ -19,7 +19,7 @@ class EncoderBias(Effect):
     symptom = "positions are off by a constant, in free air and in contact"
     formula = "q' = q + b, per finger"
     source = "homing error"
-    look_alikes = ("coulomb_friction", "finger_compliance", "motor_offset")
+    look_alikes = ("encoder_scale", "coulomb_friction", "finger_compliance", "motor_offset")
     separates = "approaching one command from both sides: a bias does not flip; a harder servo: a bias stays as it is"
     parameters = (
         Parameter("left_m", "offset of the left encoder", "m", -0.01, 0.01, 0.0003, follows="position"),

@@ -51,7 +51,7 @@ class FingerCreep(Effect):
         ),
     )
     contains = (Nested("finger_compliance", at={"at_once_share": 1.0}, same={"compliance_m_n": "compliance_m_n"}),)
-    order = 1
+    order = 3
 
     def init(self, which: np.ndarray) -> State:
         return {"at_once": np.zeros((len(which), 2)), "creep": np.zeros((len(which), 2))}

@@ -61,6 +61,8 @@ def why_left_out(effect: type[Effect], gripper: Gripper) -> str:
         return f"is the base parameter {effect.base_parameter} of {gripper.name}"
     if effect.least_channels > len(gripper.forces):
         return f"needs {effect.least_channels} force readings; {gripper.name} has {len(gripper.forces)}"
+    if effect.least_motors > (1 if gripper.is_servo else len(gripper.motors)):
+        return f"needs {effect.least_motors} motors that move fingers; {gripper.name} has not as many"
     if not _variants(effect, _Traits.of(gripper)):
         return f"needs pads, or positions that are commanded; {gripper.name} has neither"
     return ""

@@ -207,6 +207,22 @@ def test_motor_offset_is_held_by_the_servo(target):
     assert again.position == pytest.approx(plant.position, abs=3e-5)  # wherever it comes from
 
 
+@pytest.mark.parametrize(("stiffness", "damping"), [(0.2, 0.0), (0.0, -0.3), (0.1, 0.1)])
+def test_motor_asymmetry_lets_fingers_lag_by_what_damps_over_what_pulls(stiffness, damping):
+    """On a ramp of speed v, ``K (u − q) = B v``; pressing, each finger stands off by its own spring."""
+    speed, sides = 0.004, np.array([1.0, -1.0])
+    plant = make_plant(1, [(get_effect("motor_asymmetry"), (stiffness, damping), "", [0])], "reference")
+    start(plant, [0], np.zeros(1))
+    for step in range(round(1.5 / plant.dt)):
+        target = START_M + speed * plant.dt * step
+        plant.advance(np.full((1, 2), target))
+    springs, dampers = GAIN * (1 + stiffness * sides), (9.0 + 1.0) * (1 + damping * sides)
+    assert target + speed * plant.dt - plant.position[0] == pytest.approx(dampers / springs * speed, rel=0.01)
+    pressing = settle("motor_asymmetry", (stiffness, damping), 0.0225)
+    assert springs * (pressing.position[0] - 0.0225) == pytest.approx(pressing.pad_force[0], rel=0.03)
+    assert np.ptp(pressing.pad_force) < 0.03 * pressing.pad_force.mean()  # the object goes where they are alike
+
+
 @pytest.mark.parametrize("limit", [0.1, 0.25])
 def test_force_limit_is_a_plateau(limit):
     for target in (0.012, 0.002):

@@ -578,6 +578,20 @@ def test_encoder_bias_in_the_loop_moves_the_finger(target):
         assert plant.force == pytest.approx(held, rel=0.03)
 
 
+def test_encoder_scale_moves_readings_in_proportion():
+    plant, base = settle("encoder_scale", (0.02, -0.01), 0.0225), settle("", (), 0.0225)
+    assert np.array_equal(plant.position, base.position)
+    assert plant.measured_position[0] == pytest.approx(base.position[0] * [1.02, 0.99], rel=1e-12)
+
+
+@pytest.mark.parametrize("target", [0.030, 0.042])
+def test_encoder_scale_in_the_loop_moves_the_finger(target):
+    """The servo brings what it reads to the command."""
+    plant = settle("encoder_scale", (0.02, -0.01), target, variant="loop")
+    assert plant.measured_position[0] == pytest.approx([target] * 2, abs=2e-6)
+    assert plant.position[0] == pytest.approx(target / np.array([1.02, 0.99]), abs=2e-6)
+
+
 def test_quantisation_rounds_to_the_nearest_step():
     effect = make("quantisation", 0.001, 0.25)
     force = read(effect, wave())[:, 0]
