@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
-from forcegrasp.diagnosis.evidence import LEAST_LEAD, LEAST_SHARE, is_beyond_chance
-from forcegrasp.diagnosis.families import refit_without
+from forcegrasp.diagnosis.evidence import LEAST_LEAD, LEAST_SHARE_OF_MANY, is_beyond_chance
+from forcegrasp.diagnosis.families import may_join, refit_as, refit_without
 from forcegrasp.diagnosis.faults import Fault, within_tolerance
 from forcegrasp.diagnosis.needless import drop_all_needless
 from forcegrasp.diagnosis.result import Diagnosis, Step, kept_steps
@@ -66,26 +66,55 @@ def go_on_with_moved(
     """
     if not found.left or loaded.gripper.is_servo or found.verdict in (Verdict.NOT_FITTED, Verdict.DATA):
         return None
-    fault = within_tolerance(loaded, found.target, found.fit, LEAST_SHARE)
-    if fault is None or fault.moved is None:
+    moved = _explained_by_a_move(found, loaded)
+    if moved is None:
         return None
+    fit, steps, fault = moved
     progress(f"fitting with {fault.words}")
     grasps = fault.put_right.measured.grasps
     target = dataclasses.replace(found.target, grasps=grasps)
-    case = found.fit.problem.case(found.fit.vector)
-    problem = Problem(loaded.gripper, grasps, case.effects)
+    problem = Problem(loaded.gripper, grasps, fit.problem.case(fit.vector).effects)
     simulators = Simulators(problem)
-    fit = fit_exactly(target, problem, simulators, found.fit.vector, found.fit.jacobian)
+    fit = fit_exactly(target, problem, simulators, fit.vector, fit.jacobian)
     study = Study(target, simulators, evidence_folds(target.grasps), beyond_fit(fit, found.numerical), progress)
     gains = study.gains(found.heldout(), study.heldout(fit))
-    if not is_beyond_chance(gains - fault.moved.price / len(gains), LEAST_LEAD):
+    price = 0.0 if fault.moved is None else fault.moved.price
+    if not is_beyond_chance(gains - price / len(gains), LEAST_LEAD):
         return None
     given = len(found.base.fit.problem.effects)
-    steps, fit = drop_all_needless(study, kept_steps(found.steps), fit, given)
+    steps, fit = drop_all_needless(study, steps, fit, given)
     steps, bare = _one_after_the_other(study, steps, fit)
     again = search_on(target, simulators, dataclasses.replace(found.base, fit=bare), fit, steps)
-    before, moved = found.error_before, again.error_before
-    return dataclasses.replace(again, fault=fault, error_before=before, error_moved=moved), simulators
+    before, after = found.error_before, again.error_before
+    return dataclasses.replace(again, fault=fault, error_before=before, error_moved=after), simulators
+
+
+def _explained_by_a_move(found: Diagnosis, loaded: Loaded[MeasurementSet]) -> tuple[Fit, list[Step], Fault] | None:
+    """A model of which a move explains what it leaves, the steps that found its effects, and the move."""
+    for fit, steps in _models(found):
+        fault = within_tolerance(loaded, found.target, fit, LEAST_SHARE_OF_MANY)
+        if fault is not None:
+            return fit, steps, fault
+    return None
+
+
+def _models(found: Diagnosis) -> Iterator[tuple[Fit, list[Step]]]:
+    """The final fit and its steps, and then those with a rival in the place of an effect that it can't be told from.
+
+    An encoder's scale and objects that are all too large are nearly the same, but for what is given of each object.
+    """
+    steps = kept_steps(found.steps)
+    yield found.fit, steps
+    study = Study(found.target, Simulators(found.fit.problem), found.folds)
+    for place, step in enumerate(steps):
+        own, *names = step.effects
+        others = [one.effect for one in found.fit.problem.effects if one.effect.name != own]
+        for rival in step.candidates[1:]:
+            if rival.effect.name in names and may_join(rival.effect, others):
+                candidates = (rival, *(c for c in step.candidates if c is not rival))
+                effects = (rival.effect.name, own, *(n for n in names if n != rival.effect.name))
+                first = dataclasses.replace(step, effects=effects, candidates=candidates)
+                yield refit_as(rival.setting, found.fit, own, study), [*steps[:place], first, *steps[place + 1 :]]
 
 
 def _one_after_the_other(study: Study, steps: Sequence[Step], fit: Fit) -> tuple[list[Step], Fit]:

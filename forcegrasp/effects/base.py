@@ -188,6 +188,10 @@ class Effect:
         """Commanded positions on their way to the motors, m or rad. ``fresh`` ``(rows,)``: this is a new command."""
         return command
 
+    def rests_at(self, command: np.ndarray) -> np.ndarray:
+        """Where motors have come to rest in free air by commands ``(rows, motors)``, m or rad; grasps start there."""
+        return command
+
     def motor_range(self, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Least and largest force that the motors may give in this step, N or N·m, ``(rows, motors)``."""
         return low, high

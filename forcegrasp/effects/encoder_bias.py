@@ -39,8 +39,11 @@ class EncoderBias(Effect):
     def reads_only(cls, variant: str = "") -> bool:
         return variant != "loop"
 
-    def command(self, command: np.ndarray, fresh: np.ndarray) -> np.ndarray:
+    def rests_at(self, command: np.ndarray) -> np.ndarray:
         return command if self.variant == "reading" else command - self.values
+
+    def command(self, command: np.ndarray, fresh: np.ndarray) -> np.ndarray:
+        return self.rests_at(command)
 
     def read_position(self, position: np.ndarray) -> np.ndarray:
         return position + self.values

@@ -39,8 +39,11 @@ class EncoderScale(Effect):
     def reads_only(cls, variant: str = "") -> bool:
         return variant != "loop"
 
-    def command(self, command: np.ndarray, fresh: np.ndarray) -> np.ndarray:
+    def rests_at(self, command: np.ndarray) -> np.ndarray:
         return command if self.variant == "reading" else command / (1 + self.values)
+
+    def command(self, command: np.ndarray, fresh: np.ndarray) -> np.ndarray:
+        return self.rests_at(command)
 
     def read_position(self, position: np.ndarray) -> np.ndarray:
         return position * (1 + self.values)

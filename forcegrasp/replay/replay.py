@@ -179,13 +179,16 @@ class Replay:
         if not self.gripper.is_servo:
             effects = [self._at_whole_steps(e, late_s) for e in effects]
         plant = Plant(self.gripper, n, self.tier, THREADS, self._step_factor, self._other_collisions)
-        plant.attach([(e.effect(e.values, self.dt, e.variant), e.rows) for e in effects if len(e.rows)])
-        ids = np.arange(n)
+        attached = [(e.effect(e.values, self.dt, e.variant), e.rows) for e in effects if len(e.rows)]
+        plant.attach(attached)
+        ids, start = np.arange(n), self.start_m[grasp]
+        for effect, rows in attached:
+            start[rows] = np.clip(effect.rests_at(start[rows]), 0.0, self.gripper.stroke)
         offset = write_base(plant, ids, base)
         velocity = self._start_velocity[grasp] if self.gripper.is_servo else None
         if velocity is not None and START_VELOCITY in base:
             velocity = velocity + base[START_VELOCITY][:, None]
-        plant.reset(ids, offset, self.start_m[grasp], velocity)
+        plant.reset(ids, offset, start, velocity)
         if self._earlier is not None:
             plant.recall(*self._earlier, grasp)
         position, force = (np.empty((n, self._steps, width)) for width in (plant.motors, plant.channels))

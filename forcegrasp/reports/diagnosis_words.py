@@ -23,6 +23,9 @@ _WHOLE = 0.1
 # Of all that is left, a phase that has so much is where it is.
 _NEARLY_ALL = 0.8
 
+# A set that was moved shows so if it leaves this share of the error, before any effect.
+_SHOWS = 0.99
+
 # Noise is slow altogether if its slow part has so much of the variance.
 _ALL_SLOW = 0.8
 
@@ -62,6 +65,8 @@ def fault_words(diagnosis: Diagnosis) -> str:
         moved = f"What the set gives was moved within its tolerance: {diagnosis.fault.words}"
         if diagnosis.error_moved is None:
             return f"{moved}; as given the error is {diagnosis.error_before:.2f} × noise."
+        if diagnosis.error_moved > _SHOWS * diagnosis.error_before:
+            return f"{moved}. That shows only once what follows is in the model."
         change = f"from {diagnosis.error_before:.2f} to {diagnosis.error_moved:.2f} × noise"
         return f"{moved}. That alone takes the error {change}."
     if diagnosis.fault_is_rival:

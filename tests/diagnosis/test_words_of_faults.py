@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from forcegrasp.diagnosis.faults import Fault
+from forcegrasp.diagnosis.tolerance import Moved, _Number
 from forcegrasp.effects import get_effect
 from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.identify.problem import Problem
@@ -50,6 +51,16 @@ def test_a_fault_besides_an_effect_is_told_first(made_up, fault):
     assert diagnosis_json(both, None, made_up.tried, "s")["fault"] == {
         "name": "time_scale", "words": "stamps are too long", "check": "the clock", "moved": None
     }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("error_moved", "told"), [(0.8, "That alone takes the error from"), (1.01, "That shows only once what follows")]
+)
+def test_a_move_that_lowers_no_error_alone_is_not_said_to(made_up, fault, error_moved, told):
+    found = made_up.diagnosis("effect")
+    moved = Moved((_Number("radius_m", "cup", 1e-4, np.ones(2, bool)),), np.ones(1))
+    fault = dataclasses.replace(fault, moved=moved)
+    assert told in answer(dataclasses.replace(found, fault=fault, error_moved=error_moved * found.error_before))
 
 
 @pytest.mark.parametrize(("delay_s", "told"), [(0.04, "1 row"), (0.0802, "2 rows"), (0.06, ""), (0.003, "")])
