@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from forcegrasp.diagnosis.ask_again import ask_again
+from forcegrasp.diagnosis.moved_set import _models
 from forcegrasp.diagnosis.result import Step
 from forcegrasp.effects.for_gripper import effect_of
 from forcegrasp.effects.setting import EffectSetting
@@ -19,20 +22,19 @@ FRICTION, DEADBAND, LAG = "coulomb_friction", "position_deadband", "actuator_lag
 
 
 @pytest.fixture(scope="module")
-def rubbing():
-    """A jaw with dry friction, and its base model."""
+def found():
+    """:func:`step_with` of a jaw with dry friction, each made once."""
     loaded = jaw_with(FRICTION, force_n=0.08)
-    return loaded, *fit_model(loaded, 0, silent)
+    return functools.cache(functools.partial(step_with, (loaded, *fit_model(loaded, 0, silent))))
 
 
-def tied(rubbing, *names: str) -> tuple:
+def tied(found, *names: str) -> tuple:
     """A study, a step in which these could not be told apart, one that found a lag besides, and the fit with both."""
-    study, last, fit = step_with(rubbing, names[0], LAG)
-    (found,) = last.candidates
-    settings = [EffectSetting.typical(effect_of(name, rubbing[0].gripper)) for name in names]
+    study, last, fit = found(names[0], LAG)
+    (one,) = last.candidates
+    settings = [EffectSetting.typical(effect_of(name, fit.problem.gripper)) for name in names]
     candidates = [
-        dataclasses.replace(found, setting=setting, signature=np.eye(len(names))[i])
-        for i, setting in enumerate(settings)
+        dataclasses.replace(one, setting=setting, signature=np.eye(len(names))[i]) for i, setting in enumerate(settings)
     ]
     return study, [Step(names, tuple(candidates), (), 9.0, 5.0), last], fit
 
@@ -41,16 +43,16 @@ def names_in(fit) -> set[str]:
     return {one.effect.name for one in fit.problem.effects}
 
 
-def test_a_rival_that_the_whole_model_rejects_goes(rubbing):
-    study, steps, fit = tied(rubbing, FRICTION, DEADBAND)
+def test_a_rival_that_the_whole_model_rejects_goes(found):
+    study, steps, fit = tied(found, FRICTION, DEADBAND)
     left, same = ask_again(study, steps, fit)
     assert [step.effects for step in left] == [(FRICTION,), (LAG,)]
     assert same is fit
     assert left[1].error_after == pytest.approx(study.error(study.heldout(fit)))
 
 
-def test_a_rival_that_does_better_takes_the_place(rubbing):
-    study, steps, fit = tied(rubbing, DEADBAND, FRICTION)
+def test_a_rival_that_does_better_takes_the_place(found):
+    study, steps, fit = tied(found, DEADBAND, FRICTION)
     left, better = ask_again(study, steps, fit)
     assert [step.effects for step in left] == [(FRICTION,), (LAG,)]
     assert names_in(better) == {FRICTION, LAG}
@@ -59,15 +61,38 @@ def test_a_rival_that_does_better_takes_the_place(rubbing):
     assert left[1].error_after == pytest.approx(study.error(study.heldout(better)))
 
 
-def test_what_the_whole_model_can_not_tell_apart_stays_tied(rubbing):
-    study, steps, fit = tied(rubbing, FRICTION, "presliding")
+def test_what_the_whole_model_can_not_tell_apart_stays_tied(found):
+    study, steps, fit = tied(found, FRICTION, "presliding")
     left, same = ask_again(study, steps, fit)
     assert left == steps
     assert same is fit
 
 
-def test_of_the_last_step_all_was_in_the_model(rubbing, monkeypatch):
-    study, steps, fit = tied(rubbing, FRICTION, DEADBAND)
+def test_of_the_last_step_all_was_in_the_model(found, monkeypatch):
+    study, steps, fit = tied(found, FRICTION, DEADBAND)
     monkeypatch.setattr("forcegrasp.diagnosis.ask_again._asked", lambda *_: pytest.fail("asked again"))
     alone = [dataclasses.replace(steps[0], effects=(FRICTION,)), dataclasses.replace(steps[1], effects=(LAG, DEADBAND))]
     assert ask_again(study, alone, fit) == (alone, fit)
+
+
+# --- which models are asked whether a move of what the set gives explains what they leave ---------------------------
+
+
+def test_a_rival_is_asked_in_the_place_of_what_it_can_not_be_told_from(found):
+    study, steps, fit = tied(found, FRICTION, DEADBAND)
+    diagnosis = SimpleNamespace(fit=fit, steps=steps, target=study.target, folds=study.folds)
+    (own, as_found), (rival, other) = _models(diagnosis)
+    assert own is fit
+    assert as_found == steps
+    assert names_in(rival) == {DEADBAND, LAG}
+    assert rival.cost > own.cost
+    assert other[0].effects == (DEADBAND, FRICTION)
+    assert [c.effect.name for c in other[0].candidates] == [DEADBAND, FRICTION]
+    assert other[1] is steps[1]
+
+
+@pytest.mark.parametrize("rivals", [(FRICTION,), (FRICTION, LAG)])
+def test_what_is_alone_or_in_the_model_already_has_no_rival_to_ask(found, rivals):
+    study, steps, fit = tied(found, *rivals)
+    diagnosis = SimpleNamespace(fit=fit, steps=steps, target=study.target, folds=study.folds)
+    assert [one for one, _ in _models(diagnosis)] == [fit]
