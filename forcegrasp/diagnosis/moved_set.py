@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
 
 from forcegrasp.diagnosis.evidence import LEAST_LEAD, LEAST_SHARE_OF_MANY, is_beyond_chance
 from forcegrasp.diagnosis.families import may_join, refit_as, refit_without
@@ -66,55 +69,105 @@ def go_on_with_moved(
     """
     if not found.left or loaded.gripper.is_servo or found.verdict in (Verdict.NOT_FITTED, Verdict.DATA):
         return None
-    moved = _explained_by_a_move(found, loaded)
-    if moved is None:
+    models = [_with_move(model, found, loaded) for model in _models(found)]
+    best = min((one for one in models if one.fault is not None), key=lambda one: one.price, default=None)
+    if best is None or best.fault is None:
         return None
-    fit, steps, fault = moved
-    progress(f"fitting with {fault.words}")
-    grasps = fault.put_right.measured.grasps
-    target = dataclasses.replace(found.target, grasps=grasps)
-    problem = Problem(loaded.gripper, grasps, fit.problem.case(fit.vector).effects)
-    simulators = Simulators(problem)
-    fit = fit_exactly(target, problem, simulators, fit.vector, fit.jacobian)
-    study = Study(target, simulators, evidence_folds(target.grasps), beyond_fit(fit, found.numerical), progress)
-    gains = study.gains(found.heldout(), study.heldout(fit))
-    price = 0.0 if fault.moved is None else fault.moved.price
-    if not is_beyond_chance(gains - price / len(gains), LEAST_LEAD):
+    progress(f"fitting with {best.fault.words}")
+    target, simulators = best.target, Simulators(best.fit.problem)
+    numerical = beyond_fit(best.fit, found.numerical)
+    study = Study(target, simulators, evidence_folds(target.grasps), numerical, progress)
+    if not is_beyond_chance(_lead(best, _Model(found.fit, found.target, []), study), LEAST_LEAD):
         return None
     given = len(found.base.fit.problem.effects)
-    steps, fit = drop_all_needless(study, steps, fit, given)
+    steps, fit = drop_all_needless(study, _with_rivals_that_do_as_well(best, models, study), best.fit, given)
     steps, bare = _one_after_the_other(study, steps, fit)
     again = search_on(target, simulators, dataclasses.replace(found.base, fit=bare), fit, steps)
     before, after = found.error_before, again.error_before
-    return dataclasses.replace(again, fault=fault, error_before=before, error_moved=after), simulators
+    return dataclasses.replace(again, fault=best.fault, error_before=before, error_moved=after), simulators
 
 
-def _explained_by_a_move(found: Diagnosis, loaded: Loaded[MeasurementSet]) -> tuple[Fit, list[Step], Fault] | None:
-    """A model of which a move explains what it leaves, the steps that found its effects, and the move."""
-    for fit, steps in _models(found):
-        fault = within_tolerance(loaded, found.target, fit, LEAST_SHARE_OF_MANY)
-        if fault is not None:
-            return fit, steps, fault
-    return None
+@dataclass(frozen=True, eq=False)
+class _Model:
+    """A model with all that was found, or with a rival in the place of an effect that it can't be told from."""
+
+    fit: Fit
+    target: Target
+    steps: list[Step]
+    place: int = -1  #: of the step whose rival it has; none by default
+    fault: Fault | None = None  #: what was moved, if that explains some of what the model leaves
+
+    @property
+    def move_costs(self) -> float:
+        """See :attr:`.Moved.price`."""
+        return 0.0 if self.fault is None or self.fault.moved is None else self.fault.moved.price
+
+    @property
+    def price(self) -> float:
+        """Squares that it leaves, and those that its move is worth."""
+        return self.fit.cost + 2 * self.move_costs
 
 
-def _models(found: Diagnosis) -> Iterator[tuple[Fit, list[Step]]]:
-    """The final fit and its steps, and then those with a rival in the place of an effect that it can't be told from.
+def _models(found: Diagnosis) -> Iterator[_Model]:
+    """The final model, and then each that has a rival.
 
     An encoder's scale and objects that are all too large are nearly the same, but for what is given of each object.
     """
     steps = kept_steps(found.steps)
-    yield found.fit, steps
+    yield _Model(found.fit, found.target, steps)
     study = Study(found.target, Simulators(found.fit.problem), found.folds)
     for place, step in enumerate(steps):
         own, *names = step.effects
         others = [one.effect for one in found.fit.problem.effects if one.effect.name != own]
         for rival in step.candidates[1:]:
-            if rival.effect.name in names and may_join(rival.effect, others):
+            name = rival.effect.name
+            if name in names and may_join(rival.effect, others):
                 candidates = (rival, *(c for c in step.candidates if c is not rival))
-                effects = (rival.effect.name, own, *(n for n in names if n != rival.effect.name))
+                effects = (name, own, *(n for n in names if n != name))
                 first = dataclasses.replace(step, effects=effects, candidates=candidates)
-                yield refit_as(rival.setting, found.fit, own, study), [*steps[:place], first, *steps[place + 1 :]]
+                fit = refit_as(rival.setting, found.fit, own, study)
+                yield _Model(fit, found.target, [*steps[:place], first, *steps[place + 1 :]], place)
+
+
+def _with_move(model: _Model, found: Diagnosis, loaded: Loaded[MeasurementSet]) -> _Model:
+    """The model on the set as moved, if a move within the tolerance explains some of what it leaves."""
+    fault = within_tolerance(loaded, found.target, model.fit, LEAST_SHARE_OF_MANY)
+    if fault is None:
+        return model
+    target = dataclasses.replace(found.target, grasps=fault.put_right.measured.grasps)
+    problem = Problem(loaded.gripper, target.grasps, model.fit.problem.case(model.fit.vector).effects)
+    fit = fit_exactly(target, problem, Simulators(problem), model.fit.vector, model.fit.jacobian)
+    return dataclasses.replace(model, fit=fit, target=target, fault=fault)
+
+
+def _lead(best: _Model, other: _Model, study: Study) -> np.ndarray:
+    """By how much each held-out grasp speaks for a model and its move, and against another, ``(G,)``."""
+    gains = study.gains(study.heldout(other.fit), study.heldout(best.fit))
+    return gains - (best.move_costs - other.move_costs) / len(gains)
+
+
+def _with_rivals_that_do_as_well(best: _Model, models: Sequence[_Model], study: Study) -> list[Step]:
+    """The steps of the best model with those rivals that its move does not tell from it, as theirs has them.
+
+    What others left before the move is no measure of them now.
+    """
+    steps = [dataclasses.replace(step, candidates=step.candidates[:1], effects=step.effects[:1]) for step in best.steps]
+    for other in models:
+        place = other.place if best.place < 0 else best.place
+        if other is best or (best.place >= 0 and other.place not in (-1, place)):
+            continue
+        step, own = steps[place], best.steps[place].candidates[0].effect
+        rival = other.steps[place].candidates[0]
+        least = LEAST_LEAD if own.of_set != rival.effect.of_set else 0.0
+        if is_beyond_chance(_lead(best, other, study), least):
+            continue
+        setting = next(one for one in other.fit.effects if one.effect.name == rival.effect.name)
+        error = study.error(study.heldout(other.fit))
+        rival = dataclasses.replace(rival, setting=setting, fit=other.fit, error_after=error)
+        steps[place] = dataclasses.replace(
+            step, effects=(*step.effects, rival.effect.name), candidates=(*step.candidates, rival)
+        )
+    return steps
 
 
 def _one_after_the_other(study: Study, steps: Sequence[Step], fit: Fit) -> tuple[list[Step], Fit]:

@@ -80,7 +80,7 @@ def diagnose(
         steps.append(Step((rounding.effect.name,), (), (), error_before, study.error(study.heldout(fit))))
     screen, tried_anyway = Screen(effects, study), False
     believed: tuple[list[Step], Fit, Study] | None = None  # what is, if the rest explains too little in the end
-    for _ in range(MOST_EFFECTS):
+    for _ in range(MOST_EFFECTS if start is None or _is_worth_looking(study, fit) else 0):
         untried = left_to_try(effects, fit, steps)
         richer = list(families.extensions(fit, effects))
         if not untried and not richer:
@@ -106,9 +106,8 @@ def diagnose(
             target, study = weighed, dataclasses.replace(study, target=weighed)
         step, fit = drop_needless(study, step, fit, len(base.fit.problem.effects))
         steps.append(step)
-        left, noise = _left(study, fit)
-        if not left and (noise is None or not noise.stronger):
-            break  # what seems to be stronger noise may hide an effect: only that none is found tells
+        if not _is_worth_looking(study, fit):
+            break
     steps, fit = simplify(study, steps, fit, len(base.fit.problem.effects))
     steps, fit = merge(study, steps, fit, effects, len(base.fit.problem.effects))
     steps, fit = _look_beside_all(study, steps, fit, simulators)
@@ -193,6 +192,12 @@ def _left_by_many(study: Study, fit: Fit) -> tuple[str, Noise | None, str]:
             grasp, error = target.grasps[index], rms_of_grasps(fit.residual, target)[index]
             return "", noise, f"grasp {grasp.name} of {grasp.object} ({error:.2f} × noise)"
     return left, None, ""
+
+
+def _is_worth_looking(study: Study, fit: Fit) -> bool:
+    """Whether a model leaves more than noise, or what seems to be stronger noise: only that none is found tells."""
+    left, noise = _left(study, fit)
+    return bool(left) or (noise is not None and noise.stronger)
 
 
 def _left(study: Study, fit: Fit) -> tuple[str, Noise | None]:

@@ -10,7 +10,7 @@ from forcegrasp.identify.verdict import Verdict
 EXPLAINED = 0.5
 #: Where more than so many times the floor is left, they must explain this share of it: a look-alike takes half.
 FAR, EXPLAINED_FAR = 2.0, 0.9
-#: An answer that leaves more than so many times the floor says so first.
+#: Where an answer leaves more than so many times the floor, what is still missing may have decided between rivals.
 MUCH = 1.5
 
 

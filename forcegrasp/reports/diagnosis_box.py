@@ -25,6 +25,9 @@ from forcegrasp.reports.diagnosis_words import (
 from forcegrasp.reports.html import Answer, Command
 from forcegrasp.reports.law import law_words
 
+# Below so many times the floor noise of another kind may be all that is left.
+_SURELY = 1.2
+
 
 def answer_box(diagnosis: Diagnosis, advice: Advice | None, commands: Sequence[Command], note: str = "") -> Answer:
     """The answer and what it is worth.
@@ -73,7 +76,13 @@ def certainty(diagnosis: Diagnosis) -> str:
     if d.verdict is Verdict.EXPLAINED:
         return f"No effect lowers the error {judged} by more than chance. Effects that leave no trace are not excluded."
     if d.verdict is Verdict.UNKNOWN:
-        return f"Sure that something is missing: the error {judged} is far beyond the noise. What it is, is not known."
+        error = f"the error {judged} is {d.error_after:.2f} × the sensor noise, and {d.floor:.2f} would be noise"
+        if d.error_after > _SURELY * d.floor:
+            return f"Sure that something is missing: {error}. What it is, is not known."
+        return (
+            f"Something small seems to be missing: {error}. Noise that is neither even nor white would look alike: a"
+            " motion that is recorded twice tells them apart."
+        )
     if weakest is None and d.fault is not None:
         share = f"{d.error_after / d.error_before:.0%} of the error that they had"
         return f"Judged {judged}: with the set put right {share} is left, and no effect lowers it by more than chance."

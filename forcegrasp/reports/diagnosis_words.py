@@ -8,7 +8,7 @@ from forcegrasp.diagnosis.evidence import may_be_besides
 from forcegrasp.diagnosis.faults import Fault
 from forcegrasp.diagnosis.late_rows import row_s
 from forcegrasp.diagnosis.result import Candidate, Diagnosis, Step, kept_steps
-from forcegrasp.diagnosis.verdict import EXPLAINED_FAR, MUCH
+from forcegrasp.diagnosis.verdict import EXPLAINED_FAR
 from forcegrasp.effects.for_gripper import effect_of
 from forcegrasp.identify.cross_validation import heldout_residual, rms_of_recordings
 from forcegrasp.identify.intervals import listed
@@ -16,6 +16,9 @@ from forcegrasp.identify.verdict import Verdict
 from forcegrasp.reports.comparison import covariate_words, words
 from forcegrasp.reports.findings import found_parameters, where
 from forcegrasp.short_repr import counted
+
+# An answer that leaves more than so many times the floor says so first.
+_MORE = 1.2
 
 # A delay is one of whole rows if it is that close to it.
 _WHOLE = 0.1
@@ -39,7 +42,7 @@ def lacks(diagnosis: Diagnosis) -> str:
     if diagnosis.verdict is Verdict.DATA:
         faults = [_named(diagnosis.fault)] if diagnosis.fault is not None else []
         faults += [_of_step(step, diagnosis) for step in steps]
-        return f"Not the model but the set seems to be wrong: {listed(faults)}."
+        return f"{_but(diagnosis)}Not the model but the set seems to be wrong: {listed(faults)}."
     if len(steps) == 1 and len(steps[0].effects) > 1:
         names = f"{listed(steps[0].effects, 'or')}: {_undecided(steps[0])}"
     else:
@@ -158,7 +161,7 @@ def preference(step: Step) -> str:
 def is_not_all(diagnosis: Diagnosis) -> bool:
     """Whether the effects that were found leave so much that more must be missing."""
     d = diagnosis
-    return bool(d.left) and (d.error_after > MUCH * d.floor or d.explained < EXPLAINED_FAR)
+    return bool(d.left) and (d.error_after > _MORE * d.floor or d.explained < EXPLAINED_FAR)
 
 
 def besides(diagnosis: Diagnosis) -> Candidate | None:

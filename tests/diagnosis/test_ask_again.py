@@ -81,18 +81,18 @@ def test_of_the_last_step_all_was_in_the_model(found, monkeypatch):
 def test_a_rival_is_asked_in_the_place_of_what_it_can_not_be_told_from(found):
     study, steps, fit = tied(found, FRICTION, DEADBAND)
     diagnosis = SimpleNamespace(fit=fit, steps=steps, target=study.target, folds=study.folds)
-    (own, as_found), (rival, other) = _models(diagnosis)
-    assert own is fit
-    assert as_found == steps
-    assert names_in(rival) == {DEADBAND, LAG}
-    assert rival.cost > own.cost
-    assert other[0].effects == (DEADBAND, FRICTION)
-    assert [c.effect.name for c in other[0].candidates] == [DEADBAND, FRICTION]
-    assert other[1] is steps[1]
+    own, rival = _models(diagnosis)
+    assert (own.fit, own.steps, own.place) == (fit, steps, -1)
+    assert names_in(rival.fit) == {DEADBAND, LAG}
+    assert rival.price > own.price
+    assert rival.place == 0
+    assert rival.steps[0].effects == (DEADBAND, FRICTION)
+    assert [c.effect.name for c in rival.steps[0].candidates] == [DEADBAND, FRICTION]
+    assert rival.steps[1] is steps[1]
 
 
 @pytest.mark.parametrize("rivals", [(FRICTION,), (FRICTION, LAG)])
 def test_what_is_alone_or_in_the_model_already_has_no_rival_to_ask(found, rivals):
     study, steps, fit = tied(found, *rivals)
     diagnosis = SimpleNamespace(fit=fit, steps=steps, target=study.target, folds=study.folds)
-    assert [one for one, _ in _models(diagnosis)] == [fit]
+    assert [one.fit for one in _models(diagnosis)] == [fit]
