@@ -32,6 +32,7 @@ from forcegrasp.reports.comparison import (
 from forcegrasp.reports.diagnosis_words import (
     besides_sentence,
     fault_words,
+    is_of_labels,
     lacks,
     left_sentence,
     left_share,
@@ -143,7 +144,7 @@ def _of_model(diagnosis: Diagnosis) -> str:
     d, cell, noise = diagnosis, worst_cell(remaining(diagnosis).cells()), noise_words(diagnosis)
     found = listed([*([d.fault.name] if d.verdict is Verdict.DATA and d.fault else []), *d.preferred] or [""])
     place = f"{words(cell.signal)}, {words(cell.phase)} ({cell.ratio:.1f} × noise)"
-    if d.verdict is Verdict.DATA and not d.steps:  # labels
+    if is_of_labels(d):
         return lacks(d)
     if d.verdict.names_effects:
         change = f"from {d.error_of_base:.2f} to {d.error_after:.2f} ×"
@@ -210,7 +211,9 @@ def _value(effect: type[Effect], name: str, value: float, digits: int) -> str:
 
 def lines(diagnosis: Diagnosis, advice: Advice | None) -> list[str]:
     """What stands below the table: symptoms, rivals, what is left, and what to record next."""
-    text = []
+    text: list[str] = []
+    if is_of_labels(diagnosis):  # the fit was led astray, and what it says of the gripper is nothing to go by
+        return [noise_sentence(diagnosis.target)]
     for step, before in found_steps(diagnosis):
         effect = effect_of(step.effects[0], diagnosis.target.gripper)
         text.append(f"{effect.name}: {_symptom(step, before, diagnosis)}")

@@ -14,6 +14,7 @@ from forcegrasp.reports.diagnosis_words import (
     fault_words,
     foretells_no_better,
     is_not_all,
+    is_of_labels,
     lacks,
     left_sentence,
     left_share,
@@ -45,13 +46,14 @@ def answer_box(diagnosis: Diagnosis, advice: Advice | None, commands: Sequence[C
     left = left_sentence(d).removeprefix("what is left is ")
     # of rivals the next command tells which grasp to record
     record = advice.sentence().removeprefix("record next: ") if advice and d.verdict is not Verdict.ONE_OF else ""
+    shows_rest = (found or d.verdict is Verdict.UNKNOWN) and not is_of_labels(d)
     rows = [
         ("The set", fault_words(d) if found else ""),
         ("Explains", shares_sentence(d) if found else ""),
         ("Error", f"{fall}; up to {d.floor:.2f} is noise." if found and d.steps else ""),
         ("How sure", certainty(d)),
         ("Runner-up", runner_up(d) if d.verdict.lacks_effects else ""),
-        ("What is left", f"{left[0].upper()}{left[1:]}." if found or d.verdict is Verdict.UNKNOWN else ""),
+        ("What is left", f"{left[0].upper()}{left[1:]}." if shows_rest else ""),
         ("Perhaps", f"{more}." if (more := besides_sentence(d)) else ""),
         ("A law", f"{law_words(d.law)}." if d.law is not None else ""),
         ("Noise", noise_words(d) if found else ""),

@@ -36,7 +36,7 @@ _ALL_SLOW = 0.8
 def lacks(diagnosis: Diagnosis) -> str:
     """The effects that were found, what else they could be, and how much they leave, in one sentence."""
     steps = kept_steps(diagnosis.steps)
-    if diagnosis.verdict is Verdict.DATA and not steps and diagnosis.fault is None:
+    if is_of_labels(diagnosis):
         seems = f"Not the model but the set seems to be wrong: {odd_words(diagnosis)}"
         return f"{seems}. Put their labels right, or leave them out."
     if diagnosis.verdict is Verdict.DATA:
@@ -48,6 +48,11 @@ def lacks(diagnosis: Diagnosis) -> str:
     else:
         names = listed([_with_rivals(step) for step in steps])
     return f"{_but(diagnosis)}The model lacks {names}."
+
+
+def is_of_labels(diagnosis: Diagnosis) -> bool:
+    """Whether grasps have the labels of others, so that nothing else was looked for."""
+    return diagnosis.verdict is Verdict.DATA and not diagnosis.steps and diagnosis.fault is None
 
 
 def odd_words(diagnosis: Diagnosis) -> str:

@@ -192,8 +192,9 @@ def test_labels_that_are_wrong_are_put_right_before_anything_is_fitted(made_up):
     assert "grasp g3 of thing 1 (9.0 × noise; 1.1 as one of thing 0)" in answer.what
     told = dict(answer.rows)
     assert told["How sure"] == "Judged by a fit of all other grasps."
-    assert not {"Explains", "Error", "Runner-up"} & set(told)
+    assert not {"Explains", "Error", "Runner-up", "What is left"} & set(told)
     assert [c.purpose for c in answer.commands] == ["put the set right, and diagnose again"]
+    assert [line.partition(":")[0] for line in diagnosis_report.lines(labels, None)] == ["sensor noise"]
 
 
 def test_a_set_that_was_put_right_is_judged_by_what_that_leaves(made_up):
