@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from forcegrasp.diagnosis.even_stamps import are_even_in_truth, evenly, scatter_s
 from forcegrasp.diagnosis.felt_sizes import SEEN_M, doubtful_radii
 from forcegrasp.diagnosis.late_side import command_row_later, late_side
 from forcegrasp.diagnosis.shifted_rows import WORTH_A_FIT, left_by_shift
@@ -100,6 +101,10 @@ def suspects(loaded: Loaded[MeasurementSet], target: Target, fit: Fit) -> list[F
         words = f"time stamps are {times(factor)} for commands {loaded.gripper.period_s:g} s apart"
         right = _changed(loaded, lambda _, g: _slower(g, 1 / factor))
         found.append(Fault("time_scale", words, "the clock and unit of t_s", right))
+    if are_even_in_truth(target, fit):
+        words = f"time stamps scatter by {1e3 * scatter_s(target):.2g} ms, and what was read is even in time"
+        check = "whether rows are stamped when they are read, and not when they are written"
+        found.append(Fault("uneven_stamps", words, check, _changed(loaded, lambda _, g: evenly(g))))
     if (tare := find_tare(measured)) is not None:
         tare = _sharper(tare, target, fit)
         first = measured.grasps[tare.first].name

@@ -196,6 +196,12 @@ def row_early(values: np.ndarray) -> np.ndarray:
     ("measured", "name", "told", "change"),
     [
         ("sound", "time_scale", "2 times too long", lambda i, g: {"time_s": 2 * g.time_s}),
+        (
+            "sound",
+            "uneven_stamps",
+            "time stamps scatter by 5",
+            lambda i, g: {"time_s": g.time_s + np.random.default_rng(i).uniform(-0.009, 0.009, len(g.time_s))},
+        ),
         ("sound", "force_tare", "at grasp 4", lambda i, g: {"force_n": g.force_n - [0.2 * (i >= 4), 0.0]}),
         (
             "pressed_harder",
