@@ -68,10 +68,17 @@ def diagnose_set(
     def search_on(target: Target, simulators: Simulators, base: BaseFit, fit: Fit, steps: Sequence[Step]) -> Diagnosis:
         return search(target, simulators, base, (fit, steps))
 
+    def moved(found: Diagnosis, of_set: Loaded[MeasurementSet]) -> tuple[Diagnosis, Simulators] | None:
+        further = go_on_with_moved(found, of_set, search_on, progress)
+        if further is None and found.bolder is not None:
+            further = go_on_with_moved(found.bolder, of_set, search_on, progress)
+            return further if further is not None and not further[0].left else None
+        return further
+
     def as_said() -> tuple[Diagnosis, Simulators]:
         target, simulators, base = said
         found = search(target, simulators, base)
-        further = go_on_with_moved(found, loaded, search_on, progress)
+        further = moved(found, loaded)
         return further or (within_tolerance_after_all(found, loaded), simulators)
 
     said = fitted(loaded)
@@ -98,7 +105,7 @@ def diagnose_set(
             fault, right = better
             further = search(*right)
             # what is a little off besides shows once the fault does not hide it
-            on_moved = None if fault.moved else go_on_with_moved(further, fault.put_right, search_on, progress)
+            on_moved = None if fault.moved else moved(further, fault.put_right)
             if on_moved is not None:
                 further, simulators = on_moved
                 right, fault = (further.target, simulators, further.base), besides(fault, further.fault)

@@ -154,6 +154,9 @@ class Diagnosis(ShortRepr):
     law_sought: bool = False  #: whether one was looked for
     fault: Fault | None = None  #: of the set: put right in all of the above; or else the last of the rivals
     error_moved: float | None = None  #: before any effect, with the set moved or put right; None if it was not
+    #: The same with effects that explain too little to be believed, if there are; a move within tolerance may bear
+    #: them out.
+    bolder: Diagnosis | None = None
     alone: str = ""  #: the one grasp that shows more than noise, in words, where all others show none; empty if none
 
     @property

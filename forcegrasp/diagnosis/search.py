@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from forcegrasp.diagnosis.look_beside import look_beside
 from forcegrasp.diagnosis.merge import merge
 from forcegrasp.diagnosis.needless import chained, drop_needless, simplify
 from forcegrasp.diagnosis.noise_check import Noise, unexpected_noise
-from forcegrasp.diagnosis.odd_grasps import odd_grasps
+from forcegrasp.diagnosis.odd_grasps import OddGrasp, odd_grasps
 from forcegrasp.diagnosis.result import Diagnosis, Step, kept_steps, settle_ties
 from forcegrasp.diagnosis.screen import Screen
 from forcegrasp.diagnosis.split import split
@@ -111,9 +112,30 @@ def diagnose(
     steps, fit = simplify(study, steps, fit, len(base.fit.problem.effects))
     steps, fit = merge(study, steps, fit, effects, len(base.fit.problem.effects))
     steps, fit = _look_beside_all(study, steps, fit, simulators)
-    if believed is not None and not _convincing(believed[2], believed[1], study, fit):
-        steps, fit, study = believed
-        target = study.target
+    begun = _Begun(base, first, numerical, odd, folds, error_before, floor)
+    found = _concluded(begun, study, steps, fit)
+    if believed is None or _convincing(believed[2], believed[1], study, fit):
+        return found
+    steps, fit, study = believed
+    return dataclasses.replace(_concluded(begun, study, steps, fit), bolder=found)
+
+
+@dataclass(frozen=True, eq=False)
+class _Begun:
+    """What a search began with."""
+
+    base: BaseFit
+    fit: Fit
+    numerical: tuple[np.ndarray, ...]
+    odd: tuple[OddGrasp, ...]
+    folds: tuple[np.ndarray, ...]
+    error: float
+    floor: float
+
+
+def _concluded(begun: _Begun, study: Study, steps: Sequence[Step], fit: Fit) -> Diagnosis:
+    """What the steps of a search, and a fit with all effects that they found, add up to."""
+    base, target, floor, error_before = begun.base, study.target, begun.floor, begun.error
     error_after, (left, noise, alone) = study.error(study.heldout(fit)), _left_by_many(study, fit)
     much_left = bool(left) and error_after > MUCH * floor
     steps = settle_ties([with_close_rivals(step) for step in steps] if much_left else steps)
@@ -123,7 +145,9 @@ def diagnose(
     found = kept_steps(steps)
     # a missing effect makes the error rough, and the base fit stop short: then only what leaves nothing is an answer
     if not base.converged and (not found or (left and error_after > _AS_GOOD_AS_NOTHING * floor)):
-        return Diagnosis(Verdict.NOT_FITTED, (), (), base, base.fit, target, folds, error_before, error_before, odd=odd)
+        return Diagnosis(
+            Verdict.NOT_FITTED, (), (), base, base.fit, target, begun.folds, error_before, error_before, odd=begun.odd
+        )
     only_of_set = all(s.candidates and s.candidates[0].effect.of_set for s in found)
     verdict = conclude(
         [s.verdict for s in found if s.verdict],
@@ -137,10 +161,11 @@ def diagnose(
     names = [s.effects[0] for s in found] if verdict.names_effects else []
     if verdict is Verdict.ONE_OF:
         names += [name for s in found for name in s.effects[1:]]
-    if fit is not first:  # what was missing may have made them odd
+    numerical, odd = begun.numerical, begun.odd
+    if fit is not begun.fit:  # what was missing may have made them odd
         numerical, odd = numerical_error(fit, target), odd_grasps(target, fit)
     return Diagnosis(
-        verdict, tuple(dict.fromkeys(names)), tuple(steps), base, fit, target, folds, error_before, error_after,
+        verdict, tuple(dict.fromkeys(names)), tuple(steps), base, fit, target, begun.folds, error_before, error_after,
         numerical, floor, left, odd, noise, alone=alone,
     )  # fmt: skip
 

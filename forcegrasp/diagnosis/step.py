@@ -12,7 +12,6 @@ from forcegrasp.diagnosis.evidence import (
     LEAST_RISE,
     LEAST_SHARE,
     LEAST_SHARE_OF_MANY,
-    LEAST_SHARE_TOGETHER,
     add_nothing,
     indistinguishable,
     is_beyond_chance,
@@ -38,6 +37,9 @@ from forcegrasp.identify.target import Target
 
 #: An effect must lower the error of some signal in some phase by this share; by more where all is at the floor already.
 LEAST_GAIN, LEAST_GAIN_AT_FLOOR = 0.02, 0.1
+# What all signatures together promise, so that effects that explain little each are tried: straight as they are, they
+# promise less than effects explain, and what a set gives may be off besides.
+_WORTH_A_TRIAL = 0.4
 # Refitted per step: signatures only rank.
 _REFITTED = 5
 # So many are, where none promises enough.
@@ -140,9 +142,7 @@ class _Start:
 
     def may_be_of_many(self, candidate: Candidate, share_together: float) -> bool:
         """Whether an effect that explains little is worth a trial: all signatures together must promise enough."""
-        return (
-            is_significant(candidate, self.least_gain, LEAST_SHARE_OF_MANY) and share_together >= LEAST_SHARE_TOGETHER
-        )
+        return is_significant(candidate, self.least_gain, LEAST_SHARE_OF_MANY) and share_together >= _WORTH_A_TRIAL
 
     def refit(self, scores: Sequence[Score], null: np.ndarray) -> list[Candidate]:
         """Rough fits with one more effect, from where the best signatures put them."""

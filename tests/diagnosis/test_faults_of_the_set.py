@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import importlib
 from types import SimpleNamespace
 
 import numpy as np
@@ -404,6 +405,24 @@ def test_a_sound_set_has_neither_suspects_nor_odd_grasps(sound, refitted):
     assert odd_grasps(target, base.fit) == ()
     everywhere = dataclasses.replace(base.fit, residual=np.where(target.mask[..., None], 9.0, 0.0))
     assert odd_grasps(target, everywhere) == ()
+
+
+@pytest.mark.parametrize(("left", "believed"), [("", True), ("in all", False)])
+def test_effects_on_trial_are_believed_where_a_move_beside_them_leaves_nothing(
+    sound, made_up, monkeypatch, left, believed
+):
+    loaded, model = sound
+    bolder = dataclasses.replace(made_up.diagnosis("effect"), left="in all")
+    found = dataclasses.replace(made_up.diagnosis("unknown"), bolder=bolder)
+    moved = dataclasses.replace(bolder, left=left)
+    module = importlib.import_module("forcegrasp.diagnosis.diagnose_set")
+    monkeypatch.setattr(module, "diagnose", lambda *_: found)
+    monkeypatch.setattr(module, "suspects", lambda *_: [])
+    monkeypatch.setattr(module, "go_on_with_moved", lambda one, *_: (moved, None) if one is bolder else None)
+    for name in ("may_be_late_rows", "within_tolerance_after_all"):
+        monkeypatch.setattr(module, name, lambda one, *_: one)
+    diagnosis, _ = diagnose_set(loaded, model, [], 0, silent)
+    assert diagnosis.effects == (moved if believed else found).effects
 
 
 def test_swapped_labels_are_told_and_nothing_else_is_looked_for(sound):
