@@ -182,7 +182,9 @@ def printed(diagnosis: Diagnosis) -> Printed | None:
         if step.is_counted:
             fall = f"{step.error_before:.2f} → {step.error_after:.2f}"
             table.add_row(*(Plain(cell, "bold") for cell in (str(number), step.effects[0], "", "", fall, "")))
-        for place, candidate in enumerate(step.candidates[:_PRINTED]):
+        # what was tried last, and made held-out grasps worse, only puzzles
+        shown = [c for c in step.candidates if step.effects or c.heldout_gain > 0]
+        for place, candidate in enumerate(shown[:_PRINTED]):
             name, gain, p, values = _texts(candidate, diagnosis)
             cells = ("" if place else str(number), name, gain, p, _error_text(step, candidate), values)
             chosen = candidate.effect.name in step.effects

@@ -270,3 +270,13 @@ def test_shares_and_what_is_left_are_one_though_recordings_are_weighed_anew(made
     assert sum(shares.values()) == pytest.approx(1 - (2.0**2 - 1) / (5.0**2 - 1))
     assert shares["force_bias"] / shares["force_drift"] == pytest.approx((5.0**2 - 2.2**2) / (3.0**2 - 2.0**2))
     assert two.shares()["force_bias"] == pytest.approx((5.0**2 - 2.2**2) / (5.0**2 - 1))  # without a jump as it fell
+
+
+@pytest.mark.parametrize(("gain", "rows"), [(5.0, 2), (-5.0, 1)])
+def test_what_was_tried_last_and_made_grasps_worse_is_not_in_the_table(made_up, gain, rows):
+    found = made_up.diagnosis("effect")
+    (step,), best = found.steps, found.steps[0].candidates[0]
+    first = dataclasses.replace(step, candidates=(best,))
+    last = dataclasses.replace(step, effects=(), candidates=(dataclasses.replace(best, gains=np.full(4, gain)),))
+    table = diagnosis_report.printed(dataclasses.replace(found, steps=(first, last)))
+    assert table.row_count == rows
