@@ -88,7 +88,8 @@ def diagnose(
             break
         study = with_few(study, fit)
         step = look_further(study, fit, screen, untried, rng, richer)
-        if not step.effects and step.error_before > _AS_GOOD_AS_NOTHING * floor:
+        # what is on trial has no look-alikes that are worth the time
+        if not step.effects and believed is None and step.error_before > _AS_GOOD_AS_NOTHING * floor:
             worth_it = not tried_anyway and step.error_before < FAR
             found = _fitted_anyway(study, fit, screen, untried, rng) if worth_it else None
             found = found or exchange(study, fit, screen, untried, steps, rng)
