@@ -20,6 +20,8 @@ from forcegrasp.short_repr import ShortRepr
 
 # Step of the slopes, as in a fit: above contact noise, within the linear range.
 _STEP = 0.02
+# A grasp that is expected to tell less than this of one bit is not worth recording.
+_LEAST_BITS = 0.25
 
 
 @dataclass(frozen=True, repr=False)
@@ -51,7 +53,10 @@ class Advice(ShortRepr):
 
 
 def advise(diagnosis: Diagnosis) -> Advice | None:
-    """The next grasp to tell the effects of :func:`rivals_of` apart; None where there are none, and of servos."""
+    """The next grasp to tell the effects of :func:`rivals_of` apart.
+
+    None where there are no rivals or no grasp on the menu tells much of which is right, and of servos.
+    """
     if diagnosis.target.gripper.is_servo:  # the menu is of grasps
         return None
     rivals = rivals_of(diagnosis)
@@ -78,6 +83,8 @@ def advise(diagnosis: Diagnosis) -> Advice | None:
     bits = [expected_bits(*parts) for parts in zip(off.reshape(len(menu), -1), *flat, strict=True)]
     # most have all of the bit where much is known: then the one that shows it best
     best = max(range(len(menu)), key=lambda k: (round(bits[k], 2), apart[k]))
+    if bits[best] < _LEAST_BITS:
+        return None
     return Advice(
         menu[best],
         tuple(menu),

@@ -59,6 +59,9 @@ def after_diagnosis(
     with_all = f"the model that has {listed(d.preferred)}"
     if d.verdict is Verdict.ONE_OF:
         preferred = Command(f"until then take {first}, which is preferred", added.line)
+        if len(d.shares()) > 1:
+            use = _use(with_all, found, data, gripper)
+            preferred = Command(f"until then {use.purpose}", use.line)
         tied = next((step.effects for step in kept_steps(d.steps) if len(step.effects) > 1), ())
         joined = _line("diagnose", f"data=[{str(data).strip('[]')},next]") if advice is not None and tied else again
         return [

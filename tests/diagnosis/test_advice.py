@@ -87,3 +87,9 @@ def test_it_is_chosen_from_the_whole_menu(with_steps):
 def test_without_two_effects_there_is_nothing_to_tell_apart(with_steps):
     assert advise(with_steps((("force_bias",), ("force_bias",)))) is None
     assert rivals_of(with_steps()) is None
+
+
+def test_a_grasp_that_tells_next_to_nothing_is_not_asked_for(with_steps, monkeypatch):
+    tied = with_steps((("force_bias", "force_drift"), ("force_bias", "force_drift")))
+    monkeypatch.setattr("forcegrasp.diagnosis.advice.expected_bits", lambda *_: 0.12)
+    assert advise(tied) is None

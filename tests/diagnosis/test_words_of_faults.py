@@ -44,6 +44,20 @@ def test_where_only_the_set_is_in_doubt_it_is_checked_and_no_grasp_is_asked_for(
     assert other.purpose == "until then take force_bias, which is preferred"
 
 
+def test_of_several_effects_all_that_are_preferred_are_trained_with_until_then(made_up):
+    found = made_up.diagnosis("effect")
+    step = found.steps[0]
+    other = dataclasses.replace(
+        step, effects=("coulomb_friction", "backlash"), error_before=step.error_after, error_after=1.0
+    )
+    both = dataclasses.replace(
+        found, verdict=Verdict.ONE_OF, effects=("force_bias", "coulomb_friction", "backlash"), steps=(step, other)
+    )
+    _, until_then = after_diagnosis(both, None, "set", "base.yaml", "found.yaml")
+    assert until_then.purpose.startswith("until then train with the model that has force_bias and")
+    assert "model=found.yaml" in until_then.line
+
+
 def test_a_fault_besides_an_effect_is_told_first(made_up, fault):
     both = dataclasses.replace(made_up.diagnosis("effect"), effects=("time_scale", "force_bias"), fault=fault)
     assert answer(both).startswith("The set seems to be wrong: time_scale (stamps are too long; to check: the clock).")
