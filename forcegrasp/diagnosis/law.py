@@ -7,6 +7,7 @@ import re
 
 import numpy as np
 
+from forcegrasp.diagnosis.evidence import LEAST_SHARE_TOGETHER
 from forcegrasp.diagnosis.few import with_few
 from forcegrasp.diagnosis.found_law import FoundLaw
 from forcegrasp.diagnosis.law_terms import terms
@@ -74,7 +75,7 @@ def _search(study: Study, fit: Fit, rng: np.random.Generator) -> tuple[Fit, Targ
     screen, start = Screen(library, study), fit
     for number in range(MOST_TERMS):
         study = with_few(study, fit)
-        step = look_further(study, fit, screen, library, rng)
+        step = look_further(study, fit, screen, library, rng, least_promise=LEAST_SHARE_TOGETHER)
         if not step.effects:
             break
         term = step.candidates[0].effect

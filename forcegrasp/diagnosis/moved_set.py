@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from forcegrasp.diagnosis.evidence import LEAST_LEAD, LEAST_SHARE_OF_MANY, is_beyond_chance
+from forcegrasp.diagnosis.evidence import LEAST_LEAD, LEAST_SHARE, LEAST_SHARE_OF_MANY, is_beyond_chance
 from forcegrasp.diagnosis.families import may_join, refit_as, refit_without
 from forcegrasp.diagnosis.faults import Fault, within_tolerance
 from forcegrasp.diagnosis.needless import drop_all_needless
@@ -131,7 +131,9 @@ def _models(found: Diagnosis) -> Iterator[_Model]:
 
 def _with_move(model: _Model, found: Diagnosis, loaded: Loaded[MeasurementSet]) -> _Model:
     """The model on the set as moved, if a move within the tolerance explains some of what it leaves."""
-    fault = within_tolerance(loaded, found.target, model.fit, LEAST_SHARE_OF_MANY)
+    # of a law that is not known some may look like a move
+    worth = LEAST_SHARE_OF_MANY if model.steps else LEAST_SHARE
+    fault = within_tolerance(loaded, found.target, model.fit, worth)
     if fault is None:
         return model
     target = dataclasses.replace(found.target, grasps=fault.put_right.measured.grasps)

@@ -63,6 +63,7 @@ def look_further(
     richer: Sequence[tuple[str, type[Effect]]] = (),
     most: float = np.inf,
     anyway: bool = False,
+    least_promise: float = _WORTH_A_TRIAL,
 ) -> Step:
     """Looks for one more effect.
 
@@ -76,6 +77,7 @@ def look_further(
       most: cost that a fit with the effect must come down to; one that is too far from it is not looked for.
       anyway: whether effects are fitted whose signatures promise too little: where parameters are far from where the
         effect would have them, slopes tell little of what it gains.
+      least_promise: share that all signatures together must promise for an effect that explains little to be tried.
     """
     start = _Start(study, fit)
     study.progress(f"trying {len(effects)} effects")
@@ -91,7 +93,7 @@ def look_further(
         variants.setdefault(candidate.effect.name, []).append(candidate)
     ordered, redundant = start.refine_on_reference_tier(list(variants.values()), effects, look.null)
     of_many = bool(ordered) and not is_significant(ordered[0], start.least_gain)
-    if not ordered or (of_many and not start.may_be_of_many(ordered[0], look.share_together)):
+    if not ordered or (of_many and not start.may_be_of_many(ordered[0], look.share_together, least_promise)):
         return Step((), ordered, look.scores, start.error, start.error)
     winner = ordered[0]
     # of those that can't be told apart the simplest comes first
@@ -140,9 +142,9 @@ class _Start:
         """See :func:`.evidence.place`."""
         return place(candidate, self.least_gain)
 
-    def may_be_of_many(self, candidate: Candidate, share_together: float) -> bool:
+    def may_be_of_many(self, candidate: Candidate, share_together: float, least: float) -> bool:
         """Whether an effect that explains little is worth a trial: all signatures together must promise enough."""
-        return is_significant(candidate, self.least_gain, LEAST_SHARE_OF_MANY) and share_together >= _WORTH_A_TRIAL
+        return is_significant(candidate, self.least_gain, LEAST_SHARE_OF_MANY) and share_together >= least
 
     def refit(self, scores: Sequence[Score], null: np.ndarray) -> list[Candidate]:
         """Rough fits with one more effect, from where the best signatures put them."""

@@ -62,6 +62,7 @@ _ONSETS = {
         "fingers read more open than they are, so that the same target asks for less",
         lambda o: {"left_m": o.travel_m, "right_m": o.travel_m},
     ),
+    "encoder_scale": Cause("fingers read more open than they are, the more so the wider they are", _none),
 }
 _GATES = {
     "command_deadband": Cause(

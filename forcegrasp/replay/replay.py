@@ -183,7 +183,9 @@ class Replay:
         plant.attach(attached)
         ids, start = np.arange(n), self.start_m[grasp]
         for effect, rows in attached:
-            start[rows] = np.clip(effect.rests_at(start[rows]), 0.0, self.gripper.stroke)
+            start[rows] = effect.rests_at(start[rows])
+        if not self.gripper.is_servo:  # logs of a servo begin in motion, and joints have another zero
+            start = np.clip(start, 0.0, self.gripper.stroke)
         offset = write_base(plant, ids, base)
         velocity = self._start_velocity[grasp] if self.gripper.is_servo else None
         if velocity is not None and START_VELOCITY in base:

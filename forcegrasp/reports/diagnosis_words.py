@@ -52,7 +52,7 @@ def lacks(diagnosis: Diagnosis) -> str:
 
 def is_of_labels(diagnosis: Diagnosis) -> bool:
     """Whether grasps have the labels of others, so that nothing else was looked for."""
-    return diagnosis.verdict is Verdict.DATA and not diagnosis.steps and diagnosis.fault is None
+    return diagnosis.verdict is Verdict.DATA and not kept_steps(diagnosis.steps) and diagnosis.fault is None
 
 
 def odd_words(diagnosis: Diagnosis) -> str:

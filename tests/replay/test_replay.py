@@ -51,9 +51,13 @@ def by_hand(
 ) -> np.ndarray:
     """Position, force and object at each sample, read before that sample's command acts; ``(samples, 5)``."""
     plant, row = Plant(TIAGO, 1, tier, threads=1, step_factor=factor), np.array([0])
-    plant.attach([(kind(values[None], plant.dt, variant), row) for kind, variant, values in effects])
+    acting = [kind(values[None], plant.dt, variant) for kind, variant, values in effects]
+    plant.attach([(effect, row) for effect in acting])
+    start = one.command_m[:1]
+    for effect in acting:
+        start = np.clip(effect.rests_at(start), 0, TIAGO.stroke)
     base = {name: np.array([value]) for name, value in (BASE | {"force_scale": SCALE}).items()}
-    plant.reset(row, write_base(plant, row, base), one.command_m[:1])
+    plant.reset(row, write_base(plant, row, base), start)
     steps = [round((t - one.time_s[0]) / plant.dt) for t in one.time_s]
     seen = []
     for index, command in enumerate(one.command_m):
