@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from forcegrasp.effects.base import Effect, Parameter
+from forcegrasp.effects.base import Parameter
+from forcegrasp.effects.wrong_encoder import WrongEncoder
 
 
-class EncoderScale(Effect):
+class EncoderScale(WrongEncoder):
     """Each finger's encoder reads too much, or too little, by a share of the way from where the gripper is closed.
 
     ``reading``: only what is recorded is off. ``loop``: the servo itself acts on the encoder, and so stands off by it.
     """
 
     name = "encoder_scale"
-    stage = "sensor"
-    family = "offset"
     symptom = "positions are off in proportion to the opening; large objects are touched late, small ones in time"
     formula = "q' = (1 + e) q, per finger"
     source = "gear ratio or lever arm that is not the nominal one"
@@ -25,25 +24,15 @@ class EncoderScale(Effect):
         Parameter("left_error", "share that the left encoder reads too much", "1", -0.3, 0.3, 0.02),
         Parameter("right_error", "share that the right encoder reads too much", "1", -0.3, 0.3, 0.02),
     )
-    variants = ("reading", "loop")
-    known_beforehand = ("loop",)
-    variant_needs = {"loop": "position loop"}  # noqa: RUF012 never changed
     order = 5
-    per, alone = "motor", "scale"
+    alone = "scale"
 
     @classmethod
     def trials(cls) -> np.ndarray:
         return np.array([[0.01, 0.0], [0.0, 0.01]])
 
-    @classmethod
-    def reads_only(cls, variant: str = "") -> bool:
-        return variant != "loop"
-
-    def rests_at(self, command: np.ndarray) -> np.ndarray:
-        return command if self.variant == "reading" else command / (1 + self.values)
-
-    def command(self, command: np.ndarray, fresh: np.ndarray) -> np.ndarray:
-        return self.rests_at(command)
+    def true_position(self, read: np.ndarray) -> np.ndarray:
+        return read / (1 + self.values)
 
     def read_position(self, position: np.ndarray) -> np.ndarray:
         return position * (1 + self.values)
