@@ -81,7 +81,7 @@ def test_results_say_what_a_user_wants_to_know(results):
         "one_of": rf"DiagnoseResult\({name}: one_of force_bias, force_drift; error .*\)",
         "not_fitted": rf"DiagnoseResult\({name}: not_fitted; error .*\)",
         "add": rf"AddResult\({name}: force_bias added; error \d\.\d\d → 1\.00 × noise\)",
-        "table": r"TableResult\(table: one_of \w+, \w+, \w+ and \d more\)",
+        "table": r"TableResult\(table: one_of \w+, \w+, \w+ and \d+ more\)",
     }
     for kind, pattern in told.items():
         assert re.fullmatch(pattern, repr(getattr(results, kind))), repr(getattr(results, kind))
