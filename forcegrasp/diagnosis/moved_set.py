@@ -149,7 +149,7 @@ def _lead(best: _Model, other: _Model, study: Study) -> np.ndarray:
 
 
 def _with_rivals_that_do_as_well(best: _Model, models: Sequence[_Model], study: Study) -> list[Step]:
-    """The steps of the best model with those rivals that its move does not tell from it, as theirs has them.
+    """The steps of the best model, tied with those rivals that its move does not tell from it; all as theirs has them.
 
     What others left before the move is no measure of them now.
     """
@@ -158,17 +158,18 @@ def _with_rivals_that_do_as_well(best: _Model, models: Sequence[_Model], study: 
         place = other.place if best.place < 0 else best.place
         if other is best or (best.place >= 0 and other.place not in (-1, place)):
             continue
-        step, own = steps[place], best.steps[place].candidates[0].effect
-        rival = other.steps[place].candidates[0]
-        least = LEAST_LEAD if own.of_set != rival.effect.of_set else 0.0
-        if is_beyond_chance(_lead(best, other, study), least):
-            continue
+        step, own = steps[place], best.steps[place].candidates[0]
+        rival, lead = other.steps[place].candidates[0], _lead(best, other, study)
         setting = next(one for one in other.fit.effects if one.effect.name == rival.effect.name)
         error = study.error(study.heldout(other.fit))
-        rival = dataclasses.replace(rival, setting=setting, fit=other.fit, error_after=error)
-        steps[place] = dataclasses.replace(
-            step, effects=(*step.effects, rival.effect.name), candidates=(*step.candidates, rival)
-        )
+        rival = dataclasses.replace(rival, setting=setting, fit=other.fit, gains=own.gains - lead, error_after=error)
+        least = LEAST_LEAD if own.effect.of_set != rival.effect.of_set else 0.0
+        tied = len(step.effects)
+        if is_beyond_chance(lead, least):
+            steps[place] = dataclasses.replace(step, candidates=(*step.candidates, rival))
+        else:
+            candidates = (*step.candidates[:tied], rival, *step.candidates[tied:])
+            steps[place] = dataclasses.replace(step, effects=(*step.effects, rival.effect.name), candidates=candidates)
     return steps
 
 

@@ -141,6 +141,8 @@ def runner_up(diagnosis: Diagnosis) -> str:
         return f"{listed(left)}, {first.effect.name} {first.error_after:.2f}."
     other, richer = _best_other(step, diagnosis), [c.effect.name for c in _containing(step)]
     contains = f" {listed(richer)} would add little to {first.effect.name}, contained in it." if richer else ""
+    if other is None and diagnosis.error_moved is not None:
+        return contains.lstrip()  # what others left before the set was moved is no measure
     if other is None or other.heldout_gain <= 0:
         return f"None: no other effect explains any of what {first.effect.name} does.{contains}"
     gains = f"held-out gain {other.heldout_gain:+.0f} beside {first.heldout_gain:+.0f}"

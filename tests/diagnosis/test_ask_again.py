@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from forcegrasp.diagnosis.ask_again import ask_again
-from forcegrasp.diagnosis.moved_set import _models
+from forcegrasp.diagnosis.moved_set import _models, _with_rivals_that_do_as_well
 from forcegrasp.diagnosis.result import Step
 from forcegrasp.effects.for_gripper import effect_of
 from forcegrasp.effects.setting import EffectSetting
@@ -34,7 +34,8 @@ def tied(found, *names: str) -> tuple:
     (one,) = last.candidates
     settings = [EffectSetting.typical(effect_of(name, fit.problem.gripper)) for name in names]
     candidates = [
-        dataclasses.replace(one, setting=setting, signature=np.eye(len(names))[i]) for i, setting in enumerate(settings)
+        dataclasses.replace(one, setting=setting, gains=np.ones(len(fit.residual)), signature=np.eye(len(names))[i])
+        for i, setting in enumerate(settings)
     ]
     return study, [Step(names, tuple(candidates), (), 9.0, 5.0), last], fit
 
@@ -96,3 +97,15 @@ def test_what_is_alone_or_in_the_model_already_has_no_rival_to_ask(found, rivals
     study, steps, fit = tied(found, *rivals)
     diagnosis = SimpleNamespace(fit=fit, steps=steps, target=study.target, folds=study.folds)
     assert [one.fit for one in _models(diagnosis)] == [fit]
+
+
+@pytest.mark.parametrize(("first", "other", "stays"), [(FRICTION, DEADBAND, False), (DEADBAND, FRICTION, True)])
+def test_rivals_are_judged_as_their_own_move_has_them(found, first, other, stays):
+    study, steps, fit = tied(found, first, other)
+    models = list(_models(SimpleNamespace(fit=fit, steps=steps, target=study.target, folds=study.folds)))
+    step, _ = _with_rivals_that_do_as_well(models[0], models, study)
+    assert step.effects == ((first, other) if stays else (first,))
+    own, rival = step.candidates
+    assert (own.effect.name, rival.effect.name) == (first, other)
+    assert (rival.heldout_gain > own.heldout_gain) == stays
+    assert rival.error_after == pytest.approx(study.error(study.heldout(models[1].fit)))

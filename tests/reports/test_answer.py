@@ -122,6 +122,14 @@ def test_what_may_be_there_besides_is_said_and_can_be_tried(made_up):
         assert dict(answer.rows).get("Perhaps", "").startswith("backlash may be there besides: it takes") == said
 
 
+def test_where_the_set_was_moved_nothing_is_said_of_what_was_not_judged_again(made_up):
+    found = made_up.diagnosis("effect")
+    (step,) = found.steps
+    alone = dataclasses.replace(found, steps=(dataclasses.replace(step, candidates=step.candidates[:1]),))
+    assert dict(box(alone).rows)["Runner-up"].startswith("None: no other effect")
+    assert "Runner-up" not in dict(box(dataclasses.replace(alone, error_moved=1.4)).rows)
+
+
 def test_an_effect_that_contains_what_was_found_is_no_runner_up(made_up):
     one = made_up.diagnosis("effect")
     best, other = one.steps[0].candidates
