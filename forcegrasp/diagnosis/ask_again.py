@@ -8,9 +8,9 @@ from functools import partial
 
 import numpy as np
 
-from forcegrasp.diagnosis.evidence import indistinguishable
-from forcegrasp.diagnosis.exchange import steps_of
-from forcegrasp.diagnosis.families import may_join, refit_as, refit_without, roughly_as
+from forcegrasp.diagnosis.evidence import indistinguishable, rivals_in
+from forcegrasp.diagnosis.exchange import against, steps_of
+from forcegrasp.diagnosis.families import refit_as, refit_without, roughly_as
 from forcegrasp.diagnosis.needless import chained
 from forcegrasp.diagnosis.result import Candidate, Step
 from forcegrasp.diagnosis.signatures import trials
@@ -42,8 +42,7 @@ def ask_again(study: Study, steps: Sequence[Step], fit: Fit) -> tuple[list[Step]
 def _asked(study: Study, step: Step, fit: Fit) -> tuple[Step, Fit]:
     """A step with those of its rivals that the whole model can't tell apart; and the model with the first of them."""
     own = step.effects[0]
-    others = [one.effect for one in fit.problem.effects if one.effect.name != own]
-    rivals = [c for c in step.candidates[1:] if c.effect.name in step.effects[1:] and may_join(c.effect, others)]
+    rivals = rivals_in(step, fit)
     study.progress(f"asking again whether {' or '.join([own, *(c.effect.name for c in rivals)])}")
     without = study.heldout(refit_without(own, fit, study))
     fits = side_by_side([partial(_with_rival, one, fit, own, study) for one in rivals])
@@ -68,14 +67,7 @@ def _with_rival(rival: Candidate, fit: Fit, own: str, study: Study) -> Fit:
 
 def _judged(candidate: Candidate, fit: Fit, without: np.ndarray, study: Study) -> Candidate:
     """A candidate by what it gains in a whole model, ``without`` being the held-out residuals of one that lacks it."""
-    held = study.heldout(fit)
-    gains = study.gains(without, held)
-    recordings = study.of_recordings(gains)
-    return dataclasses.replace(
-        candidate,
-        fit=fit,
-        gains=gains,
-        of_recordings=np.array([one.sum() for one in recordings]) if recordings else None,
-        share=study.explained(without, held),
-        error_after=study.error(held),
-    )
+    judged = against(dataclasses.replace(candidate, fit=fit), without, study)
+    recordings = study.of_recordings(judged.gains)
+    sums = np.array([one.sum() for one in recordings]) if recordings else None
+    return dataclasses.replace(judged, of_recordings=sums)

@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 
-from forcegrasp.diagnosis.shifted_rows import WORTH_A_FIT
+from forcegrasp.diagnosis.shifted_rows import WORTH_A_FIT, left_beyond_noise
 from forcegrasp.diagnosis.signatures import Background
 from forcegrasp.identify.fit import Fit, cheap_tier
 from forcegrasp.identify.predict import predict
@@ -49,8 +49,5 @@ def are_even_in_truth(target: Target, fit: Fit) -> bool:
     )
     change = np.where(target.mask[..., None], (even - said) / target.sigma, 0.0)
     background = Background(fit, ())
-    before, after = (
-        float(np.sum(background.remove((fit.weight * residual).ravel()) ** 2)) - target.readings
-        for residual in (fit.residual, fit.residual - change)
-    )
+    before, after = (left_beyond_noise(r, background, target) for r in (fit.residual, fit.residual - change))
     return after < (1 - WORTH_A_FIT) * before

@@ -9,6 +9,7 @@ import numpy as np
 
 from forcegrasp.diagnosis import families
 from forcegrasp.diagnosis.result import Candidate, Step
+from forcegrasp.identify.fit import Fit
 
 #: Family-wise probability of a false alarm that is accepted at each step.
 ALARM = 0.01
@@ -108,6 +109,13 @@ def with_close_rivals(step: Step) -> Step:
     return dataclasses.replace(
         step, effects=(*step.effects, *names), candidates=(*step.candidates[:known], *close, *others)
     )
+
+
+def rivals_in(step: Step, fit: Fit) -> list[Candidate]:
+    """The effects that a step could not tell from its first one, and that may take its place in a model."""
+    own, *names = step.effects
+    others = [one.effect for one in fit.problem.effects if one.effect.name != own]
+    return [c for c in step.candidates[1:] if c.effect.name in names and families.may_join(c.effect, others)]
 
 
 def add_nothing(candidates: Sequence[Candidate]) -> set[str]:

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from forcegrasp.diagnosis.evidence import LEAST_LEAD, LEAST_SHARE, LEAST_SHARE_OF_MANY, is_beyond_chance
-from forcegrasp.diagnosis.families import may_join, refit_as, refit_without
+from forcegrasp.diagnosis.evidence import LEAST_LEAD, LEAST_SHARE, LEAST_SHARE_OF_MANY, is_beyond_chance, rivals_in
+from forcegrasp.diagnosis.families import refit_as, refit_without
 from forcegrasp.diagnosis.faults import Fault, within_tolerance
 from forcegrasp.diagnosis.needless import drop_all_needless
 from forcegrasp.diagnosis.result import Diagnosis, Step, kept_steps
@@ -117,16 +117,13 @@ def _models(found: Diagnosis) -> Iterator[_Model]:
     yield _Model(found.fit, found.target, steps)
     study = Study(found.target, Simulators(found.fit.problem), found.folds)
     for place, step in enumerate(steps):
-        own, *names = step.effects
-        others = [one.effect for one in found.fit.problem.effects if one.effect.name != own]
-        for rival in step.candidates[1:]:
+        for rival in rivals_in(step, found.fit):
             name = rival.effect.name
-            if name in names and may_join(rival.effect, others):
-                candidates = (rival, *(c for c in step.candidates if c is not rival))
-                effects = (name, own, *(n for n in names if n != name))
-                first = dataclasses.replace(step, effects=effects, candidates=candidates)
-                fit = refit_as(rival.setting, found.fit, own, study)
-                yield _Model(fit, found.target, [*steps[:place], first, *steps[place + 1 :]], place)
+            candidates = (rival, *(c for c in step.candidates if c is not rival))
+            effects = (name, *(n for n in step.effects if n != name))
+            first = dataclasses.replace(step, effects=effects, candidates=candidates)
+            fit = refit_as(rival.setting, found.fit, step.effects[0], study)
+            yield _Model(fit, found.target, [*steps[:place], first, *steps[place + 1 :]], place)
 
 
 def _with_move(model: _Model, found: Diagnosis, loaded: Loaded[MeasurementSet]) -> _Model:

@@ -141,8 +141,10 @@ def _concluded(begun: _Begun, study: Study, steps: Sequence[Step], fit: Fit) -> 
     much_left = bool(left) and error_after > MUCH * floor
     steps = settle_ties([with_close_rivals(step) for step in steps] if much_left else steps)
     if not much_left:  # what is still missing could decide between them again
-        steps, fit = ask_again(study, steps, fit)
-        error_after, (left, noise, alone) = study.error(study.heldout(fit)), _left_by_many(study, fit)
+        steps, asked = ask_again(study, steps, fit)
+        if asked is not fit:
+            fit = asked
+            error_after, (left, noise, alone) = study.error(study.heldout(fit)), _left_by_many(study, fit)
     found = kept_steps(steps)
     # a missing effect makes the error rough, and the base fit stop short: then only what leaves nothing is an answer
     if not base.converged and (not found or (left and error_after > _AS_GOOD_AS_NOTHING * floor)):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from forcegrasp.effects.base import Contribution, Effect, Parameter
+from forcegrasp.effects.base import Contribution, Effect, Parameter, State
 from forcegrasp.physics.plant import Plant
 
 _SIDES = np.array([1.0, -1.0])
@@ -44,8 +44,11 @@ class MotorAsymmetry(Effect):
             plant.field("actuator_gainprm")[rows, actuator, 0] *= stiffer
             plant.field("actuator_biasprm")[rows, actuator, 1] *= stiffer
 
-    def act(self) -> Contribution:
-        plant, rows = self.plant, self.rows[:, None]
+    def init(self, which: np.ndarray) -> State:
+        plant, rows = self.plant, self.rows[which, None]
         of_servo = -plant.field("actuator_biasprm")[rows, plant.actuators, 2]
         of_joint = plant.base("dof_damping")[rows, plant.motor_dofs]
-        return Contribution(damping=self["damping_share"] * _SIDES * (of_servo + of_joint))
+        return {"damping": self["damping_share"][which] * _SIDES * (of_servo + of_joint)}
+
+    def act(self) -> Contribution:
+        return Contribution(damping=self.state["damping"])
