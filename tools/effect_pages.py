@@ -90,6 +90,14 @@ _PLANS = {
         "fast and slow moves in free air with long pauses after them, and a squeeze",
         ((26.2, 0.02, 1.2), (27, 0.004, 1.2), (22.5, 0.015, 0.8)),
     ),
+    "smooth_load_friction": Show(
+        "squeezes and a partial release, each with a long hold",
+        ((26, 0.02, 0.1), (22.6, 0.02, 1.2), (20, 0.02, 1.2), (21.6, 0.01, 1.2), (27, 0.02, 0.2)),
+    ),
+    "smooth_stiction": Show(
+        "slow and fast moves in free air with long pauses after them, and a squeeze",
+        ((26.2, 0.002, 0.8), (27, 0.02, 0.8), (26.4, 0.004, 0.8), (22.5, 0.015, 0.8)),
+    ),
     "direction_friction": Show(
         "fast ramps, opening and closing, in free air; a squeeze and a release",
         ((25.6, 0.02, 0.4), (27.4, 0.02, 0.4), (25.6, 0.02, 0.4), (22, 0.02, 0.3), (27, 0.02, 0.4)),

@@ -6,6 +6,14 @@ import numpy as np
 
 from forcegrasp.effects.base import Contribution, Effect, Parameter
 
+#: Friction by the load.
+COEFFICIENT = Parameter("coefficient", "friction per load c", "1", 0.0, 0.6, 0.15, trials=(0.1,))
+
+
+def load_of(effect: Effect) -> np.ndarray:
+    """What the transmission carries, N or N·m, ``(rows, motors)``."""
+    return np.abs(effect.plant.motor_force[effect.rows] - effect.plant.outside_force[effect.rows])
+
 
 class LoadFriction(Effect):
     """Gears that are pressed together rub: dry friction in proportion to the force that the transmission carries.
@@ -22,9 +30,8 @@ class LoadFriction(Effect):
     source = "Duclusaud et al. (2024), arXiv 2410.08650, model M3, forces of the last physics step"
     look_alikes = ("coulomb_friction", "stiction", "force_hysteresis", "backlash")
     separates = "holds that are approached from both sides under several loads: the band is as wide as the load is high"
-    parameters = (Parameter("coefficient", "friction per load c", "1", 0.0, 0.6, 0.15, trials=(0.1,)),)
+    parameters = (COEFFICIENT,)
     order = 4
 
     def act(self) -> Contribution:
-        load = self.plant.motor_force[self.rows] - self.plant.outside_force[self.rows]
-        return Contribution(friction=self["coefficient"] * np.abs(load))
+        return Contribution(friction=self["coefficient"] * load_of(self))

@@ -53,6 +53,8 @@ _SHIPPED = (
     "rate_limited_lag",
     "readout_skew",
     "smooth_friction",
+    "smooth_load_friction",
+    "smooth_stiction",
     "stiction",
     "stiffening_contact",
     "swapped_forces",
