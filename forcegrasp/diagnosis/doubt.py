@@ -6,10 +6,10 @@ import dataclasses
 
 import numpy as np
 
-from forcegrasp.diagnosis.evidence import LEAST_LEAD, LEAST_SHARE, is_beyond_chance
+from forcegrasp.diagnosis.evidence import LEAST_LEAD, is_beyond_chance
 from forcegrasp.diagnosis.faults import Fault
 from forcegrasp.diagnosis.result import Diagnosis
-from forcegrasp.diagnosis.verdict import EXPLAINED, explained_share
+from forcegrasp.diagnosis.verdict import explained_share
 from forcegrasp.identify.cross_validation import heldout_residual, log_likelihood, make_folds, rms
 from forcegrasp.identify.fit import Fit
 from forcegrasp.identify.target import Target
@@ -19,13 +19,9 @@ _Fitted = tuple[Target, Fit]
 
 
 def leaves_less(fault: Fault, right: _Fitted, said: _Fitted) -> bool:
-    """Whether the base model of a set put right leaves much less on held-out grasps than that of the set as it is.
-
-    What fingers felt is seen in the readings themselves: there as much is enough as of an effect.
-    """
-    least = LEAST_SHARE if fault.fitted_m else EXPLAINED
+    """Whether the base model of a set put right leaves much less on held-out grasps than that of the set as it is."""
     before, after = rms(_held(*said), said[0]), rms(_held(*right), right[0])
-    return is_beyond_chance(_gains(fault, right, said), LEAST_LEAD) and explained_share(before, after) > least
+    return is_beyond_chance(_gains(fault, right, said), LEAST_LEAD) and explained_share(before, after) > fault.worth
 
 
 def with_fault(found: Diagnosis, fault: Fault, said: _Fitted) -> Diagnosis:

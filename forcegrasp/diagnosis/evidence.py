@@ -9,13 +9,13 @@ import numpy as np
 
 from forcegrasp.diagnosis import families
 from forcegrasp.diagnosis.result import Candidate, Step
+from forcegrasp.diagnosis.verdict import LEAST_SHARE
 from forcegrasp.identify.fit import Fit
 
 #: Family-wise probability of a false alarm that is accepted at each step.
 ALARM = 0.01
-#: An effect must explain this share of the mean square beyond the noise.
-LEAST_SHARE = 0.25
-#: One of many may explain less; it is believed if all of them together leave nothing, or explain this share.
+#: One of many effects may explain less than `LEAST_SHARE`; it is believed if all of them together leave nothing, or
+#: explain this share.
 LEAST_SHARE_OF_MANY, LEAST_SHARE_TOGETHER = 0.1, 0.75
 #: A change of the held-out log-likelihood below this is no evidence, however even it is.
 LEAST_RISE = 5.0

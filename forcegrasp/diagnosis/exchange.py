@@ -7,12 +7,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from forcegrasp.diagnosis.evidence import LEAST_RISE, LEAST_SHARE, is_beyond_chance
+from forcegrasp.diagnosis.evidence import LEAST_RISE, is_beyond_chance
 from forcegrasp.diagnosis.families import look_alike, roughly_without
 from forcegrasp.diagnosis.result import Candidate, Step, kept_steps
 from forcegrasp.diagnosis.screen import Screen
 from forcegrasp.diagnosis.step import look_further
 from forcegrasp.diagnosis.study import Study
+from forcegrasp.diagnosis.verdict import LEAST_SHARE
 from forcegrasp.effects import Effect
 from forcegrasp.identify.fit import Fit
 

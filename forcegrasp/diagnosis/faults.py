@@ -11,9 +11,12 @@ import numpy as np
 from forcegrasp.diagnosis.even_stamps import are_even_in_truth, evenly, scatter_s
 from forcegrasp.diagnosis.felt_sizes import SEEN_M, doubtful_radii
 from forcegrasp.diagnosis.late_side import command_row_later, late_side
+from forcegrasp.diagnosis.linear_step import linear_step
+from forcegrasp.diagnosis.session_drift import order_in_session, session_drift
 from forcegrasp.diagnosis.shifted_rows import WORTH_A_FIT, left_by_shift
 from forcegrasp.diagnosis.signatures import Background
 from forcegrasp.diagnosis.tolerance import MOST, WORTH, Moved, move_given, wanted_moves
+from forcegrasp.diagnosis.verdict import EXPLAINED, LEAST_SHARE
 from forcegrasp.identify.base_fit import rms_error
 from forcegrasp.identify.fit import Fit
 from forcegrasp.identify.intervals import listed
@@ -40,6 +43,7 @@ class Fault(ShortRepr):
     moved: Moved | None = None  #: what was moved within the tolerance of what is given, so that it is no fault
     fitted_m: dict[str, float] = field(default_factory=dict)  #: given radii that are fitted instead, by object, metres
     least_m: float = SEEN_M  #: by how much less they were as given
+    worth: float = EXPLAINED  #: least share of what is left beyond the noise that it must explain
     of_most: bool = False  #: radii of most objects are doubted, so that an effect may do as well
     wider: Fault | None = None  #: the same of more objects, to be tried if something is left
     instead_of: str = ""  #: the one effect that it stands for where it is a rival; otherwise it stands for all
@@ -105,13 +109,21 @@ def suspects(loaded: Loaded[MeasurementSet], target: Target, fit: Fit) -> list[F
         words = f"time stamps scatter by {1e3 * scatter_s(target):.2g} ms, and what was read is even in time"
         check = "whether rows are stamped when they are read, and not when they are written"
         found.append(Fault("uneven_stamps", words, check, _changed(loaded, lambda _, g: evenly(g))))
-    if (tare := find_tare(measured)) is not None:
-        tare = _sharper(tare, target, fit)
+    tare, drift, left = find_tare(measured), session_drift(target, fit), np.inf
+    if tare is not None:
+        tare, left = _sharper(tare, target, fit)
+    if tare is not None and (drift is None or left <= drift.left):
         first = measured.grasps[tare.first].name
         changed = [f"{n} by {x:+.3g} N" for n, x in zip(measured.columns.force, tare.change_n, strict=True) if x]
         words = f"the zero changes at grasp {first}: {listed(changed)}"
         right = _changed(loaded, lambda index, g: _levelled(g, tare) if index >= tare.first else g)
         found.append(Fault("force_tare", words, "whether sensors were set to zero there", right))
+    elif drift is not None:
+        order = order_in_session(measured.grasps)
+        check = "whether sensors or motors warm up meanwhile: grasp one object first and last, and compare"
+        right = _changed(loaded, lambda index, g: drift.taken_out(g, order[index]))
+        words = drift.words(measured.columns.force)
+        found.append(Fault(f"force_{drift.of}_drift", words, check, right, worth=LEAST_SHARE))
     early = _early_readings(target, fit)
     if early:
         late = ", or commands stand one row late" if len(early) > 1 else ""
@@ -144,7 +156,8 @@ def _wrong_radii(loaded: Loaded[MeasurementSet], wrong: dict[str, float]) -> Fau
     words = f"fingers met {listed(list(wrong))} elsewhere than the set says"
     right = _changed(loaded, lambda _, g: dataclasses.replace(g, radius_m=None) if g.object in wrong else g)
     check = f"the radius of {listed(list(wrong))}, with a calliper: it may be another object's, or a diameter"
-    return Fault("object_radius", words, check, right, fitted_m=wrong)
+    # what fingers felt is seen in the readings themselves: as much is enough as of an effect
+    return Fault("object_radius", words, check, right, fitted_m=wrong, worth=LEAST_SHARE)
 
 
 def _most_radii(loaded: Loaded[MeasurementSet], apart: Sequence[str]) -> Fault | None:
@@ -189,23 +202,21 @@ def _slower(grasp: MeasuredGrasp, factor: float) -> MeasuredGrasp:
     return dataclasses.replace(grasp, time_s=start + factor * (grasp.time_s - start))
 
 
-def _sharper(tare: Tare, target: Target, fit: Fit) -> Tare:
+def _sharper(tare: Tare, target: Target, fit: Fit) -> tuple[Tare, float]:
     """The same change as all readings have it, by a linear step from a fit; as it was where these say otherwise.
 
-    Readings before contact, which show that a zero has changed, are few.
+    Readings before contact, which show that a zero has changed, are few. Also what the step leaves beyond the noise.
     """
     changed = np.flatnonzero(tare.change_n)
-    columns = np.zeros((*target.signals.shape, len(changed)))
+    per_unit = np.zeros((*target.signals.shape, len(changed)))
     for column, channel in enumerate(changed):
-        columns[tare.first :, :, target.axis.kinds["force"].start + channel, column] = 1.0
-    columns = fit.weight[..., None] * np.where(target.mask[..., None, None], columns / target.sigma[:, None], 0.0)
-    slopes = np.column_stack([fit.slopes, columns.reshape(-1, len(changed))])
-    step = np.linalg.lstsq(slopes, (fit.weight * fit.residual).ravel(), rcond=None)[0][-len(changed) :]
+        per_unit[tare.first :, :, target.axis.forces.start + channel, column] = 1.0
+    step, left = linear_step(target, fit, per_unit)
     change = tare.change_n.copy()
     change[changed] = np.where(
         np.abs(step - change[changed]) < _OTHERWISE * np.abs(change[changed]), step, change[changed]
     )
-    return dataclasses.replace(tare, change_n=change)
+    return dataclasses.replace(tare, change_n=change), left
 
 
 def _levelled(grasp: MeasuredGrasp, tare: Tare) -> MeasuredGrasp:

@@ -8,13 +8,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from forcegrasp.diagnosis.evidence import LEAST_LEAD, LEAST_SHARE, LEAST_SHARE_OF_MANY, is_beyond_chance, rivals_in
+from forcegrasp.diagnosis.evidence import LEAST_LEAD, LEAST_SHARE_OF_MANY, is_beyond_chance, rivals_in
 from forcegrasp.diagnosis.families import refit_as, refit_without
 from forcegrasp.diagnosis.faults import Fault, within_tolerance
 from forcegrasp.diagnosis.needless import drop_all_needless
 from forcegrasp.diagnosis.result import Diagnosis, Step, kept_steps
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.diagnosis.tolerance import all_radii
+from forcegrasp.diagnosis.verdict import LEAST_SHARE
 from forcegrasp.effects.object_size import ObjectSize
 from forcegrasp.identify.base_fit import BaseFit
 from forcegrasp.identify.cross_validation import evidence_folds

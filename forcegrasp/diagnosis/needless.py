@@ -8,10 +8,11 @@ from functools import partial
 
 import numpy as np
 
-from forcegrasp.diagnosis.evidence import LEAST_RISE, LEAST_SHARE, is_beyond_chance, nearly_as_much
+from forcegrasp.diagnosis.evidence import LEAST_RISE, is_beyond_chance, nearly_as_much
 from forcegrasp.diagnosis.families import falls_back, fits_as_well, refit_as, refit_without, roughly_without, simpler
 from forcegrasp.diagnosis.result import Step
 from forcegrasp.diagnosis.study import Study
+from forcegrasp.diagnosis.verdict import LEAST_SHARE
 from forcegrasp.identify.fit import Fit
 from forcegrasp.identify.noise_floor import excess
 from forcegrasp.identify.side_by_side import side_by_side

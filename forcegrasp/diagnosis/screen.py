@@ -7,10 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from forcegrasp.diagnosis.evidence import ALARM, LEAST_SHARE
+from forcegrasp.diagnosis.evidence import ALARM
 from forcegrasp.diagnosis.noise_check import Noise
 from forcegrasp.diagnosis.signatures import Background, Score, Signatures, null_gains, share_together, trials
 from forcegrasp.diagnosis.study import Study
+from forcegrasp.diagnosis.verdict import LEAST_SHARE
 from forcegrasp.effects import Effect
 from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.identify.fit import Fit

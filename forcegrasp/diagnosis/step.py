@@ -10,7 +10,6 @@ import numpy as np
 from forcegrasp.diagnosis import families
 from forcegrasp.diagnosis.evidence import (
     LEAST_RISE,
-    LEAST_SHARE,
     LEAST_SHARE_OF_MANY,
     add_nothing,
     indistinguishable,
@@ -26,6 +25,7 @@ from forcegrasp.diagnosis.result import Candidate, Step
 from forcegrasp.diagnosis.screen import MAX_GAIN_FACTOR, Screen
 from forcegrasp.diagnosis.signatures import Background, Score, best_effects, of_best_effects
 from forcegrasp.diagnosis.study import Study
+from forcegrasp.diagnosis.verdict import LEAST_SHARE
 from forcegrasp.effects import Effect
 from forcegrasp.identify.base_fit import rms_error
 from forcegrasp.identify.cross_validation import rms

@@ -6,6 +6,8 @@ from collections.abc import Sequence
 
 from forcegrasp.identify.verdict import Verdict
 
+#: An effect must explain this share of the mean square beyond the noise.
+LEAST_SHARE = 0.25
 #: Effects must explain this share of the mean square beyond the noise to be the answer; below it is "unknown".
 EXPLAINED = 0.5
 #: Where more than so many times the floor is left, they must explain this share of it: a look-alike takes half.

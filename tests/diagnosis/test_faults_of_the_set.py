@@ -204,6 +204,13 @@ def row_early(values: np.ndarray) -> np.ndarray:
             lambda i, g: {"time_s": g.time_s + np.random.default_rng(i).uniform(-0.009, 0.009, len(g.time_s))},
         ),
         ("sound", "force_tare", "at grasp 4", lambda i, g: {"force_n": g.force_n - [0.2 * (i >= 4), 0.0]}),
+        ("sound", "force_zero_drift", "f_l_n by -0.06", lambda i, g: {"force_n": g.force_n - [0.03 * (i % 3), 0.0]}),
+        (
+            "pressed_harder",
+            "force_gain_drift",
+            "and f_r_n by +11 %",
+            lambda i, g: {"force_n": g.force_n * (1 + 0.015 * i), "session": "1"},
+        ),
         (
             "pressed_harder",
             "early_row",
