@@ -118,6 +118,7 @@ _PLANS = {
         ((23.8, 0.02, 0.4), (22, 0.02, 0.4), (20, 0.02, 0.4), (18, 0.02, 0.4), (26.5, 0.01, 0.2)),
     ),
     "motor_asymmetry": _STEPS,
+    "return_spring": _STEPS_OF_SEVERAL_SIZES,
     "encoder_scale": _STEPS,
     "finger_creep": Show(
         "a fast squeeze, a long hold, a partial release, another hold",

@@ -11,7 +11,7 @@ from forcegrasp.diagnosis.doubt import leaves_less, more_likely, with_fault
 from forcegrasp.diagnosis.faults import Fault, besides, leaves_nothing, suspects
 from forcegrasp.diagnosis.late_rows import may_be_late_rows
 from forcegrasp.diagnosis.law import find_law
-from forcegrasp.diagnosis.moved_set import go_on_with_moved, within_tolerance_after_all
+from forcegrasp.diagnosis.moved_set import MovesFirst, go_on_with_moved, within_tolerance_after_all
 from forcegrasp.diagnosis.result import Diagnosis, Step
 from forcegrasp.diagnosis.search import diagnose
 from forcegrasp.effects import Effect
@@ -61,9 +61,14 @@ def diagnose_set(
         return fit_set.apply_model(one, model, progress, refit=True)
 
     def search(
-        target: Target, simulators: Simulators, base: BaseFit, start: tuple[Fit, Sequence[Step]] | None = None
+        target: Target,
+        simulators: Simulators,
+        base: BaseFit,
+        start: tuple[Fit, Sequence[Step]] | None = None,
+        may_be_given: MovesFirst | None = None,
     ) -> Diagnosis:
-        return diagnose(target, base, simulators, chosen, np.random.default_rng(seed + 1), progress, start)
+        rng = np.random.default_rng(seed + 1)
+        return diagnose(target, base, simulators, chosen, rng, progress, start, may_be_given)
 
     def search_on(target: Target, simulators: Simulators, base: BaseFit, fit: Fit, steps: Sequence[Step]) -> Diagnosis:
         return search(target, simulators, base, (fit, steps))
@@ -75,11 +80,21 @@ def diagnose_set(
             return further if further is not None and not further[0].left else None
         return further
 
+    def search_and_move(
+        of_set: Loaded[MeasurementSet], target: Target, simulators: Simulators, base: BaseFit
+    ) -> tuple[Diagnosis, tuple[Diagnosis, Simulators] | None]:
+        """The diagnosis of a set, and that of the set with moves within its tolerance if it wants any."""
+        first = None if of_set.gripper.is_servo else MovesFirst(of_set)
+        found = search(target, simulators, base, may_be_given=first)
+        further = moved(found, of_set)
+        if further is None and first is not None and first.asked:  # it was no move after all
+            found = search(target, simulators, base)
+            further = moved(found, of_set)
+        return found, further
+
     def as_said() -> tuple[Diagnosis, Simulators]:
-        target, simulators, base = said
-        found = search(target, simulators, base)
-        further = moved(found, loaded)
-        return further or (within_tolerance_after_all(found, loaded), simulators)
+        found, further = search_and_move(loaded, *said)
+        return further or (within_tolerance_after_all(found, loaded), said[1])
 
     said = fitted(loaded)
 
@@ -103,9 +118,8 @@ def diagnose_set(
     for suspect in suspects(loaded, said[0], said[2].fit):
         if (better := put_right(suspect)) is not None:
             fault, right = better
-            further = search(*right)
             # what is a little off besides shows once the fault does not hide it
-            on_moved = None if fault.moved else moved(further, fault.put_right)
+            further, on_moved = (search(*right), None) if fault.moved else search_and_move(fault.put_right, *right)
             if on_moved is not None:
                 further, simulators = on_moved
                 right, fault = (further.target, simulators, further.base), besides(fault, further.fault)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from forcegrasp.diagnosis.evidence import LEAST_LEAD, LEAST_SHARE_OF_MANY, is_beyond_chance, rivals_in
-from forcegrasp.diagnosis.families import refit_as, refit_without
+from forcegrasp.diagnosis.families import refit_without, roughly_as
 from forcegrasp.diagnosis.faults import Fault, within_tolerance
 from forcegrasp.diagnosis.needless import drop_all_needless
 from forcegrasp.diagnosis.result import Diagnosis, Step, kept_steps
@@ -30,6 +30,22 @@ from forcegrasp.measure import MeasurementSet
 
 #: Searches on from a base model, a fit with effects besides, and the steps that found these.
 SearchOn = Callable[[Target, Simulators, BaseFit, Fit, Sequence[Step]], Diagnosis]
+
+# Where a move within the tolerance would take off this share of what a model leaves, it comes before unlikely effects.
+_NEARLY_ALL = 0.8
+
+
+@dataclass(eq=False)
+class MovesFirst:
+    """Whether moves within the tolerance are to be tried before effects that promise little."""
+
+    loaded: Loaded[MeasurementSet]
+    asked: bool = False  #: whether they were, of any fit
+
+    def __call__(self, target: Target, fit: Fit) -> bool:
+        first = within_tolerance(self.loaded, target, fit, _NEARLY_ALL) is not None
+        self.asked |= first
+        return first
 
 
 def within_tolerance_after_all(found: Diagnosis, loaded: Loaded[MeasurementSet]) -> Diagnosis:
@@ -110,7 +126,7 @@ class _Model:
 
 
 def _models(found: Diagnosis) -> Iterator[_Model]:
-    """The final model, and then each that has a rival.
+    """The final model, and then each that has a rival, fitted roughly: what it is moved by is not known yet.
 
     An encoder's scale and objects that are all too large are nearly the same, but for what is given of each object.
     """
@@ -123,7 +139,7 @@ def _models(found: Diagnosis) -> Iterator[_Model]:
             candidates = (rival, *(c for c in step.candidates if c is not rival))
             effects = (name, *(n for n in step.effects if n != name))
             first = dataclasses.replace(step, effects=effects, candidates=candidates)
-            fit = refit_as(rival.setting, found.fit, step.effects[0], study)
+            fit = roughly_as([rival.setting], found.fit, step.effects[0], study)
             yield _Model(fit, found.target, [*steps[:place], first, *steps[place + 1 :]], place)
 
 
@@ -132,9 +148,10 @@ def _with_move(model: _Model, found: Diagnosis, loaded: Loaded[MeasurementSet]) 
     # of a law that is not known some may look like a move
     worth = LEAST_SHARE_OF_MANY if model.steps else LEAST_SHARE
     fault = within_tolerance(loaded, found.target, model.fit, worth)
-    if fault is None:
+    if fault is None and model.place < 0:
         return model
-    target = dataclasses.replace(found.target, grasps=fault.put_right.measured.grasps)
+    grasps = found.target.grasps if fault is None else fault.put_right.measured.grasps
+    target = dataclasses.replace(found.target, grasps=grasps)
     problem = Problem(loaded.gripper, target.grasps, model.fit.problem.case(model.fit.vector).effects)
     fit = fit_exactly(target, problem, Simulators(problem), model.fit.vector, model.fit.jacobian)
     return dataclasses.replace(model, fit=fit, target=target, fault=fault)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -50,6 +50,7 @@ def diagnose(
     rng: np.random.Generator,
     progress: Progress = silent,
     start: tuple[Fit, Sequence[Step]] | None = None,
+    may_be_given: Callable[[Target, Fit], bool] | None = None,
 ) -> Diagnosis:
     """Adds effects to a fitted base model for as long as the evidence holds.
 
@@ -61,6 +62,8 @@ def diagnose(
       rng: for the null distribution.
       progress: told what is going on.
       start: a fit with the effects that steps have found before, to go on from; the base model by default.
+      may_be_given: whether what the set gives, moved within its tolerance, may explain what a fit leaves: then effects
+        that promise too little are not fitted.
     """
     first, before = (base.fit, ()) if start is None else start
     fit = first
@@ -89,7 +92,8 @@ def diagnose(
         study = with_few(study, fit)
         step = look_further(study, fit, screen, untried, rng, richer)
         # what is on trial has no look-alikes that are worth the time
-        if not step.effects and believed is None and step.error_before > _AS_GOOD_AS_NOTHING * floor:
+        much = not step.effects and believed is None and step.error_before > _AS_GOOD_AS_NOTHING * floor
+        if much and not (may_be_given is not None and may_be_given(target, fit)):
             worth_it = not tried_anyway and step.error_before < FAR
             found = _fitted_anyway(study, fit, screen, untried, rng) if worth_it else None
             found = found or exchange(study, fit, screen, untried, steps, rng)

@@ -52,6 +52,7 @@ _SHIPPED = (
     "rate_limit",
     "rate_limited_lag",
     "readout_skew",
+    "return_spring",
     "smooth_friction",
     "smooth_load_friction",
     "smooth_stiction",

@@ -136,6 +136,15 @@ def test_motor_offset_is_held_by_the_servo(target):
     assert again.position == pytest.approx(plant.position, abs=3e-5)  # wherever it comes from
 
 
+@pytest.mark.parametrize("target", [0.030, 0.034])
+@pytest.mark.parametrize("spring", [(4.0, 0.045), (30.0, 0.02)])
+def test_return_spring_is_held_by_the_servo(spring, target):
+    """At rest kp (u − q) = k (q − q_0)."""
+    stiffness, rest = spring
+    expected = (GAIN * target + stiffness * rest) / (GAIN + stiffness)
+    assert settle("return_spring", spring, target).position[0] == pytest.approx([expected] * 2, abs=2e-5)
+
+
 @pytest.mark.parametrize(("stiffness", "damping"), [(0.2, 0.0), (0.0, -0.3), (0.1, 0.1)])
 def test_motor_asymmetry_lets_fingers_lag_by_what_damps_over_what_pulls(stiffness, damping):
     """On a ramp of speed v, ``K (u − q) = B v``; pressing, each finger stands off by its own spring."""
