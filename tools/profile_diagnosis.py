@@ -13,9 +13,20 @@ from types import FrameType
 from mujoco.batch import Batch
 
 from forcegrasp.cli.measuring import refuse_table
-from forcegrasp.diagnosis import needless, odd_grasps, signatures, step, tolerance
+from forcegrasp.diagnosis import (
+    exchange,
+    faults,
+    merge,
+    moved_set,
+    needless,
+    odd_grasps,
+    signatures,
+    split,
+    step,
+    tolerance,
+)
 from forcegrasp.diagnosis.diagnose_set import diagnose_set
-from forcegrasp.diagnosis.refine import refine
+from forcegrasp.diagnosis.refine import refine, refine_anyway
 from forcegrasp.identify.base_fit import fit_base
 from forcegrasp.identify.cross_validation import heldout_residual
 from forcegrasp.identify.loading import load
@@ -35,7 +46,14 @@ PARTS = {
     needless.drop_needless.__code__: "fits without known effects",
     heldout_residual.__code__: "held-out grasps",
     odd_grasps.odd_grasps.__code__: "odd grasps",
-    tolerance.move_given.__code__: "tolerances",
+    refine_anyway.__code__: "rough fits with effects that promise little",
+    exchange.exchange.__code__: "effects in place of known ones",
+    split.split.__code__: "two effects in place of one",
+    merge.merge.__code__: "one effect in place of two",
+    needless.simplify.__code__: "simpler effects",
+    moved_set.go_on_with_moved.__code__: "what is given, moved",
+    faults.suspects.__code__: "mistakes of the set",
+    tolerance.wanted_moves.__code__: "how far what is given is to be moved",
 }
 
 

@@ -3,23 +3,27 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 
 import numpy as np
 
 from forcegrasp.diagnosis.evidence import indistinguishable, rivals_in
 from forcegrasp.diagnosis.exchange import against, steps_of
-from forcegrasp.diagnosis.families import refit_as, refit_without, roughly_as
+from forcegrasp.diagnosis.families import look_alike, may_join, refit_as, refit_without, roughly_as
 from forcegrasp.diagnosis.needless import chained
+from forcegrasp.diagnosis.refine import refine_anyway
 from forcegrasp.diagnosis.result import Candidate, Step
 from forcegrasp.diagnosis.signatures import trials
 from forcegrasp.diagnosis.study import Study
+from forcegrasp.effects import Effect
 from forcegrasp.identify.fit import Fit
 from forcegrasp.identify.side_by_side import side_by_side
 
 
-def ask_again(study: Study, steps: Sequence[Step], fit: Fit) -> tuple[list[Step], Fit]:
+def ask_again(
+    study: Study, steps: Sequence[Step], fit: Fit, effects: Sequence[type[Effect]] = ()
+) -> tuple[list[Step], Fit]:
     """The steps less those rivals that the whole model tells apart, or with one in the first one's place; and the fit.
 
     Two effects may have fitted alike only because what was still missing hid the difference. Of the step that found
@@ -29,20 +33,34 @@ def ask_again(study: Study, steps: Sequence[Step], fit: Fit) -> tuple[list[Step]
       study: the measurements.
       steps: that found the effects.
       fit: with all effects.
+      effects: that may do better than one of their family that was found when others were still missing.
     """
     left = list(steps)
     for step in steps_of(fit, steps)[:-1]:
-        if len(step.effects) == 1:
-            continue
-        asked, fit = _asked(study, step, fit)
-        left[left.index(step)] = asked
+        rivals = [*rivals_in(step, fit), *_others_of_its_family(study, step, fit, effects)]
+        if rivals:
+            left[left.index(step)], fit = _asked(study, step, rivals, fit)
     return (left if left == list(steps) else chained(left, study.error(study.heldout(fit)))), fit
 
 
-def _asked(study: Study, step: Step, fit: Fit) -> tuple[Step, Fit]:
+def _others_of_its_family(study: Study, step: Step, fit: Fit, effects: Sequence[type[Effect]]) -> Iterator[Candidate]:
+    """Candidates that leave less than a model on few grasps in the place of the effect that a step found."""
+    own = next(one.effect for one in fit.problem.effects if one.effect.name == step.effects[0])
+    others = [one.effect for one in fit.problem.effects if one.effect is not own]
+    alike = [
+        effect for effect in effects
+        if effect.family == own.family and look_alike(effect, own) and effect.name not in step.effects
+        and may_join(effect, [*others, own])
+    ]  # fmt: skip
+    for better in refine_anyway(alike, study, fit, own.name) if alike else ():
+        change = (better.weight * (fit.residual - better.residual)).ravel()
+        signature = change / max(float(np.linalg.norm(change)), 1e-9)
+        yield dataclasses.replace(step.candidates[0], setting=better.effects[-1], fit=better, signature=signature)
+
+
+def _asked(study: Study, step: Step, rivals: Sequence[Candidate], fit: Fit) -> tuple[Step, Fit]:
     """A step with those of its rivals that the whole model can't tell apart; and the model with the first of them."""
     own = step.effects[0]
-    rivals = rivals_in(step, fit)
     study.progress(f"asking again whether {' or '.join([own, *(c.effect.name for c in rivals)])}")
     without = study.heldout(refit_without(own, fit, study))
     fits = side_by_side([partial(_with_rival, one, fit, own, study) for one in rivals])
@@ -52,9 +70,11 @@ def _asked(study: Study, step: Step, fit: Fit) -> tuple[Step, Fit]:
     if best is not first and indistinguishable(best, first):
         best = first
     apart = {c.effect.name for c in (first, *judged) if c is not best and not indistinguishable(best, c)}
-    names = [best.effect.name, *(n for n in step.effects if n != best.effect.name and n not in apart)]
+    every = dict.fromkeys([*step.effects, *(c.effect.name for c in rivals)])
+    names = [best.effect.name, *(n for n in every if n != best.effect.name and n not in apart)]
+    new = [c for c in judged if c.effect.name not in {one.effect.name for one in step.candidates}]
     as_found = sorted(
-        step.candidates, key=lambda c: names.index(c.effect.name) if c.effect.name in names else len(names)
+        [*step.candidates, *new], key=lambda c: names.index(c.effect.name) if c.effect.name in names else len(names)
     )
     return dataclasses.replace(step, effects=tuple(names), candidates=tuple(as_found)), best.fit
 

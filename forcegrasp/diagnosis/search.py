@@ -117,7 +117,7 @@ def diagnose(
     steps, fit = simplify(study, steps, fit, len(base.fit.problem.effects))
     steps, fit = merge(study, steps, fit, effects, len(base.fit.problem.effects))
     steps, fit = _look_beside_all(study, steps, fit, simulators)
-    begun = _Begun(base, first, numerical, odd, folds, error_before, floor)
+    begun = _Begun(base, first, numerical, odd, folds, error_before, floor, effects)
     found = _concluded(begun, study, steps, fit)
     if believed is None or _convincing(believed[2], believed[1], study, fit):
         return found
@@ -136,6 +136,7 @@ class _Begun:
     folds: tuple[np.ndarray, ...]
     error: float
     floor: float
+    effects: Sequence[type[Effect]]
 
 
 def _concluded(begun: _Begun, study: Study, steps: Sequence[Step], fit: Fit) -> Diagnosis:
@@ -145,7 +146,7 @@ def _concluded(begun: _Begun, study: Study, steps: Sequence[Step], fit: Fit) -> 
     much_left = bool(left) and error_after > MUCH * floor
     steps = settle_ties([with_close_rivals(step) for step in steps] if much_left else steps)
     if not much_left:  # what is still missing could decide between them again
-        steps, asked = ask_again(study, steps, fit)
+        steps, asked = ask_again(study, steps, fit, begun.effects if error_after > floor else ())
         if asked is not fit:
             fit = asked
             error_after, (left, noise, alone) = study.error(study.heldout(fit)), _left_by_many(study, fit)

@@ -69,6 +69,19 @@ def test_what_the_whole_model_can_not_tell_apart_stays_tied(found):
     assert same is fit
 
 
+def test_one_of_its_family_that_does_better_takes_the_place(found):
+    study, (step, last), fit = tied(found, "load_friction")
+    one = dataclasses.replace(step.candidates[0], signature=np.eye(1, fit.residual.size)[0])
+    steps = [dataclasses.replace(step, candidates=(one,)), last]
+    friction, deadband = (effect_of(name, fit.problem.gripper) for name in (FRICTION, DEADBAND))
+    left, better = ask_again(study, steps, fit, [deadband, friction])
+    assert [step.effects for step in left] == [(FRICTION,), (LAG,)]
+    assert names_in(better) == {FRICTION, LAG}
+    assert better.cost < 0.9 * fit.cost
+    assert [c.effect.name for c in left[0].candidates] == [FRICTION, "load_friction"]
+    assert ask_again(study, steps, fit, [deadband]) == (steps, fit)
+
+
 def test_of_the_last_step_all_was_in_the_model(found, monkeypatch):
     study, steps, fit = tied(found, FRICTION, DEADBAND)
     monkeypatch.setattr("forcegrasp.diagnosis.ask_again._asked", lambda *_: pytest.fail("asked again"))
