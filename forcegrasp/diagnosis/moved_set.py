@@ -12,9 +12,9 @@ from forcegrasp.diagnosis.evidence import LEAST_LEAD, LEAST_SHARE_OF_MANY, is_be
 from forcegrasp.diagnosis.families import refit_without, roughly_as
 from forcegrasp.diagnosis.faults import Fault, within_tolerance
 from forcegrasp.diagnosis.needless import drop_all_needless
-from forcegrasp.diagnosis.result import Diagnosis, Step, kept_steps
+from forcegrasp.diagnosis.result import Candidate, Diagnosis, Step, kept_steps
 from forcegrasp.diagnosis.study import Study
-from forcegrasp.diagnosis.tolerance import all_radii
+from forcegrasp.diagnosis.tolerance import all_radii, may_be_moved
 from forcegrasp.diagnosis.verdict import LEAST_SHARE
 from forcegrasp.effects.object_size import ObjectSize
 from forcegrasp.identify.base_fit import BaseFit
@@ -43,7 +43,7 @@ class MovesFirst:
     asked: bool = False  #: whether they were, of any fit
 
     def __call__(self, target: Target, fit: Fit) -> bool:
-        first = within_tolerance(self.loaded, target, fit, _NEARLY_ALL) is not None
+        first = may_be_moved(self.loaded.measured, target, fit, _NEARLY_ALL)
         self.asked |= first
         return first
 
@@ -196,7 +196,7 @@ def _one_after_the_other(study: Study, steps: Sequence[Step], fit: Fit) -> tuple
       steps: that found the effects.
       fit: with all effects.
     """
-    error, found = study.error(study.heldout(fit)), list(steps)
+    error, found, later = study.error(study.heldout(fit)), list(steps), []
     for place, step in reversed(list(enumerate(steps))):
         if step.is_counted:
             found[place] = dataclasses.replace(step, error_before=error, error_after=error)
@@ -205,6 +205,15 @@ def _one_after_the_other(study: Study, steps: Sequence[Step], fit: Fit) -> tuple
         first = dataclasses.replace(step.candidates[0], setting=setting, fit=fit, error_after=error)
         fit, after = refit_without(step.effects[0], fit, study), error
         error = study.error(study.heldout(fit))
-        candidates = (first, *step.candidates[1:])
+        rivals = [_before(later, one, study) for one in step.candidates[1:]]
+        later.append(step.effects[0])
+        candidates = (first, *rivals)
         found[place] = dataclasses.replace(step, candidates=candidates, error_before=error, error_after=after)
     return found, fit
+
+
+def _before(later: Sequence[str], rival: Candidate, study: Study) -> Candidate:
+    """A rival with the error that it leaves while these effects, which were found after it, are not in its model."""
+    if not later:
+        return rival
+    return dataclasses.replace(rival, error_after=study.error(study.heldout(refit_without(later, rival.fit, study))))

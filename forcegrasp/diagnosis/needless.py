@@ -9,10 +9,19 @@ from functools import partial
 import numpy as np
 
 from forcegrasp.diagnosis.evidence import LEAST_RISE, is_beyond_chance, nearly_as_much
-from forcegrasp.diagnosis.families import falls_back, fits_as_well, refit_as, refit_without, roughly_without, simpler
+from forcegrasp.diagnosis.families import (
+    falls_back,
+    fits_as_well,
+    refit_as,
+    refit_without,
+    roughly_as,
+    roughly_without,
+    simpler,
+)
 from forcegrasp.diagnosis.result import Step
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.diagnosis.verdict import LEAST_SHARE
+from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.identify.fit import Fit
 from forcegrasp.identify.noise_floor import excess
 from forcegrasp.identify.side_by_side import side_by_side
@@ -77,17 +86,29 @@ def simplify(study: Study, steps: Sequence[Step], fit: Fit, given: int) -> tuple
     for step in [step for step in steps if step.effects and step.candidates][:-1]:
         settings = {one.effect.name: one for one in fit.effects[given:]}
         known = settings.get(step.effects[0])
-        if known is None or not known.effect.contains:
+        if known is None:
+            continue
+        simple = [simpler(known, nested, fit.problem.gripper) for nested in known.effect.contains]
+        surely = side_by_side([partial(_is_surely_more_than, one, known.effect.name, fit, study) for one in simple])
+        doubted = [one for one, is_more in zip(simple, surely, strict=True) if not is_more]
+        if not doubted:
             continue
         without, held = study.heldout(refit_without(known.effect.name, fit, study)), study.heldout(fit)
-        for nested in known.effect.contains:
-            study.progress(f"fitting with {nested.effect} in place of {known.effect.name}")
-            less = refit_as(simpler(known, nested, fit.problem.gripper), fit, known.effect.name, study)
+        for nested in doubted:
+            study.progress(f"fitting with {nested.effect.name} in place of {known.effect.name}")
+            less = refit_as(nested, fit, known.effect.name, study)
             if is_enough(study, without, study.heldout(less), held):
-                study.progress(f"{nested.effect} is enough")
-                left[left.index(step)], fit = _with_simpler(step, nested.effect, less), less
+                study.progress(f"{nested.effect.name} is enough")
+                left[left.index(step)], fit = _with_simpler(step, nested.effect.name, less), less
                 break
     return (left if left == list(steps) else chained(left, study.error(study.heldout(fit)))), fit
+
+
+def _is_surely_more_than(simple: EffectSetting, name: str, fit: Fit, study: Study) -> bool:
+    """Whether few grasps say so clearly that a simpler effect does not do in another one's place."""
+    some, part = study.on_few(fit)
+    less = None if some is study else roughly_as([simple], part, name, some)
+    return less is not None and is_beyond_chance(some.gains(less.residual, part.residual), SURELY * LEAST_RISE)
 
 
 def is_enough(study: Study, without: np.ndarray, of_simple: np.ndarray, of_richer: np.ndarray) -> bool:

@@ -156,14 +156,9 @@ def wanted_moves(measured: MeasurementSet, target: Target, fit: Fit, worth: floa
       fit: of the base model, with all as given.
       worth: least share of the squares beyond the noise.
     """
-    numbers = _numbers(measured, target)
-    columns = _columns(target, fit, numbers)
-    groups = [kinds for kinds in _GROUPS if any(number.kind in kinds for number in numbers)]
-    steps = [_step(fit, columns, numbers, kinds) for kinds in groups]
-    explained = [fit.cost - left - 2 * moved.price for moved, left in steps]
-    if max(explained) <= max(worth * (fit.cost - target.readings), 0.0):  # noise may leave less than it should
+    moved = _first_step(measured, target, fit, worth)
+    if moved is None:
         return None
-    moved, _ = next(one for one, share in zip(steps, explained, strict=True) if share > _NEARLY * max(explained))
     for _ in range(_STEPS - 1):
         grasps = tuple(moved.put(g) for g in measured.grasps)
         problem = Problem(fit.problem.gripper, grasps, fit.problem.effects)
@@ -174,6 +169,24 @@ def wanted_moves(measured: MeasurementSet, target: Target, fit: Fit, worth: floa
         if np.abs(moved.deviations - before).max() < _SETTLED:
             break
     return moved if np.any(moved.deviations) else None
+
+
+def may_be_moved(measured: MeasurementSet, target: Target, fit: Fit, worth: float = WORTH) -> bool:
+    """Whether the first step of :func:`wanted_moves` explains enough, within the tolerance."""
+    moved = _first_step(measured, target, fit, worth)
+    return moved is not None and moved.is_within
+
+
+def _first_step(measured: MeasurementSet, target: Target, fit: Fit, worth: float) -> Moved | None:
+    """One linear step of the fewest numbers that explain nearly what all would; None if that is too little."""
+    numbers = _numbers(measured, target)
+    columns = _columns(target, fit, numbers)
+    groups = [kinds for kinds in _GROUPS if any(number.kind in kinds for number in numbers)]
+    steps = [_step(fit, columns, numbers, kinds) for kinds in groups]
+    explained = [fit.cost - left - 2 * moved.price for moved, left in steps]
+    if max(explained) <= max(worth * (fit.cost - target.readings), 0.0):  # noise may leave less than it should
+        return None
+    return next(moved for (moved, _), share in zip(steps, explained, strict=True) if share > _NEARLY * max(explained))
 
 
 def _numbers(measured: MeasurementSet, target: Target) -> tuple[_Number, ...]:
