@@ -47,8 +47,8 @@ class Advice(ShortRepr):
         one, other = self.rivals
         return (
             f"record next: {self.grasp} (on {self.next_grasp.object}); there {one} and {other} differ by"
-            f" {self.differences[self.grasp]:.1f} × noise, which is expected to give {self.bits[self.grasp]:.2f} of the"
-            " 1 bit that decides between them"
+            f" {self.differences[self.grasp]:.1f} × noise, which is expected to tell {self.bits[self.grasp]:.2f} bit"
+            " of which is right (1 is certainty)"
         )
 
 

@@ -45,6 +45,7 @@ _ONSETS = {
     "presliding": Cause("the motor must overcome it first, bristles and all", lambda o: {"force_n": o.motor_n}),
     "smooth_friction": Cause("the motor creeps against it, and is not there yet when the force is read", _none),
     "smooth_stiction": Cause("the motor creeps against it, and is not there yet when the force is read", _none),
+    "return_spring": Cause("a spring that pulls the finger open takes its part of the motor's force", _none),
     "backlash": Cause(
         "half the gap is lost: ahead of the encoder always, behind it if one target was held",
         lambda o: {"gap_m": 2 * o.travel_m},
