@@ -13,6 +13,8 @@ from forcegrasp.runs.provenance import git_hash
 ROOT = Path(__file__).resolve().parents[1]
 #: Packages on which a diagnosis depends.
 PACKAGES = ("identify", "diagnosis", "effects", "replay")
+#: Commit and digest in the sentence of a page or a card.
+STAMP = re.compile(r"commit `([0-9a-f]+\+?)`, digest `([0-9a-f]+)`")
 #: What of a package can change a figure.
 _SUFFIXES = (".py", ".yaml", ".xml", ".json")
 _SAID = "Measured with"

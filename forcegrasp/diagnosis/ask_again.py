@@ -45,7 +45,7 @@ def ask_again(
 
 def _others_of_its_family(study: Study, step: Step, fit: Fit, effects: Sequence[type[Effect]]) -> Iterator[Candidate]:
     """Candidates that leave less than a model on few grasps in the place of the effect that a step found."""
-    own = next(one.effect for one in fit.problem.effects if one.effect.name == step.effects[0])
+    own = fit.effect(step.effects[0]).effect
     others = [one.effect for one in fit.problem.effects if one.effect is not own]
     alike = [
         effect for effect in effects

@@ -133,8 +133,7 @@ def roughly_as_richer(container: type[Effect], fit: Fit, without: str, study: St
 
 
 def _richer_than(name: str, container: type[Effect], fit: Fit) -> list[EffectSetting]:
-    known = next(one for one in fit.effects if one.effect.name == name)
-    return richer(known, container)
+    return richer(fit.effect(name), container)
 
 
 def refit_without(names: str | Collection[str], fit: Fit, study: Study) -> Fit:

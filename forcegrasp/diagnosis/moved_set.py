@@ -58,8 +58,7 @@ def within_tolerance_after_all(found: Diagnosis, loaded: Loaded[MeasurementSet])
     step = next((step for step in kept_steps(found.steps) if step.effects == (ObjectSize.name,)), None)
     if step is None or found.left or found.fault is not None:
         return found
-    case = found.fit.problem.case(found.fit.vector)
-    (move_m,) = next(one.values.tolist() for one in case.effects if one.effect.name == ObjectSize.name)
+    (move_m,) = found.fit.effect(ObjectSize.name).values.tolist()
     moved = all_radii(loaded.measured, found.target, move_m)
     if moved is None:
         return found
@@ -175,7 +174,7 @@ def _with_rivals_that_do_as_well(best: _Model, models: Sequence[_Model], study: 
             continue
         step, own = steps[place], best.steps[place].candidates[0]
         rival, lead = other.steps[place].candidates[0], _lead(best, other, study)
-        setting = next(one for one in other.fit.effects if one.effect.name == rival.effect.name)
+        setting = other.fit.effect(rival.effect.name)
         error = study.error(study.heldout(other.fit))
         rival = dataclasses.replace(rival, setting=setting, fit=other.fit, gains=own.gains - lead, error_after=error)
         least = LEAST_LEAD if own.effect.of_set != rival.effect.of_set else 0.0
@@ -201,8 +200,7 @@ def _one_after_the_other(study: Study, steps: Sequence[Step], fit: Fit) -> tuple
         if step.is_counted:
             found[place] = dataclasses.replace(step, error_before=error, error_after=error)
             continue
-        setting = next(one for one in fit.effects if one.effect.name == step.effects[0])
-        first = dataclasses.replace(step.candidates[0], setting=setting, fit=fit, error_after=error)
+        first = dataclasses.replace(step.candidates[0], setting=fit.effect(step.effects[0]), fit=fit, error_after=error)
         fit, after = refit_without(step.effects[0], fit, study), error
         error = study.error(study.heldout(fit))
         rivals = [_before(later, one, study) for one in step.candidates[1:]]

@@ -93,6 +93,10 @@ class Fit(ShortRepr):
         """The effects of the model as they were fitted."""
         return self.problem.case(self.vector).effects
 
+    def effect(self, name: str) -> EffectSetting:
+        """The effect of this name as it was fitted."""
+        return next(one for one in self.effects if one.effect.name == name)
+
     @property
     def slopes(self) -> np.ndarray:
         """The weighted Jacobian, ``(N, p)``."""

@@ -7,7 +7,7 @@ import shutil
 
 import pytest
 
-from tools.measured_code import digest
+from tools.measured_code import ROOT, digest
 from tools.results import __main__ as program
 from tools.results import blocks, execute, hours, pages, tables
 from tools.results.hours import Rates
@@ -184,6 +184,7 @@ def test_only_takes_what_is_needed_along_and_skip_leaves_out(every):
     assert names(["ship-ib"], []) == ["train-ib", "evaluate-ib", "ship-ib"]
     assert names(["printed"], ["train-printed"]) == ["evaluate-printed"]
     assert set(every) - set(names([], ["grippers", "pages"])) == {"grippers"}
+    assert [stage.name for stage in program.choose(every, ["pictures"], [], package=True)] == ["pictures"]
     with pytest.raises(ValueError, match="nothing is called ib, no_such; there are"):
         program.choose(every, ["ib"], ["no_such"])
 
@@ -440,3 +441,14 @@ def test_a_digest_is_of_single_files_and_of_presets_beside_the_package(tmp_path)
         (tmp_path / path).write_text("a = 2\n")
         assert now() not in known
         known.add(now())
+
+
+def test_a_policy_of_the_package_was_shipped_as_its_card_says(tmp_path):
+    notes = Notes(tmp_path)
+    note = notes.ended("ship-ib")
+    assert note is not None
+    card = (ROOT / "forcegrasp/policies/ib/card.md").read_text()
+    assert f"commit `{note.commit}`, digest `{note.digest}`" in card
+    assert notes.behind(["ship-ib"]) == [note]
+    assert notes.ended("ship-nothing") is None
+    assert notes.ended("train-ib") is None

@@ -5,6 +5,7 @@
     python -m tools.results --redo outdated       also what other code than today's has made
     python -m tools.results --skip hidden-effects,grippers
     python -m tools.results --only ablation       a stage, or a table or picture by its mark, and what it needs
+    python -m tools.results --only pictures --package    of the policies as the package has them: none is trained
     python -m tools.results --seeds 2 --frames 50000 --trials 2    a trial: pages and policies go to OUT/pages
     python -m tools.results check                 fails where a page's figures are older than the code they measure
 
@@ -21,7 +22,7 @@ from forcegrasp.errors import ForcegraspError
 from forcegrasp.runs.lock import only_writer
 from tools.results import execute
 from tools.results.blocks import BLOCKS
-from tools.results.notes import Notes, State
+from tools.results.notes import SHIP, Notes, State
 from tools.results.settings import SEEDS, Settings
 from tools.results.stage import Stage
 
@@ -34,6 +35,7 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--out", type=Path, help="folder of results (runs/results; of a trial runs/results_trial)")
     parser.add_argument("--only", default="", metavar="NAMES", help="stages, tables or pictures; by commas")
     parser.add_argument("--skip", default="", metavar="NAMES", help="stages to leave out, or pages; by commas")
+    parser.add_argument("--package", action="store_true", help="policies as the package has them: none is trained")
     parser.add_argument("--redo", choices=("outdated",), help="begin anew what is not of today's code or commands")
     parser.add_argument("--seeds", type=_count, default=SEEDS, help=f"of each training ({SEEDS})")
     parser.add_argument("--frames", type=_count, help="control steps of each training")
@@ -63,7 +65,7 @@ def main(arguments: list[str] | None = None) -> int:
     settings = Settings(out.resolve(), *(options.seeds, options.frames, options.trials, options.real_data))
     try:
         every = stages(settings)
-        chosen = choose(every, _words(options.only), _words(options.skip))
+        chosen = choose(every, _words(options.only), _words(options.skip), options.package)
         notes = Notes(settings.out)
         tell(chosen, notes, settings, options.redo is not None)
         if options.what == "plan":
@@ -82,8 +84,8 @@ def main(arguments: list[str] | None = None) -> int:
     return status
 
 
-def choose(every: dict[str, Stage], only: list[str], skip: list[str]) -> list[Stage]:
-    """The stages that were asked for, with those that they need, in order.
+def choose(every: dict[str, Stage], only: list[str], skip: list[str], package: bool = False) -> list[Stage]:
+    """The stages that were asked for, with those that they need, in order; of the policies of the package, none.
 
     Raises:
       ValueError: if there is no stage, table or picture of a name.
@@ -94,7 +96,7 @@ def choose(every: dict[str, Stage], only: list[str], skip: list[str]) -> list[St
         raise ValueError(f"nothing is called {', '.join(unknown)}; there are {', '.join([*every, *shown])}")
     wanted = [stage for name in only for stage in shown.get(name, (name,))] or list(every)
     for name in wanted:  # grows as it is gone through
-        wanted += [need for need in every[name].needs if need not in wanted]
+        wanted += [n for n in every[name].needs if n not in wanted and not (package and n.startswith(SHIP))]
     return [stage for name, stage in every.items() if name in wanted and name not in skip]
 
 

@@ -32,7 +32,7 @@ def carry_out(stages: Iterable[Stage], notes: Notes, redo: bool, say: Callable[[
             say(f"{stage.name}: made {why}, and left as it is; --redo outdated makes it anew")
             left = 1
             continue
-        if waiting := [name for name in stage.needs if not _ended(notes, name)]:
+        if waiting := [name for name in stage.needs if notes.ended(name) is None]:
             say(f"{stage.name}: waits for {', '.join(waiting)}")
             left = 1
             continue
@@ -41,11 +41,6 @@ def carry_out(stages: Iterable[Stage], notes: Notes, redo: bool, say: Callable[[
             say(f"{stage.name}: {how}; the same command goes on from here")
             return status
     return left
-
-
-def _ended(notes: Notes, name: str) -> bool:
-    note = notes.read(name)
-    return bool(note and note.ended)
 
 
 def _run(stage: Stage, notes: Notes, say: Callable[[str], None]) -> int:

@@ -12,9 +12,12 @@ from pathlib import Path
 
 from forcegrasp.files.whole_file import write_whole
 from forcegrasp.runs.provenance import git_hash
-from tools.measured_code import sentence
+from tools.measured_code import ROOT, STAMP, sentence
 from tools.results.settings import digests
 from tools.results.stage import Stage
+
+#: What the names of stages begin with that put a policy into the package.
+SHIP = "ship-"
 
 
 class State(StrEnum):
@@ -50,6 +53,13 @@ class Notes:
         path = self._path(name)
         return Note(**json.loads(path.read_text("utf-8"))) if path.is_file() else None
 
+    def ended(self, name: str) -> Note | None:
+        """The note of a stage that has ended; of a policy that was shipped elsewhere, what its card says."""
+        note = self.read(name)
+        if note is None and name.startswith(SHIP):
+            return _of_card(ROOT / "forcegrasp" / "policies" / name.removeprefix(SHIP) / "card.md")
+        return note if note and note.ended else None
+
     def state(self, stage: Stage) -> tuple[State, str]:
         """How far it is, and why it is outdated."""
         note = self.read(stage.name)
@@ -68,8 +78,8 @@ class Notes:
         found: dict[str, Note] = {}
         ahead = list(names)
         for name in ahead:  # grows as it is gone through
-            note = self.read(name)
-            if note is None or not note.ended:
+            note = self.ended(name)
+            if note is None:
                 return None
             found[name] = note
             ahead += [need for need in note.needs if need not in ahead]
@@ -107,6 +117,11 @@ class Notes:
     def _write(self, name: str, note: Note) -> None:
         self._path(name).parent.mkdir(parents=True, exist_ok=True)
         write_whole(self._path(name), (json.dumps(asdict(note), indent=1) + "\n").encode())
+
+
+def _of_card(card: Path) -> Note | None:
+    found = STAMP.search(card.read_text("utf-8")) if card.is_file() else None
+    return Note([], {}, found[1], found[2], ended="in the package") if found else None
 
 
 def stamps(made: list[Note], name: str, more: str = "") -> list[str]:
