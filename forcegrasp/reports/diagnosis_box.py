@@ -46,11 +46,15 @@ def answer_box(diagnosis: Diagnosis, advice: Advice | None, commands: Sequence[C
     left = left_sentence(d).removeprefix("what is left is ")
     # of rivals the next command tells which grasp to record
     record = advice.sentence().removeprefix("record next: ") if advice and d.verdict is not Verdict.ONE_OF else ""
+    fault = d.fault if d.verdict is Verdict.DATA and not kept_steps(d.steps) else None  # that is all that was found
+    what = answer(d) if fault is None else f"Not the model but the set seems to be wrong: {fault.name}."
     shows_rest = (found or d.verdict is Verdict.UNKNOWN) and not is_of_labels(d)
     rows = [
         ("The set", fault_words(d) if found else ""),
+        ("What is wrong", f"{fault.words[0].upper()}{fault.words[1:]}." if fault else ""),
+        ("To check", f"{fault.check[0].upper()}{fault.check[1:]}." if fault else ""),
         ("Explains", shares_sentence(d) if found else ""),
-        ("Error", f"{fall}; up to {d.floor:.2f} is noise." if found and d.steps else ""),
+        ("Error", f"{fall}; up to {d.floor:.2f} is noise." if (found and d.steps) or fault else ""),
         ("How sure", certainty(d)),
         ("Runner-up", runner_up(d) if d.verdict.lacks_effects else ""),
         ("What is left", f"{left[0].upper()}{left[1:]}." if shows_rest else ""),
@@ -62,7 +66,7 @@ def answer_box(diagnosis: Diagnosis, advice: Advice | None, commands: Sequence[C
         ("Note", note),
     ]
     return Answer(
-        lacks(d) if found else answer(d),
+        lacks(d) if found else what,
         [(name, text) for name, text in rows if text],
         [(f"{name} {percent(share)}", share) for name, share in shares.items()],
         commands,

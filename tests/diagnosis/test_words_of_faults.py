@@ -14,6 +14,7 @@ from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.identify.problem import Problem
 from forcegrasp.identify.verdict import Verdict
 from forcegrasp.reports.diagnosis import answer, diagnosis_json, lines
+from forcegrasp.reports.diagnosis_box import answer_box
 from forcegrasp.reports.diagnosis_words import row_sentence
 from forcegrasp.reports.next_step import after_diagnosis
 
@@ -65,6 +66,17 @@ def test_a_fault_besides_an_effect_is_told_first(made_up, fault):
     assert diagnosis_json(both, None, made_up.tried, "s")["fault"] == {
         "name": "time_scale", "words": "stamps are too long", "check": "the clock", "moved": None
     }  # fmt: skip
+
+
+def test_the_box_tells_a_fault_alone_in_a_line_for_each_thing(made_up, fault):
+    alone = dataclasses.replace(
+        made_up.diagnosis("explained"), verdict=Verdict.DATA, effects=("time_scale",), steps=(), fault=fault
+    )
+    box = answer_box(alone, None, [])
+    assert box.what == "Not the model but the set seems to be wrong: time_scale."
+    rows = dict(box.rows)
+    assert (rows["What is wrong"], rows["To check"]) == ("Stamps are too long.", "The clock.")
+    assert f"{alone.error_before:.2f} → {alone.error_after:.2f}" in rows["Error"]
 
 
 @pytest.mark.parametrize(
