@@ -47,7 +47,9 @@ def answer_box(diagnosis: Diagnosis, advice: Advice | None, commands: Sequence[C
     # of rivals the next command tells which grasp to record
     record = advice.sentence().removeprefix("record next: ") if advice and d.verdict is not Verdict.ONE_OF else ""
     fault = d.fault if d.verdict is Verdict.DATA and not kept_steps(d.steps) else None  # that is all that was found
-    what = answer(d) if fault is None else f"Not the model but the set seems to be wrong: {fault.name}."
+    what = lacks(d) if found else answer(d)
+    if fault is not None:
+        what = f"Not the model but the set seems to be wrong: {fault.name}."
     shows_rest = (found or d.verdict is Verdict.UNKNOWN) and not is_of_labels(d)
     rows = [
         ("The set", fault_words(d) if found else ""),
@@ -66,7 +68,7 @@ def answer_box(diagnosis: Diagnosis, advice: Advice | None, commands: Sequence[C
         ("Note", note),
     ]
     return Answer(
-        lacks(d) if found else what,
+        what,
         [(name, text) for name, text in rows if text],
         [(f"{name} {percent(share)}", share) for name, share in shares.items()],
         commands,
