@@ -63,21 +63,23 @@ def test_effects_that_contain_one_another_are_related():
 
 
 @pytest.mark.parametrize(
-    ("lead", "redundant"),
+    ("lead", "fits_better", "redundant"),
     [
-        (np.array([3.0, -3.0, 2.0, -2.0]), True),  # no lead
-        (np.full(4, 3.0), True),  # a sure one, of 3 % of what the simple one gains
-        (np.full(4, 30.0), False),
+        (np.array([3.0, -3.0, 2.0, -2.0]), True, True),  # no lead
+        (np.full(4, 3.0), True, True),  # a sure one, of 3 % of what the simple one gains
+        (np.full(4, 30.0), True, False),
+        (np.full(4, 30.0), False, True),  # of held-out grasps alone, whose predictions are linear
     ],
 )
-def test_an_effect_must_explain_more_than_the_one_it_contains(made_up, lead, redundant):
+def test_an_effect_must_explain_more_than_the_one_it_contains(made_up, lead, fits_better, redundant):
     good = made_up.diagnosis("effect").steps[0].candidates[0]
 
-    def candidate(name: str, gains: np.ndarray):
-        return dataclasses.replace(good, setting=EffectSetting.typical(get_effect(name)), gains=gains)
+    def candidate(name: str, gains: np.ndarray, less: float = 1.0):
+        fit = dataclasses.replace(good.fit, residual=less * good.fit.residual)
+        return dataclasses.replace(good, setting=EffectSetting.typical(get_effect(name)), gains=gains, fit=fit)
 
     simple = candidate("coulomb_friction", np.full(4, 100.0))
-    rich = candidate("stiction", 100.0 + lead)
+    rich = candidate("stiction", 100.0 + lead, 0.9 if fits_better else 1.0)
     assert add_nothing([simple, rich]) == ({"stiction"} if redundant else set())
     assert add_nothing([rich, candidate("backlash", np.full(4, 100.0))]) == set()
 
@@ -88,7 +90,8 @@ def test_an_effect_that_has_become_the_one_it_contains_adds_nothing_whatever_it_
     good = made_up.diagnosis("effect").steps[0].candidates[0]
     simple = dataclasses.replace(good, setting=EffectSetting.typical(get_effect("coulomb_friction")))
     smooth = EffectSetting(get_effect("smooth_friction"), "", np.array([0.03, creep]))
-    rich = dataclasses.replace(good, setting=smooth, gains=2 * good.gains)
+    fit = dataclasses.replace(good.fit, residual=0.9 * good.fit.residual)
+    rich = dataclasses.replace(good, setting=smooth, gains=2 * good.gains, fit=fit)
     assert add_nothing([simple, rich]) == ({"smooth_friction"} if redundant else set())
 
 
