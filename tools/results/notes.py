@@ -18,6 +18,8 @@ from tools.results.stage import Stage
 
 #: What the names of stages begin with that put a policy into the package.
 SHIP = "ship-"
+# When a stage has ended whose policy came with the package.
+_IN_PACKAGE = "in the package"
 
 
 class State(StrEnum):
@@ -121,11 +123,14 @@ class Notes:
 
 def _of_card(card: Path) -> Note | None:
     found = STAMP.search(card.read_text("utf-8")) if card.is_file() else None
-    return Note([], {}, found[1], found[2], ended="in the package") if found else None
+    return Note([], {}, found[1], found[2], ended=_IN_PACKAGE) if found else None
 
 
 def stamps(made: list[Note], name: str, more: str = "") -> list[str]:
     """For a page or a card: a sentence for each state of the code that took part, and the command to do it again."""
-    commits = {note.digest: note.commit for note in reversed(made)}
+    first = {note.digest: note for note in reversed(made)}
     how = f"`python -m tools.results --only {name}`{more}"
-    return [sentence(commit, digest, how) for digest, commit in commits.items()]
+    return [
+        sentence(note.commit, digest, "policies that are shown" if note.ended == _IN_PACKAGE else how)
+        for digest, note in reversed(first.items())
+    ]
