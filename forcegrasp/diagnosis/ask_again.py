@@ -10,11 +10,11 @@ import numpy as np
 
 from forcegrasp.diagnosis.evidence import indistinguishable, rivals_in
 from forcegrasp.diagnosis.exchange import against, steps_of
-from forcegrasp.diagnosis.families import look_alike, may_join, refit_as, refit_without, roughly_as
+from forcegrasp.diagnosis.families import may_join, others_of_its_family, refit_as, refit_without, roughly_as
 from forcegrasp.diagnosis.needless import chained
 from forcegrasp.diagnosis.refine import refine_anyway
 from forcegrasp.diagnosis.result import Candidate, Step
-from forcegrasp.diagnosis.signatures import trials
+from forcegrasp.diagnosis.signatures import direction, trials
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.effects import Effect
 from forcegrasp.identify.fit import Fit
@@ -37,24 +37,22 @@ def ask_again(
     """
     left = list(steps)
     for step in steps_of(fit, steps)[:-1]:
-        rivals = [*rivals_in(step, fit), *_others_of_its_family(study, step, fit, effects)]
+        rivals = [*rivals_in(step, fit), *_better_of_its_family(study, step, fit, effects)]
         if rivals:
             left[left.index(step)], fit = _asked(study, step, rivals, fit)
     return (left if left == list(steps) else chained(left, study.error(study.heldout(fit)))), fit
 
 
-def _others_of_its_family(study: Study, step: Step, fit: Fit, effects: Sequence[type[Effect]]) -> Iterator[Candidate]:
+def _better_of_its_family(study: Study, step: Step, fit: Fit, effects: Sequence[type[Effect]]) -> Iterator[Candidate]:
     """Candidates that leave less than a model on few grasps in the place of the effect that a step found."""
     own = fit.effect(step.effects[0]).effect
     others = [one.effect for one in fit.problem.effects if one.effect is not own]
     alike = [
-        effect for effect in effects
-        if effect.family == own.family and look_alike(effect, own) and effect.name not in step.effects
-        and may_join(effect, [*others, own])
+        effect for effect in others_of_its_family(own, effects)
+        if effect.name not in step.effects and may_join(effect, [*others, own])
     ]  # fmt: skip
     for better in refine_anyway(alike, study, fit, own.name) if alike else ():
-        change = (better.weight * (fit.residual - better.residual)).ravel()
-        signature = change / max(float(np.linalg.norm(change)), 1e-9)
+        signature = direction(fit, better)
         yield dataclasses.replace(step.candidates[0], setting=better.effects[-1], fit=better, signature=signature)
 
 

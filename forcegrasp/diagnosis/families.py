@@ -45,6 +45,11 @@ def look_alike(one: type[Effect], other: type[Effect]) -> bool:
     return one.name in other.look_alikes or other.name in one.look_alikes
 
 
+def others_of_its_family(own: type[Effect], effects: Sequence[type[Effect]]) -> list[type[Effect]]:
+    """Those of the effects that are of one's family and look like it; no mistakes of the set."""
+    return [e for e in effects if e.family == own.family and look_alike(e, own) and not e.of_set]
+
+
 def _contained(effect: type[Effect]) -> set[str]:
     return {nested.effect for nested in effect.contains}
 

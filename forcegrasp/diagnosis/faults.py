@@ -211,7 +211,7 @@ def _sharper(tare: Tare, target: Target, fit: Fit) -> tuple[Tare, float]:
     per_unit = np.zeros((*target.signals.shape, len(changed)))
     for column, channel in enumerate(changed):
         per_unit[tare.first :, :, target.axis.forces.start + channel, column] = 1.0
-    step, left = linear_step(target, fit, per_unit)
+    step, left = linear_step(target, fit, Background(fit, ()), per_unit)
     change = tare.change_n.copy()
     change[changed] = np.where(
         np.abs(step - change[changed]) < _OTHERWISE * np.abs(change[changed]), step, change[changed]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 
 import numpy as np
@@ -21,7 +21,6 @@ from forcegrasp.diagnosis.families import (
 from forcegrasp.diagnosis.result import Step
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.diagnosis.verdict import LEAST_SHARE
-from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.identify.fit import Fit
 from forcegrasp.identify.noise_floor import excess
 from forcegrasp.identify.side_by_side import side_by_side
@@ -89,7 +88,8 @@ def simplify(study: Study, steps: Sequence[Step], fit: Fit, given: int) -> tuple
         if known is None:
             continue
         simple = [simpler(known, nested, fit.problem.gripper) for nested in known.effect.contains]
-        surely = side_by_side([partial(_is_surely_more_than, one, known.effect.name, fit, study) for one in simple])
+        roughly = [partial(roughly_as, [one], without=known.effect.name) for one in simple]
+        surely = side_by_side([partial(_is_surely_worse, rough, fit, study) for rough in roughly])
         doubted = [one for one, is_more in zip(simple, surely, strict=True) if not is_more]
         if not doubted:
             continue
@@ -104,11 +104,19 @@ def simplify(study: Study, steps: Sequence[Step], fit: Fit, given: int) -> tuple
     return (left if left == list(steps) else chained(left, study.error(study.heldout(fit)))), fit
 
 
-def _is_surely_more_than(simple: EffectSetting, name: str, fit: Fit, study: Study) -> bool:
-    """Whether few grasps say so clearly that a simpler effect does not do in another one's place."""
+def _is_surely_worse(rough: Callable[..., Fit], fit: Fit, study: Study) -> bool:
+    """Whether few grasps say so clearly that another model leaves more than a fit that all need not be asked.
+
+    Args:
+      rough: fits the other model roughly, from a fit and with a study.
+      fit: that has what the other model lacks.
+      study: the measurements.
+    """
     some, part = study.on_few(fit)
-    less = None if some is study else roughly_as([simple], part, name, some)
-    return less is not None and is_beyond_chance(some.gains(less.residual, part.residual), SURELY * LEAST_RISE)
+    if some is study:
+        return False
+    less = rough(part, study=some)
+    return is_beyond_chance(some.gains(less.residual, part.residual), SURELY * LEAST_RISE)
 
 
 def is_enough(study: Study, without: np.ndarray, of_simple: np.ndarray, of_richer: np.ndarray) -> bool:
@@ -166,17 +174,10 @@ def drop_all_needless(study: Study, steps: Sequence[Step], fit: Fit, given: int)
     return left, fit
 
 
-def _is_surely_needed(name: str, fit: Fit, study: Study) -> bool:
-    """Whether few grasps say so clearly that the model needs an effect that all need not be asked."""
-    some, part = study.on_few(fit)
-    less = None if some is study else roughly_without(name, part, some)
-    return less is not None and is_beyond_chance(some.gains(less.residual, part.residual), SURELY * LEAST_RISE)
-
-
 def _without_needless(study: Study, fit: Fit, names: Sequence[str]) -> tuple[str, Fit] | None:
     """That one of these effects which held-out grasps ask for least, if they don't, and the fit without it."""
     held, without = study.heldout(fit), {}
-    surely = side_by_side([partial(_is_surely_needed, name, fit, study) for name in names])
+    surely = side_by_side([partial(_is_surely_worse, partial(roughly_without, name), fit, study) for name in names])
     doubted = [name for name, is_needed in zip(names, surely, strict=True) if not is_needed]
     for name in doubted:
         study.progress(f"fitting without {name}")

@@ -66,13 +66,14 @@ def session_drift(target: Target, fit: Fit) -> SessionDrift | None:
       fit: of the base model.
     """
     order, forces = order_in_session(target.grasps), fit.predicted[..., target.axis.forces]
-    left = left_beyond_noise(fit.residual, Background(fit, ()), target)
+    background = Background(fit, ())
+    left = left_beyond_noise(fit.residual, background, target)
     least, best = (1 - LEAST_SHARE) * max(0.0, left), None
     for of, one_unit in (("gain", forces), ("zero", np.ones_like(forces))):
         per_unit = np.zeros((*target.signals.shape, forces.shape[-1]))
         for column in range(forces.shape[-1]):
             per_unit[..., target.axis.forces.start + column, column] = order[:, None] * one_unit[..., column]
-        change, left = linear_step(target, fit, per_unit)
+        change, left = linear_step(target, fit, background, per_unit)
         if left < least:
             least, best = left, SessionDrift(of, change, left)
     return best

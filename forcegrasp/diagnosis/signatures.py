@@ -54,6 +54,12 @@ class Background:
         return vectors - self._basis @ (self._basis.T @ vectors)
 
 
+def direction(before: Fit, after: Fit) -> np.ndarray:
+    """What one fit changes of the weighted residuals of another, ``(N,)``, scaled to length 1."""
+    change = (after.weight * (before.residual - after.residual)).ravel()
+    return change / max(float(np.linalg.norm(change)), 1e-9)
+
+
 def trials(effects: Sequence[type[Effect]]) -> list[EffectSetting]:
     """Every trial of every variant of these effects."""
     return [EffectSetting(e, variant, values) for e in effects for variant in e.variants for values in e.trials()]

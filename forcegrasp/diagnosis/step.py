@@ -23,7 +23,7 @@ from forcegrasp.diagnosis.other_starts import other_starts
 from forcegrasp.diagnosis.refine import NO_BETTER, refine, refine_anyway
 from forcegrasp.diagnosis.result import Candidate, Step
 from forcegrasp.diagnosis.screen import MAX_GAIN_FACTOR, Screen
-from forcegrasp.diagnosis.signatures import Background, Score, best_effects, of_best_effects
+from forcegrasp.diagnosis.signatures import Background, Score, best_effects, direction, of_best_effects
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.diagnosis.verdict import LEAST_SHARE
 from forcegrasp.effects import Effect
@@ -193,7 +193,7 @@ class _Start:
           null: gains of the best signature of noise.
         """
         name, own = best.effect.name, best.effect
-        alike = [e for e in effects if e.family == own.family and families.look_alike(e, own) and not e.of_set]
+        alike = families.others_of_its_family(own, effects)
         for effect in alike:
             self._study.progress(f"trying {effect.name} in place of {name}")
         fits = refine_anyway(alike, self._study, best.fit, name)
@@ -324,9 +324,8 @@ class _Start:
 
     def _judge_by_gain(self, refit: Fit, null: np.ndarray, replaces: str = "") -> Candidate:
         """The same of a fit that did not start from a signature."""
-        change = (refit.weight * (self._fit.residual - refit.residual)).ravel()
         p_family = (1 + int(np.sum(null >= self._fit.cost - refit.cost))) / (1 + len(null))
-        return self._judge(refit, p_family, change / max(np.linalg.norm(change), 1e-9), replaces)
+        return self._judge(refit, p_family, direction(self._fit, refit), replaces)
 
     def _judge(self, refit: Fit, p_family: float, signature: np.ndarray, replaces: str = "") -> Candidate:
         """What held-out grasps say of a fit with one more effect, its last one."""

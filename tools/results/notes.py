@@ -71,7 +71,7 @@ class Notes:
             return State.OUTDATED, "by other commands"
         if note.digest != self._now[stage.code]:
             return State.OUTDATED, "with other code"
-        if anew := [name for name, ended in note.needs.items() if ended != self._ended(name)]:
+        if anew := [name for name, ended in note.needs.items() if ended != self._when_ended(name)]:
             return State.OUTDATED, f"before {', '.join(anew)}"
         return (State.DONE if note.ended else State.BEGUN), ""
 
@@ -91,7 +91,7 @@ class Notes:
         """The note of a stage that is begun, or gone on with."""
         note = self.read(stage.name)
         if note is None:
-            needs = {name: self._ended(name) for name in stage.needs}
+            needs = {name: self._when_ended(name) for name in stage.needs}
             commands = [list(command) for command in stage.commands]
             note = Note(commands, needs, git_hash() or "none", self._now[stage.code])
             self._write(stage.name, note)
@@ -109,7 +109,7 @@ class Notes:
         shutil.rmtree(self.out / stage.name, ignore_errors=True)
         self._path(stage.name).unlink(missing_ok=True)
 
-    def _ended(self, name: str) -> str:
+    def _when_ended(self, name: str) -> str:
         note = self.read(name)
         return note.ended if note else ""
 
