@@ -123,8 +123,8 @@ def refit_as(setting: EffectSetting, fit: Fit, without: str | Collection[str], s
 
 def roughly_as(settings: Sequence[EffectSetting], fit: Fit, without: str | Collection[str], study: Study) -> Fit:
     """The same by the cheap model, from the best of several sizes."""
-    problem, start = _best_start(settings, fit, without, study)
-    return fit_once(study.target, problem, study.simulators, start, fit.correction, rounds=0)
+    problem, start, slopes = _best_start(settings, fit, without, study)
+    return fit_once(study.target, problem, study.simulators, start, fit.correction, rounds=0, slopes=slopes)
 
 
 def refit_as_richer(container: type[Effect], fit: Fit, without: str, study: Study) -> Fit:
@@ -149,8 +149,8 @@ def refit_without(names: str | Collection[str], fit: Fit, study: Study) -> Fit:
 
 def roughly_without(names: str | Collection[str], fit: Fit, study: Study) -> Fit:
     """The same by the cheap model."""
-    problem, start, _ = _problem_without(names, fit)
-    return fit_once(study.target, problem, study.simulators, start, fit.correction, rounds=0)
+    problem, start, slopes = _problem_without(names, fit)
+    return fit_once(study.target, problem, study.simulators, start, fit.correction, rounds=0, slopes=slopes)
 
 
 def _problem_without(names: str | Collection[str], fit: Fit) -> tuple[Problem, np.ndarray, np.ndarray]:
@@ -168,15 +168,16 @@ def _without(names: str | Collection[str], fit: Fit) -> tuple[list[EffectSetting
 
 
 def _refit(settings: Sequence[EffectSetting], fit: Fit, without: str | Collection[str], study: Study) -> Fit:
-    problem, start = _best_start(settings, fit, without, study)
-    return fit_exactly(study.target, problem, study.simulators, start)
+    problem, start, slopes = _best_start(settings, fit, without, study)
+    return fit_exactly(study.target, problem, study.simulators, start, slopes)
 
 
 def _best_start(
     settings: Sequence[EffectSetting], fit: Fit, without: str | Collection[str], study: Study
-) -> tuple[Problem, np.ndarray]:
+) -> tuple[Problem, np.ndarray, np.ndarray]:
+    """The problem with the best of some effects in place of others, where to start, and the slopes of what stays."""
     kept, places = _without(without, fit)
-    base = fit.vector[places]
+    base, slopes = fit.vector[places], fit.jacobian[..., places]
     problems = [Problem(fit.problem.gripper, fit.problem.grasps, [*kept, setting]) for setting in settings]
     starts = [np.r_[base, problem.start()[len(base) :]] for problem in problems]
     if len(starts) > 1:
@@ -184,8 +185,8 @@ def _best_start(
         left = map(study.target.residual, predict(study.simulators.cheap, cases))
         errors = [float(np.sum((fit.weight * one) ** 2)) for one in left]
         best = int(np.argmin(errors))
-        return problems[best], starts[best]
-    return problems[0], starts[0]
+        return problems[best], starts[best], slopes
+    return problems[0], starts[0], slopes
 
 
 def extensions(fit: Fit, effects: Sequence[type[Effect]]) -> Iterator[tuple[str, type[Effect]]]:

@@ -11,6 +11,7 @@ import numpy as np
 from forcegrasp.diagnosis.evidence import LEAST_LEAD, LEAST_SHARE_OF_MANY, is_beyond_chance, rivals_in
 from forcegrasp.diagnosis.families import refit_without, roughly_as
 from forcegrasp.diagnosis.faults import Fault, within_tolerance
+from forcegrasp.diagnosis.few import with_few
 from forcegrasp.diagnosis.needless import drop_all_needless
 from forcegrasp.diagnosis.result import Candidate, Diagnosis, Step, kept_steps
 from forcegrasp.diagnosis.study import Study
@@ -92,7 +93,7 @@ def go_on_with_moved(
     progress(f"fitting with {best.fault.words}")
     target, simulators = best.target, Simulators(best.fit.problem)
     numerical = beyond_fit(best.fit, found.numerical)
-    study = Study(target, simulators, evidence_folds(target.grasps), numerical, progress)
+    study = with_few(Study(target, simulators, evidence_folds(target.grasps), numerical, progress), best.fit)
     if not is_beyond_chance(_lead(best, _Model(found.fit, found.target, []), study), LEAST_LEAD):
         return None
     given = len(found.base.fit.problem.effects)

@@ -222,7 +222,9 @@ class _Start:
         alike = {best.effect.name: _as_good(best, others) for best, *others in variants}
         near = [c for c in ordered if c is ordered[0] or indistinguishable(ordered[0], c)][:_REFINED]
         contained = {nested.effect for c in near for nested in c.effect.contains}
-        near += [c for c in ordered if c.effect.name in contained and c not in near]
+        simpler = [c for c in ordered if c.effect.name in contained and c not in near]
+        least = min((c.fit.cost for c in near), default=np.inf)
+        near += [c for c in simpler if _least_cost(c.fit, self._fit) < least]  # others can't do for what contains them
         rough = {c.effect.name: c.fit for c in near}
         simple = [c for c in near if c.effect.name in contained]
         refined = self._at_the_end(simple, alike)

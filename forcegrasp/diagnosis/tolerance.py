@@ -28,7 +28,7 @@ WORTH = 0.5
 # Fewer numbers do that take this share of what all would.
 _NEARLY = 0.8
 # Readings bend with what is given: so many linear steps, or until they are this small.
-_STEPS, _SETTLED = 3, 0.1
+_STEPS, _SETTLED = 4, 0.1
 # What is moved together, the fewest numbers first.
 _PERIOD, _OBJECT = "period_share", ("radius_m", "offset_m")
 _READING = (SKEW, FORCE_SKEW)
@@ -156,37 +156,59 @@ def wanted_moves(measured: MeasurementSet, target: Target, fit: Fit, worth: floa
       fit: of the base model, with all as given.
       worth: least share of the squares beyond the noise.
     """
-    moved = _first_step(measured, target, fit, worth)
-    if moved is None:
+    first = _first_step(measured, target, fit, worth)
+    if first is None:
         return None
-    for _ in range(_STEPS - 1):
-        grasps = tuple(moved.put(g) for g in measured.grasps)
+    columns, step = first
+    for _ in range(_STEPS):
+        grasps, before = tuple(step.moved.put(g) for g in measured.grasps), step.moved
         problem = Problem(fit.problem.gripper, grasps, fit.problem.effects)
-        simulators, of_moved = Simulators(problem), dataclasses.replace(target, grasps=grasps)
-        fit = fit_once(of_moved, problem, simulators, fit.vector, fit.correction, rounds=1)
-        before = moved.deviations
-        moved, _ = _step(fit, _columns(target, fit, moved.numbers), moved.numbers, None, before)
-        if np.abs(moved.deviations - before).max() < _SETTLED:
+        of_moved = dataclasses.replace(target, grasps=grasps)
+        led = _led_by(fit, problem, step.vector, of_moved)
+        if led.cost > fit.cost:  # slopes say too little so far from where they were found
+            led = fit_once(of_moved, problem, Simulators(problem), fit.vector, fit.correction, rounds=1)
+            columns = _columns(target, led, before.numbers)
+        fit, step = led, _step(led, columns, before.numbers, None, before.deviations)
+        if np.abs(step.moved.deviations - before.deviations).max() < _SETTLED:
             break
-    return moved if np.any(moved.deviations) else None
+    return step.moved if np.any(step.moved.deviations) else None
+
+
+def _led_by(fit: Fit, problem: Problem, vector: np.ndarray, target: Target) -> Fit:
+    """The fit as if it had ended at these coordinates of a problem whose grasps are a little different."""
+    vector = np.clip(vector, problem.low + 1e-9, problem.high - 1e-9)
+    replay = Replay(problem.gripper, problem.grasps, cheap_tier(problem.gripper))
+    predicted = predict(replay, [problem.case(vector)])[0] + fit.correction
+    residual = target.residual(predicted)
+    return dataclasses.replace(fit, problem=problem, vector=vector, predicted=predicted, residual=residual)
 
 
 def may_be_moved(measured: MeasurementSet, target: Target, fit: Fit, worth: float = WORTH) -> bool:
     """Whether the first step of :func:`wanted_moves` explains enough, within the tolerance."""
-    moved = _first_step(measured, target, fit, worth)
-    return moved is not None and moved.is_within
+    first = _first_step(measured, target, fit, worth)
+    return first is not None and first[1].moved.is_within
 
 
-def _first_step(measured: MeasurementSet, target: Target, fit: Fit, worth: float) -> Moved | None:
-    """One linear step of the fewest numbers that explain nearly what all would; None if that is too little."""
+@dataclass(frozen=True, eq=False)
+class _Step:
+    """A linear step of what is given, and of the parameters that follow."""
+
+    moved: Moved
+    vector: np.ndarray  #: the parameters' coordinates after it, ``(p,)``
+    left: float  #: sum of squares that it leaves
+
+
+def _first_step(measured: MeasurementSet, target: Target, fit: Fit, worth: float) -> tuple[np.ndarray, _Step] | None:
+    """One step of the fewest numbers that do nearly as much as all, and their columns; None if all do too little."""
     numbers = _numbers(measured, target)
     columns = _columns(target, fit, numbers)
     groups = [kinds for kinds in _GROUPS if any(number.kind in kinds for number in numbers)]
     steps = [_step(fit, columns, numbers, kinds) for kinds in groups]
-    explained = [fit.cost - left - 2 * moved.price for moved, left in steps]
+    explained = [fit.cost - step.left - 2 * step.moved.price for step in steps]
     if max(explained) <= max(worth * (fit.cost - target.readings), 0.0):  # noise may leave less than it should
         return None
-    return next(moved for (moved, _), share in zip(steps, explained, strict=True) if share > _NEARLY * max(explained))
+    step = next(step for step, share in zip(steps, explained, strict=True) if share > _NEARLY * max(explained))
+    return columns[:, [numbers.index(number) for number in step.moved.numbers]], step
 
 
 def _numbers(measured: MeasurementSet, target: Target) -> tuple[_Number, ...]:
@@ -239,8 +261,8 @@ def _step(
     numbers: Sequence[_Number],
     kinds: Sequence[str] | None = None,
     before: np.ndarray | None = None,
-) -> tuple[Moved, float]:
-    """One linear step of what is given, and the sum of squares that it leaves.
+) -> _Step:
+    """One linear step of what is given.
 
     Args:
       fit: of the base model.
@@ -255,4 +277,6 @@ def _step(
     prior, residual = np.eye(slopes.shape[1])[len(fit.problem) :], fit.residual.ravel()
     step = np.linalg.lstsq(np.vstack([slopes, prior]), np.r_[residual, -start], rcond=None)[0]
     moves = np.clip(start + step[len(fit.problem) :], -MOST, MOST)  # the first step may lead too far
-    return Moved(tuple(numbers[index] for index in chosen), moves), float(np.sum((residual - slopes @ step) ** 2))
+    moved = Moved(tuple(numbers[index] for index in chosen), moves)
+    left = float(np.sum((residual - slopes @ step) ** 2))
+    return _Step(moved, fit.vector + step[: len(fit.problem)], left)

@@ -148,6 +148,7 @@ def fit_once(
     rounds: int = 2,
     free: np.ndarray | None = None,
     known_slopes: np.ndarray | None = None,
+    slopes: np.ndarray | None = None,
 ) -> Fit:
     """Fits from one start.
 
@@ -161,9 +162,12 @@ def fit_once(
       free: which coordinates may change, ``(p,)``; all by default.
       known_slopes: of the first k coordinates from an earlier fit nearby, ``(G, S, C, k)``; they are kept, which spares
         most of the simulations.
+      slopes: the same, for the start alone.
     """
     local = _Local(target, problem, simulators.cheap, simulators.cheap, known_slopes, simulators.step)
     vector = np.clip(start, problem.low + 1e-9, problem.high - 1e-9)
+    if slopes is not None:
+        local.begin(vector, slopes)
     free = np.ones(len(problem), bool) if free is None else free
     if correction is None:
         correction = 0.0 if simulators.one_model else _difference(problem, simulators, vector)
@@ -204,7 +208,8 @@ def fit_exactly(
 
     Args:
       target, problem, simulators, start: as for :func:`fit_once`.
-      slopes: as they were found near the start, ``(G, S, C, p)``, which spares finding them there.
+      slopes: of the first k coordinates, as they were found near the start, ``(G, S, C, k)``, which spares finding them
+        there.
     """
     local = _Local(target, problem, simulators.exact, simulators.cheap, None, simulators.step)
     free = np.ones(len(problem), bool)
@@ -354,8 +359,11 @@ class _Local:
         return self._slope is not None and self._age == 0 and np.array_equal(self._slope[0], x)
 
     def begin(self, x: np.ndarray, slopes: np.ndarray) -> None:
-        """Takes slopes for those at a point."""
-        self._slope, self._age = (x.copy(), self.value(x), slopes), 1
+        """Takes slopes of the first coordinates for those at a point; the others are measured."""
+        value = self.value(x)
+        if slopes.shape[-1] < len(x):
+            slopes = self._measured(x, value, slopes)
+        self._slope, self._age = (x.copy(), value, slopes), 1
 
     def slopes(self, x: np.ndarray, anew: bool = False) -> np.ndarray:
         """Slopes of the signals ÷ noise over the coordinates, ``(G, S, C, p)``."""
@@ -363,7 +371,7 @@ class _Local:
         if self._slope is not None and np.array_equal(self._slope[0], x) and not (anew and self._age):
             return self._slope[2]
         if self._slope is None or anew or self._age >= _SLOPES_LAST or len(x) > _FEW:
-            self._age, slopes = 0, self._measured(x, value)
+            self._age, slopes = 0, self._measured(x, value, self._known)
         else:
             self._age += 1
             before, signals, slopes = self._slope
@@ -373,10 +381,10 @@ class _Local:
         self._slope = (x.copy(), value, slopes)
         return slopes
 
-    def _measured(self, x: np.ndarray, value: np.ndarray) -> np.ndarray:
+    def _measured(self, x: np.ndarray, value: np.ndarray, known: np.ndarray | None) -> np.ndarray:
         """One-sided differences, all in one simulation; 0 where a coordinate jumps, and no slope leads anywhere."""
         problem, target = self.problem, self.target
-        count = 0 if self._known is None else self._known.shape[-1]
+        count = 0 if known is None else known.shape[-1]
         groups = [g for g in problem.columns() if min(g) >= count and not problem.entries[g[0]].jumps]
         width = problem.high - problem.low
         step = np.where(x + self._step > problem.high, -self._step, self._step)
@@ -393,6 +401,6 @@ class _Local:
                 slopes[members, :, :, index] = change[members] / step[index]
         slopes /= target.sigma[:, None]
         slopes[~target.mask] = 0
-        if count:
-            slopes[..., :count] = self._known
+        if known is not None:
+            slopes[..., :count] = known
         return slopes

@@ -336,7 +336,7 @@ def test_a_clock_that_is_a_little_off_is_no_effect(sound):
     stretched = dataclasses.replace(stretched, measured=dataclasses.replace(stretched.measured, period_std_share=0.015))
     diagnosis, _ = diagnose_set(stretched, model, ["command_delay", "actuator_lag", "force_lag"], 0, silent)
     assert (diagnosis.verdict, diagnosis.effects) == ("explained", ())
-    assert "What the set gives was moved within its tolerance: the clock's period by -3 %" in answer(diagnosis)
+    assert "What the set gives was moved within its tolerance: the clock's period by -2.9 %" in answer(diagnosis)
 
 
 def test_a_clock_that_is_further_off_moves_within_a_wider_tolerance(sound):
