@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from forcegrasp.identify.base_fit import Subset
-from forcegrasp.identify.cross_validation import rms_of_grasps
+from forcegrasp.identify.cross_validation import normal_equations, rms_of_grasps, step_of
 from forcegrasp.identify.fit import Fit
 from forcegrasp.identify.predict import predict
 from forcegrasp.identify.problem import Problem
@@ -59,8 +59,9 @@ def odd_grasps(target: Target, fit: Fit) -> tuple[OddGrasp, ...]:
     labels = [grasp.object for grasp in target.grasps]
     count, suspects, usual = max(1, min(_MOST, int(_SHARE * len(errors)))), np.array([], int), 1.0
     problem, vector = fit.problem, fit.vector
-    for _ in range(_ROUNDS):  # those that the others miss most are left out, and judged again by the others
-        before, suspects = set(suspects), _suspects(errors, labels, count)
+    for number in range(_ROUNDS):  # those that the others miss most are left out, and judged again by the others
+        before = set(suspects)
+        suspects = _suspects(errors, labels, count) if number else _least_trimmed(fit, labels, count)
         if set(suspects) == before:  # as if there are none
             break
         rest = np.setdiff1d(np.arange(len(errors)), suspects)
@@ -99,6 +100,32 @@ def _suspects(errors: np.ndarray, labels: Sequence[str], count: int) -> np.ndarr
         if left[label] > 1 and len(chosen) < count:
             left[label] -= 1
             chosen.append(index)
+    return np.array(chosen, int)
+
+
+def _least_trimmed(fit: Fit, labels: Sequence[str], count: int) -> np.ndarray:
+    """Indices of the grasps without which the others leave least, as far as slopes tell, one after the other.
+
+    A grasp of a hard object among those of a soft one draws the fit to itself, so that the others seem odd (least
+    trimmed squares: Rousseeuw 1984).
+    """
+    inner, slope = normal_equations(fit)
+    squares = np.sum((fit.weight * fit.residual) ** 2, axis=(1, 2))
+    left = Counter(labels)
+    chosen: list[int] = []
+
+    def left_by_others(index: int) -> float:
+        rest = np.setdiff1d(np.arange(len(squares)), [*chosen, index])
+        products, along = inner[rest].sum(axis=0), slope[rest].sum(axis=0)
+        step = step_of(fit, products, along)
+        return float(squares[rest].sum() - 2 * along @ step + step @ products @ step)
+
+    while len(chosen) < count:
+        may_go = [i for i in range(len(labels)) if i not in chosen and left[labels[i]] > 1]
+        if not may_go:
+            break
+        chosen.append(min(may_go, key=left_by_others))
+        left[labels[chosen[-1]]] -= 1
     return np.array(chosen, int)
 
 

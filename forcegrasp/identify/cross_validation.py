@@ -23,6 +23,8 @@ _HEAVY = 6.0
 # A step that changes more than this share of a fold's squares is simulated, in these lengths: of a servo whose fit is
 # further than so many times the noise off, and of any fit that is nearer, where steps are small if they are right.
 _FAR, _COUNTS, _COUNTS_NEAR, _SHARES = 3.0, 0.02, 0.05, (1.0, 0.5, 0.25, 0.1)
+# So is one that makes a fold's squares so many times as large, or as small: slopes hardly reach so far.
+_ODD = 4.0
 # What fits leave of held-out grasps, with target and folds: a search, its doubts and its report ask for the same.
 _KNOWN: WeakKeyDictionary[Fit, list[tuple[Target, Sequence[np.ndarray], np.ndarray]]] = WeakKeyDictionary()
 
@@ -84,11 +86,8 @@ def heldout_residual(fit: Fit, target: Target, folds: Sequence[np.ndarray]) -> n
 
 
 def _heldout_residual(fit: Fit, target: Target, folds: Sequence[np.ndarray]) -> np.ndarray:
-    p = len(fit.problem)
     jacobian, residual = fit.jacobian, fit.residual
-    weighted, off = fit.weight[..., None] * jacobian, fit.weight * residual
-    inner = np.einsum("gskp,gskq->gpq", weighted, weighted, optimize=True)
-    slope = np.einsum("gskp,gsk->gp", weighted, off, optimize=True)
+    inner, slope = normal_equations(fit)
     held = np.full(residual.shape, np.nan)
     doubtful: list[tuple[np.ndarray, np.ndarray]] = []
     far = np.sum(residual**2) > _FAR**2 * target.readings
@@ -97,14 +96,33 @@ def _heldout_residual(fit: Fit, target: Target, folds: Sequence[np.ndarray]) -> 
         rest = np.setdiff1d(np.arange(len(target.grasps)), fold)
         if len(rest) == 0:
             continue
-        step = np.linalg.lstsq(inner[rest].sum(axis=0) + _RIDGE * np.eye(p), slope[rest].sum(axis=0), rcond=None)[0]
-        change = jacobian[fold] @ step
+        step = step_of(fit, inner[rest].sum(axis=0), slope[rest].sum(axis=0))
+        change, squares = jacobian[fold] @ step, np.sum(residual[fold] ** 2)
         held[fold] = residual[fold] - change
-        if np.sum(change**2) > counts * np.sum(residual[fold] ** 2):
+        ratio = np.sum(held[fold] ** 2) / max(squares, 1e-12)
+        if np.sum(change**2) > counts * squares or not 1 / _ODD < ratio < _ODD:
             doubtful.append((fold, step))
     if doubtful:
         _simulate(fit, target, doubtful, held)
     return held
+
+
+def normal_equations(fit: Fit) -> tuple[np.ndarray, np.ndarray]:
+    """Each grasp's products of a fit's slopes with each other, ``(G, p, p)``, and with what it leaves, ``(G, p)``."""
+    weighted, off = fit.weight[..., None] * fit.jacobian, fit.weight * fit.residual
+    inner = np.einsum("gskp,gskq->gpq", weighted, weighted, optimize=True)
+    return inner, np.einsum("gskp,gsk->gp", weighted, off, optimize=True)
+
+
+def step_of(fit: Fit, inner: np.ndarray, slope: np.ndarray) -> np.ndarray:
+    """The linear step from a fit, ``(p,)``, that some grasps ask for, within the bounds.
+
+    Args:
+      fit: of all grasps.
+      inner, slope: sums of theirs, from :func:`normal_equations`.
+    """
+    step = np.linalg.lstsq(inner + _RIDGE * np.eye(len(slope)), slope, rcond=None)[0]
+    return np.clip(fit.vector + step, fit.problem.low, fit.problem.high) - fit.vector
 
 
 def _simulate(fit: Fit, target: Target, doubtful: list[tuple[np.ndarray, np.ndarray]], held: np.ndarray) -> None:

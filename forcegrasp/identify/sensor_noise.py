@@ -15,6 +15,8 @@ from forcegrasp.measure.schema import MeasuredGrasp, MeasurementSet
 
 #: Noise further than this from what the readings show is warned of, or refused.
 WARN, REFUSE = 1.5, 10.0
+# So many times it means that a unit lacks its prefix.
+_MILLI = (300.0, 3000.0)
 # Noise that is correlated over less than this still shows in full, seconds.
 _SLOW_S = 0.1
 # Fewer windows than this, per sensor, say nothing.
@@ -90,10 +92,19 @@ def check_given_noise(measured: MeasurementSet, unit: str = "m") -> list[str]:
         line = f"{where}: {std:.3g} {unit} is given, the readings show {shown:.2g} {unit}"
         noisy = all(is_noisy([signals[:, finger] for signals in readings]) for finger in range(readings[0].shape[1]))
         if apart > REFUSE and noisy:
-            raise MeasurementError(f"{line}; correct it, in {unit}, or leave it out to have it estimated")
+            raise MeasurementError(f"{line}; {_what_to_correct(std, shown, unit)}")
         if apart > WARN:
             warnings.append(f"{line}; errors are told as multiples of what is given")
     return warnings
+
+
+def _what_to_correct(std: float, shown: float, unit: str) -> str:
+    """What to do about a noise that is far from what the readings show: a thousand is a prefix of a unit."""
+    if min(_MILLI) < shown / std < max(_MILLI):
+        return f"are the readings in m{unit}? give them in {unit}"
+    if min(_MILLI) < std / shown < max(_MILLI):
+        return f"is it in m{unit}? give it in {unit}"
+    return f"correct it, in {unit}, or leave it out to have it estimated"
 
 
 def noise_range(grasps: Sequence[MeasuredGrasp], readings: Sequence[np.ndarray]) -> tuple[float, float]:

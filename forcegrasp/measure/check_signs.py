@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -13,6 +13,9 @@ from forcegrasp.measure.check_liveness import feels, force_noise, without_trend
 from forcegrasp.measure.samples import place
 from forcegrasp.measure.schema import MeasuredGrasp, MeasurementSet, side_of
 
+# What positions and commands change in so many rows is compared this many rows apart, either way; and what is clearly
+# less than something else is so by this share.
+_WINDOW, _ROWS, _CLEARLY = 4, 8, 0.7
 PadsAt = Callable[[np.ndarray], np.ndarray | None]
 #: Positions may lag behind commands by any of these, in seconds.
 _LAGS = (0.0, 0.05, 0.1, 0.2, 0.4, 0.8)
@@ -35,6 +38,7 @@ def check_signs(
     reach = open_m - closed_m
     for motor in range(len(measured.columns.position)):
         _check_follows(measured, motor, abs(reach))
+        _check_leads(measured, motor, abs(reach))
     if len(measured.columns.position) == len(measured.columns.command) == 2:
         _check_own_commands(measured, abs(reach))
     if measured.columns.read_effort:
@@ -70,6 +74,32 @@ def _check_follows(measured: MeasurementSet, motor: int, reach: float) -> None:
         )
 
 
+def _check_leads(measured: MeasurementSet, motor: int, reach: float) -> None:
+    """What is read comes after what was commanded, and is what jitters: the other way round the columns are swapped."""
+    moved = [g for g in measured.grasps if np.ptp(g.command_m[:, motor]) > 0.2 * reach and len(g.time_s) > 4 * _ROWS]
+    if not moved:
+        return
+    changes, jitter = [], []
+    for grasp in moved:
+        both = np.stack([grasp.command_m[:, motor], grasp.position_m[:, motor]])
+        changes.append(both[:, _WINDOW:] - both[:, :-_WINDOW])
+        jitter.append(np.median(np.abs(np.diff(both, 3)), axis=1))
+    unlike = [1 - _alike(changes, row) for row in range(-_ROWS, _ROWS + 1)]  # positions, so many rows later
+    leads = min(unlike[:_ROWS]) < _CLEARLY * min(unlike[_ROWS:])
+    of_command, of_position = np.median(jitter, axis=0)
+    if leads and of_position < _CLEARLY * of_command:
+        raise MeasurementError(
+            f"{place(measured.path, moved[0], 0, measured.columns.position[motor])}: moves before"
+            f" {measured.columns.command[motor]} does; are the two swapped?"
+        )
+
+
+def _alike(changes: Sequence[np.ndarray], row: int) -> float:
+    """Correlation of what commands and positions change, ``(2, T)`` of each grasp, the latter so many rows later."""
+    pairs = [(c[max(0, -row) : len(c) - max(0, row)], p[max(0, row) : len(p) + min(0, row)]) for c, p in changes]
+    return correlation(np.concatenate([c for c, _ in pairs]), np.concatenate([p for _, p in pairs]))
+
+
 def _check_own_commands(measured: MeasurementSet, reach: float) -> None:
     """Where two motors are told different things each must do its own."""
     crossed, right = [], 0
@@ -92,9 +122,17 @@ def _check_own_commands(measured: MeasurementSet, reach: float) -> None:
 
 
 def _check_effort(measured: MeasurementSet) -> None:
-    """A motor's effort must close while it is commanded to close further than it is, moving or not."""
-    behind = np.concatenate([(g.position_m - g.command_m)[:, 0] for g in measured.grasps])
-    if correlation(np.concatenate([g.force_n[:, 0] for g in measured.grasps]), behind) < -0.5:
+    """A motor's effort must close while it is commanded to close further than it is, moving or not.
+
+    The command of its own row acts after it was read, that of the row before until then.
+    """
+    efforts = np.concatenate([g.force_n[1:, 0] for g in measured.grasps])
+    behind = [
+        np.concatenate([g.position_m[1:, 0] - command for g, command in zip(measured.grasps, commands, strict=True)])
+        for commands in zip(*((g.command_m[1:, 0], g.command_m[:-1, 0]) for g in measured.grasps), strict=True)
+    ]
+    found = [correlation(efforts, one) for one in behind]
+    if min(found) < -0.5 and max(found) < 0.5:
         where = place(measured.path, measured.grasps[0], 0, measured.columns.force[0])
         raise MeasurementError(
             f"{where}: opens while the command is to close; f ≥ 0 presses, multiply them by -1; or q = 0 must be closed"

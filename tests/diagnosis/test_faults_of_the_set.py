@@ -457,6 +457,18 @@ def test_of_each_object_a_grasp_is_left_to_judge_the_others_by():
     assert odd_grasps_module._suspects(errors[-2:], labels[-2:], 1).tolist() == []
 
 
+def test_the_grasp_that_draws_a_fit_to_itself_is_left_out_first(refitted):
+    """One of a hard object among those of a soft one: the fit is its own, and what it leaves is in the others."""
+    target, _, base = refitted
+    labels = ["soft"] * len(target.grasps)
+    jacobian, residual = np.zeros_like(base.fit.jacobian), np.zeros_like(base.fit.residual)
+    jacobian[..., 0], residual[target.mask] = 1.0, -4.0
+    jacobian[0], residual[0] = 10 * jacobian[0], 10 * np.abs(residual[0])
+    astray = dataclasses.replace(base.fit, jacobian=jacobian, residual=residual, vector=base.fit.problem.start())
+    assert odd_grasps_module._least_trimmed(astray, labels, 1).tolist() == [0]
+    assert odd_grasps_module._least_trimmed(astray, ["hard", *labels[1:]], 1).tolist() != [0]  # its object's only one
+
+
 def test_a_grasp_that_fits_no_object_is_told_and_does_not_decide(sound):
     loaded, model = sound
     name = loaded.measured.grasps[0].name

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 from pathlib import Path
 
 import numpy as np
@@ -52,9 +53,17 @@ def test_factor(grasps, key, factor):
         assert all(f"set/meta.yaml: {key}: {sigma * factor:.3g} " in warning for warning in warnings)
     else:
         with pytest.raises(
-            MeasurementError, match=rf"set/meta.yaml: {key}: .* is given, the readings show .*; correct"
+            MeasurementError, match=rf"set/meta.yaml: {key}: .* is given, the readings show .*; (correct|is it in m)"
         ):
             check_given_noise(measured)
+
+
+@pytest.mark.parametrize(
+    ("factor", "words"), [(1e-3, "are the readings in mN? give them in N"), (1e3, "is it in mN? give it in N")]
+)
+def test_a_unit_without_its_prefix_is_told(grasps, factor, words):
+    with pytest.raises(MeasurementError, match=rf"force_std_n: .*{re.escape(words)}$"):
+        check_given_noise(given(grasps, SIGMA_M, SIGMA_N * factor))
 
 
 def test_what_is_shown_is_the_noise(grasps):

@@ -7,7 +7,16 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from forcegrasp.identify.cross_validation import FOLDS, heldout_residual, log_likelihood, make_folds, rms, rms_of_grasps
+from forcegrasp.identify.cross_validation import (
+    FOLDS,
+    heldout_residual,
+    log_likelihood,
+    make_folds,
+    normal_equations,
+    rms,
+    rms_of_grasps,
+    step_of,
+)
 from forcegrasp.identify.fit import Fit
 from forcegrasp.identify.target import Target
 from tests.identify.targets import G, S, grasp, make
@@ -27,7 +36,8 @@ def linear_fit(target: Target, jacobian: np.ndarray, measured: np.ndarray) -> Fi
     ]
     predicted = jacobian @ theta
     residual = np.where(target.mask[..., None], measured - predicted, 0)
-    return Fit(_Counted(count=p), theta, predicted, residual, jacobian, 0 * predicted, 0.0, 1, target.weight)
+    problem = _Counted(count=p, low=np.full(p, -np.inf), high=np.full(p, np.inf))
+    return Fit(problem, theta, predicted, residual, jacobian, 0 * predicted, 0.0, 1, target.weight)
 
 
 def refit_without(fold: np.ndarray, jacobian: np.ndarray, measured: np.ndarray) -> np.ndarray:
@@ -65,6 +75,17 @@ def test_a_parameter_of_the_heldout_grasp_alone_stays_where_it_is():
     without = fit.jacobian[..., :2]
     step = np.linalg.lstsq(without[1:].reshape(-1, 2), fit.residual[1:].ravel(), rcond=None)[0]
     assert held[0] == pytest.approx(fit.residual[0] - without[0] @ step, abs=1e-4)
+
+
+def test_a_step_ends_at_the_bounds():
+    rng, target = np.random.default_rng(0), make()
+    jacobian = 100 * rng.standard_normal((G, S, 4, 2))
+    fit = linear_fit(target, jacobian, rng.standard_normal((G, S, 4)))
+    inner, slope = (one[1:].sum(axis=0) for one in normal_equations(fit))
+    free = step_of(fit, inner, slope)
+    assert np.abs(free).min() > 0
+    fit.problem.low[0] = fit.problem.high[0] = fit.vector[0]
+    assert step_of(fit, inner, slope) == pytest.approx([0.0, free[1]])
 
 
 def test_grasps_of_no_fold_are_left_out():

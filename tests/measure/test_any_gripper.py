@@ -10,7 +10,7 @@ import pytest
 from measured_rig import make_set
 
 from forcegrasp.errors import MeasurementError
-from forcegrasp.measure import MeasuredGrasp, MeasurementSet, check_set, read_set, write_set
+from forcegrasp.measure import MeasuredGrasp, MeasurementSet, check_set, check_signs, read_set, write_set
 from forcegrasp.measure.schema import TWO_FINGERS, columns_of, fingerprint_of_set
 from forcegrasp.physics.gripper import Gripper
 from forcegrasp.physics.gripper_file import load_gripper, shipped_grippers
@@ -115,6 +115,31 @@ def test_what_one_motor_shows_wrong_is_refused(name):
     refuse(changed(measured, force_n=np.negative), gripper, measured.columns.force[0], "by -1")
     refuse(changed(measured, force_n=np.zeros_like), gripper, ", ".join(measured.columns.force), "all forces are zero")
     refuse(changed(measured, force_n=np.ones_like), gripper, f"column {measured.columns.force[0]}", "sensor stuck?")
+
+
+@pytest.mark.parametrize("name", [name for name in NAMES if columns_of(load_gripper(name)).read_effort])
+def test_the_effort_of_a_drive_that_is_done_within_a_row(name):
+    """The command of a row acts after it was read, so that the effort is that of the row before."""
+    gripper = load_gripper(name)
+
+    def swinging(grasp: MeasuredGrasp, sign: float) -> MeasuredGrasp:
+        rng, time = np.random.default_rng(len(grasp.name)), np.arange(len(grasp.time_s))
+        command = gripper.stroke * (0.6 + 0.3 * np.sin(0.8 * time))[:, None]
+        meant = np.concatenate([command[:1], command[:-1]])
+        position = np.maximum(meant, 0.5 * gripper.stroke) + 1e-4 * rng.standard_normal(command.shape)
+        effort = sign * (8 * (position - meant) / gripper.stroke + 0.05 * rng.standard_normal(command.shape))
+        return dataclasses.replace(grasp, command_m=command, position_m=position, force_n=effort)
+
+    for sign in (1.0, -1.0):
+        measured = recorded(name)
+        measured = dataclasses.replace(measured, grasps=tuple(swinging(g, sign) for g in measured.grasps))
+        own = np.concatenate([(g.position_m - g.command_m)[:, 0] for g in measured.grasps])
+        assert abs(np.corrcoef(own, np.concatenate([g.force_n[:, 0] for g in measured.grasps]))[0, 1]) < 0.5
+        if sign > 0:
+            check_signs._check_effort(measured)
+            continue
+        with pytest.raises(MeasurementError, match=r"f_n: opens while the command is to close; .* by -1"):
+            check_signs._check_effort(measured)
 
 
 @pytest.mark.parametrize("name", NAMES)

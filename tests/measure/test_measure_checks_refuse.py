@@ -110,6 +110,10 @@ CASES = {
         _each(position_m=lambda g: _columns(g.position_m, 1, OPPOSITE)),
         ["q_r_m", "against"],
     ),
+    "commands and positions swapped": (
+        lambda grasps: [change(g, command_m=g.position_m, position_m=g.command_m) for g in grasps],
+        ["q_l_m", "moves before qdes_l_m does; are the two swapped?"],
+    ),
     "commands the wrong way": (_each(command_m=lambda g: OPPOSITE(g.command_m)), ["runs against qdes_l_m"]),
     "negative positions": (_each(position_m=lambda g: -g.position_m), ["out of reach"]),
     "positions from the middle, the wrong way": (_each(position_m=lambda g: 0.04 - g.position_m), ["against"]),
