@@ -56,10 +56,10 @@ def fit_base(
     starts = [small.known, *(_random_start(small.problem, contact_estimate, rng) for _ in range(1, STARTS))]
     ends = side_by_side([partial(small.fit, start) for start in starts])
     for number, end in enumerate(ends[1:], 2):
-        progress(f"base model, start {number} of {STARTS}: {end.error:.2f} × noise")
+        progress(f"base model, start {number} of {STARTS}, on a few grasps: {end.error:.2f} × noise")
     while len(ends) < MOST_STARTS and not _ends_agree(ends, small.target):
         ends.append(small.fit(_random_start(small.problem, contact_estimate, rng)))
-        progress(f"base model, start {len(ends)} of {MOST_STARTS}: {ends[-1].error:.2f} × noise")
+        progress(f"base model, start {len(ends)} of {MOST_STARTS}, on a few grasps: {ends[-1].error:.2f} × noise")
     best = min(ends, key=lambda end: end.cost)
     errors = tuple(end.error for end in ends)
     if ends[0].cost - best.cost > cost_tolerance(best, small.target):  # another start found a better place

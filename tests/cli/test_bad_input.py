@@ -402,7 +402,7 @@ def test_full_disk_while_training(tiny, tmp_path, capsys, monkeypatch):
 
 def test_setting_of_mujocos_renderer_does_not_matter(tmp_path):
     """A recording starts sooner than a training, of which test_terminal.py says so, and imports MuJoCo alike."""
-    command = [sys.executable, "-m", "forcegrasp.cli.main", "record", "grasps=1", "objects=1", "out=run"]
+    command = [sys.executable, "-m", "forcegrasp", "record", "grasps=1", "objects=1", "out=run"]
     environment = {**os.environ, "MUJOCO_GL": "osmesa"}
     done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
