@@ -12,7 +12,6 @@ from forcegrasp.diagnosis.faults import Fault, besides, leaves_nothing, suspects
 from forcegrasp.diagnosis.late_rows import may_be_late_rows
 from forcegrasp.diagnosis.law import find_law
 from forcegrasp.diagnosis.moved_set import MovesFirst, go_on_with_moved, within_tolerance_after_all
-from forcegrasp.diagnosis.odd_grasps import odd_grasps
 from forcegrasp.diagnosis.result import Diagnosis, Step
 from forcegrasp.diagnosis.search import diagnose
 from forcegrasp.effects import Effect
@@ -116,8 +115,7 @@ def diagnose_set(
                 return wider, more
         return fault, right
 
-    labels_are_right = not any(grasp.like for grasp in odd_grasps(said[0], said[2].fit))
-    for suspect in suspects(loaded, said[0], said[2].fit) if labels_are_right else ():
+    for suspect in suspects(loaded, said[0], said[2].fit):
         if (better := put_right(suspect)) is not None:
             fault, right = better
             # what is a little off besides shows once the fault does not hide it

@@ -12,6 +12,7 @@ from forcegrasp.diagnosis.even_stamps import are_even_in_truth, evenly, scatter_
 from forcegrasp.diagnosis.felt_sizes import SEEN_M, doubtful_radii
 from forcegrasp.diagnosis.late_side import command_row_later, late_side
 from forcegrasp.diagnosis.linear_step import linear_step
+from forcegrasp.diagnosis.odd_grasps import odd_grasps
 from forcegrasp.diagnosis.session_drift import order_in_session, session_drift
 from forcegrasp.diagnosis.shifted_rows import WORTH_A_FIT, left_by_shift
 from forcegrasp.diagnosis.signatures import Background
@@ -100,6 +101,8 @@ def suspects(loaded: Loaded[MeasurementSet], target: Target, fit: Fit) -> list[F
     """
     measured, found = loaded.measured, []
     if loaded.gripper.is_servo or leaves_nothing(fit, target):
+        return []
+    if any(grasp.like for grasp in odd_grasps(target, fit)):  # wrong labels may look like any other fault
         return []
     if (factor := clock_factor(measured, loaded.gripper.period_s, 1 + MOST * measured.period_std_share)) is not None:
         words = f"time stamps are {times(factor)} for commands {loaded.gripper.period_s:g} s apart"

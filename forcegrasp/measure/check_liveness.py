@@ -60,8 +60,11 @@ def _check_forces(measured: MeasurementSet, where: str) -> list[str]:
         for channel, column in enumerate(columns)
         if not felt[:, channel].any()
     ]
+    unseen = "no contact"
+    if measured.columns.read_effort:
+        unseen += ", which an effort shows only while the motor stands"
     return warnings + [
-        f"{place(measured.path, grasp)}: no contact"
+        f"{place(measured.path, grasp)}: {unseen}"
         for grasp, some in zip(grasps, np.any(felt, axis=1), strict=True)
         if not some
     ]
