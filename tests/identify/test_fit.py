@@ -212,11 +212,13 @@ def test_known_slopes_spare_simulations_and_lead_to_the_same_place(fitted, monke
 
     monkeypatch.setattr(fit_module, "predict", counted)
     fits = []
-    for known in (None, before.jacobian):
+    for given in ({}, {"known_slopes": before.jacobian}, {"slopes": before.jacobian}):
         counts.append(0)
-        fits.append(fit_once(target, problem, fitted.simulators, start, before.correction, 0, known_slopes=known))
+        fits.append(fit_once(target, problem, fitted.simulators, start, before.correction, 0, **given))
     assert counts[1] < 0.75 * counts[0]
+    assert counts[1] < counts[2] < counts[0]  # they are found anew where it ends
     assert np.array_equal(fits[1].jacobian[..., :6], before.jacobian)
+    assert not np.array_equal(fits[2].jacobian[..., :6], before.jacobian)
     for fit in fits:
         assert rms_error(before, target) > 1.3
         assert rms_error(fit, target) < 1.06
