@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -92,15 +92,8 @@ def odd_grasps(target: Target, fit: Fit) -> tuple[OddGrasp, ...]:
 
 
 def _suspects(errors: np.ndarray, labels: Sequence[str], count: int) -> np.ndarray:
-    """Indices of the grasps of the largest errors, without the last one of an object: nothing else is known of it."""
-    left = Counter(labels)
-    chosen: list[int] = []
-    for index in map(int, np.argsort(-errors)):
-        label = labels[index]
-        if left[label] > 1 and len(chosen) < count:
-            left[label] -= 1
-            chosen.append(index)
-    return np.array(chosen, int)
+    """Indices of the grasps of the largest errors."""
+    return _left_out(labels, count, lambda index, _: -errors[index])
 
 
 def _least_trimmed(fit: Fit, labels: Sequence[str], count: int) -> np.ndarray:
@@ -111,20 +104,27 @@ def _least_trimmed(fit: Fit, labels: Sequence[str], count: int) -> np.ndarray:
     """
     inner, slope = normal_equations(fit)
     squares = np.sum((fit.weight * fit.residual) ** 2, axis=(1, 2))
-    left = Counter(labels)
-    chosen: list[int] = []
 
-    def left_by_others(index: int) -> float:
+    def left_by_others(index: int, chosen: Sequence[int]) -> float:
         rest = np.setdiff1d(np.arange(len(squares)), [*chosen, index])
         products, along = inner[rest].sum(axis=0), slope[rest].sum(axis=0)
         step = step_of(fit, products, along)
         return float(squares[rest].sum() - 2 * along @ step + step @ products @ step)
 
+    return _left_out(labels, count, left_by_others)
+
+
+def _left_out(labels: Sequence[str], count: int, cost: Callable[[int, Sequence[int]], float]) -> np.ndarray:
+    """Indices of the grasps of the least cost, ``cost(index, chosen before)``, one after the other.
+
+    Without the last one of an object: nothing else is known of it.
+    """
+    left, chosen = Counter(labels), list[int]()
     while len(chosen) < count:
-        may_go = [i for i in range(len(labels)) if i not in chosen and left[labels[i]] > 1]
+        may_go = [i for i, label in enumerate(labels) if i not in chosen and left[label] > 1]
         if not may_go:
             break
-        chosen.append(min(may_go, key=left_by_others))
+        chosen.append(min(may_go, key=lambda index: cost(index, chosen)))
         left[labels[chosen[-1]]] -= 1
     return np.array(chosen, int)
 

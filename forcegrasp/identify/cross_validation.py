@@ -133,7 +133,7 @@ def _simulate(fit: Fit, target: Target, doubtful: list[tuple[np.ndarray, np.ndar
     replay = Replay(problem.gripper, problem.grasps, cheap_tier(problem.gripper))
     squares = np.sum((fit.weight * fit.residual) ** 2, axis=(1, 2))
     for scale in _SHARES:
-        vectors = [np.clip(fit.vector + scale * step, problem.low, problem.high) for _, step in doubtful]
+        vectors = [fit.vector + scale * step for _, step in doubtful]
         signals = predict(replay, [problem.case(vector) for vector in vectors]) + fit.correction
         residuals = target.residual(signals)
         left = []

@@ -100,9 +100,10 @@ def check_given_noise(measured: MeasurementSet, unit: str = "m") -> list[str]:
 
 def _what_to_correct(std: float, shown: float, unit: str) -> str:
     """What to do about a noise that is far from what the readings show: a thousand is a prefix of a unit."""
-    if min(_MILLI) < shown / std < max(_MILLI):
+    low, high = _MILLI
+    if low < shown / std < high:
         return f"are the readings in m{unit}? give them in {unit}"
-    if min(_MILLI) < std / shown < max(_MILLI):
+    if low < std / shown < high:
         return f"is it in m{unit}? give it in {unit}"
     return f"correct it, in {unit}, or leave it out to have it estimated"
 

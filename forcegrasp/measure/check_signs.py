@@ -13,15 +13,15 @@ from forcegrasp.measure.check_liveness import feels, force_noise, without_trend
 from forcegrasp.measure.samples import place
 from forcegrasp.measure.schema import MeasuredGrasp, MeasurementSet, side_of
 
-# What positions and commands change in so many rows is compared this many rows apart, either way; and what is clearly
-# less than something else is so by this share.
-_WINDOW, _ROWS, _CLEARLY = 4, 8, 0.7
 PadsAt = Callable[[np.ndarray], np.ndarray | None]
 #: Positions may lag behind commands by any of these, in seconds.
 _LAGS = (0.0, 0.05, 0.1, 0.2, 0.4, 0.8)
 # Two motors are told different things if that changes by this share of their range; positions are crossed if their
 # difference goes the other way, with a correlation like this, and more so than the same way.
 _APART, _CROSSED = 0.05, 0.3
+# What positions and commands change in so many rows is compared this many rows apart, either way; and what is clearly
+# less than something else is so by this share.
+_WINDOW, _ROWS, _CLEARLY = 4, 8, 0.7
 
 
 def check_signs(
@@ -127,11 +127,9 @@ def _check_effort(measured: MeasurementSet) -> None:
     The command of its own row acts after it was read, that of the row before until then.
     """
     efforts = np.concatenate([g.force_n[1:, 0] for g in measured.grasps])
-    behind = [
-        np.concatenate([g.position_m[1:, 0] - command for g, command in zip(measured.grasps, commands, strict=True)])
-        for commands in zip(*((g.command_m[1:, 0], g.command_m[:-1, 0]) for g in measured.grasps), strict=True)
-    ]
-    found = [correlation(efforts, one) for one in behind]
+    own = np.concatenate([(g.position_m[1:] - g.command_m[1:])[:, 0] for g in measured.grasps])
+    before = np.concatenate([(g.position_m[1:] - g.command_m[:-1])[:, 0] for g in measured.grasps])
+    found = [correlation(efforts, behind) for behind in (own, before)]
     if min(found) < -0.5 and max(found) < 0.5:
         where = place(measured.path, measured.grasps[0], 0, measured.columns.force[0])
         raise MeasurementError(
