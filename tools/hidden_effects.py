@@ -226,6 +226,7 @@ def run_job(job: Job) -> dict:
         "verdict": diagnosis.verdict,
         "effects": list(diagnosis.effects),
         "steps": [[s.verdict, list(s.effects)] for s in diagnosis.steps],
+        "shares": diagnosis.shares(),
         "found_parameters": {e.effect.name: {n: p.value for n, p in e.parameters.items()} for e in model.effects},
         "error_before": diagnosis.error_before,
         "error_after": diagnosis.error_after,

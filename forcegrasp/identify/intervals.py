@@ -18,8 +18,9 @@ Z95 = 1.96
 _SLOWEST = 0.95
 # Share of the range between its bounds up to which a parameter is at one.
 _AT_BOUND = 1e-3
-# Correlation of two parameters above which data don't tell them apart.
-_CONFOUNDED = 0.98
+# Correlation of two parameters above which data don't tell them apart, and the share of their values up to which their
+# intervals may reach: where both are narrower, data tell them apart all the same.
+_CONFOUNDED, _WELL_KNOWN = 0.98, 0.1
 
 
 def standard_errors(fit: Fit, target: Target, numerical: Sequence[np.ndarray] = ()) -> np.ndarray:
@@ -120,14 +121,15 @@ def warnings(fit: Fit, errors: np.ndarray) -> list[str]:
     loose = [entry.name for entry, wide in zip(entries, hardly_fixed(fit, errors), strict=True) if wide]
     if loose:
         lines.append(f"{listed(loose)} {'is' if len(loose) == 1 else 'are'} hardly fixed by these data")
-    together = _confounded(fit)
+    together = _confounded(fit, errors)
     if together:
         lines.append(f"{'; '.join(together)}: only together are they fixed")
     return lines
 
 
-def _confounded(fit: Fit) -> list[str]:
+def _confounded(fit: Fit, errors: np.ndarray) -> list[str]:
     """Groups of parameters of which each can be replaced by others of its group, in words; alike ones are one group."""
+    wide = [high - low > 2 * _WELL_KNOWN * abs(value) for value, low, high in intervals(fit, errors)]
     covariance = fit.covariance()
     sigma = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
     correlation = covariance / np.outer(sigma, sigma)
@@ -135,7 +137,7 @@ def _confounded(fit: Fit) -> list[str]:
     count, group = connected_components(linked, directed=False)
     found: dict[tuple[str, ...], list[tuple[list[str], float]]] = {}
     for members in (np.flatnonzero(group == k) for k in range(count)):
-        if len(members) > 1:
+        if len(members) > 1 and any(wide[i] for i in members):
             inside = np.triu(np.where(linked, correlation, 0.0)[np.ix_(members, members)], k=1).ravel()
             entries = [fit.problem.entries[i] for i in members]
             strongest = float(inside[np.argmax(np.abs(inside))])
