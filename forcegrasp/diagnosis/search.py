@@ -82,7 +82,7 @@ def diagnose(
     if (rounding := target.rounding) is not None and start is None:
         progress(f"found {rounding.effect.name}: readings are multiples of one step")
         steps.append(Step((rounding.effect.name,), (), (), error_before, study.error(study.heldout(fit))))
-    screen, tried_anyway = Screen(effects, study), False
+    screen, screened, tried_anyway = Screen(effects, study), fit, False
     believed: tuple[list[Step], Fit, Study] | None = None  # what is, if the rest explains too little in the end
     for _ in range(MOST_EFFECTS if start is None or _is_worth_looking(study, fit) else 0):
         untried = left_to_try(effects, fit, steps)
@@ -93,7 +93,11 @@ def diagnose(
         step = look_further(study, fit, screen, untried, rng, richer)
         # what is on trial has no look-alikes that are worth the time
         much = not step.effects and believed is None and step.error_before > _AS_GOOD_AS_NOTHING * floor
-        if much and not (may_be_given is not None and may_be_given(target, fit)):
+        much = much and not (may_be_given is not None and may_be_given(target, fit))
+        if much and screened is not fit:  # beside what was found since, others may do something else
+            screen, screened = Screen(effects, study), fit
+            step = look_further(study, fit, screen, untried, rng, richer)
+        if much and not step.effects:
             worth_it = not tried_anyway and step.error_before < FAR
             found = _fitted_anyway(study, fit, screen, untried, rng) if worth_it else None
             found = found or exchange(study, fit, screen, untried, steps, rng)

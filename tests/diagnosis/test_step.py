@@ -84,10 +84,11 @@ def test_of_rough_fits_those_that_gain_much_less_than_the_best_one_are_left_out(
 def test_a_search_fits_anyway_once_and_judges_odd_grasps_again(creeping, monkeypatch, error):
     """With a hundred times the noise left, a real drive got a force limit that no signature had promised."""
     study, base = creeping
-    nothing, asked = Step((), (), (), error, error), []
+    nothing, asked, screens = Step((), (), (), error, error), [], []
 
-    def step(*arguments, anyway=False, **_):
+    def step(study, fit, screen, *_, anyway=False, **__):
         asked.append(anyway)
+        screens.append(screen)
         return looked(creeping, [SMOOTH, DELAY], anyway=True) if anyway and asked.count(True) == 1 else nothing
 
     def odd(target, fit):
@@ -99,7 +100,9 @@ def test_a_search_fits_anyway_once_and_judges_odd_grasps_again(creeping, monkeyp
     for name in ("exchange", "split"):
         monkeypatch.setattr(search, name, lambda *_: None)
     diagnosis = search.diagnose(study.target, base, study.simulators, [SMOOTH, DELAY], np.random.default_rng(0))
-    assert asked == ([False, True, False] if error < 10 else [False])
+    # beside what was found, signatures are others
+    assert asked == ([False, True, False, False] if error < 10 else [False])
+    assert [screen is screens[0] for screen in screens] == [True, True, True, False][: len(screens)]
     assert diagnosis.preferred == (("smooth_friction",) if error < 10 else ())
     assert len(diagnosis.odd) == (error > 10)
 
