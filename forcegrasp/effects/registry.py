@@ -21,6 +21,7 @@ _SHIPPED = (
     "backlash",
     "command_deadband",
     "command_delay",
+    "contact_damping",
     "contact_friction",
     "coulomb_friction",
     "direction_friction",

@@ -33,8 +33,8 @@ class Prior:
 #: of stiction and load_friction, smooth_object_friction, which object_friction stands for, finger_creep, which
 #: finger_compliance and viscoelastic_contact do, rate_limited_lag, which rate_limit and actuator_lag do,
 #: contact_friction, which is a part of object_body, and hunt_crossley_contact, for robots keep the scene's contact and
-#: stiffen it. Nor has one an effect that came later (encoder_scale, motor_asymmetry, return_spring), or such a variant,
-#: lest robots change that policies were compared on.
+#: stiffen it. Nor has one an effect that came later (encoder_scale, motor_asymmetry, return_spring, contact_damping),
+#: or such a variant, lest robots change that policies were compared on.
 EFFECTS = {
     "command_deadband": Prior(0.3, 1 / 3, 3, "the paper's robot: its driver sends no command below 0.3 mm"),
     "command_delay": Prior(0.6, 0.1, 0.7, "assumed: from a bus cycle to one control step of 40 ms"),

@@ -57,7 +57,7 @@ def grown(effect: type[Effect], name: str, factor: float) -> np.ndarray:
     index = [p.name for p in effect.parameters].index(name)
     p = effect.parameters[index]
     values[index] = p.typical / factor if np.isinf(p.null) else p.null + factor * (p.typical - p.null)
-    values[index] = min(values[index], p.high)
+    values[index] = np.clip(values[index], p.low, p.high)
     return values
 
 

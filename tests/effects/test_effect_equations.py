@@ -10,6 +10,7 @@ from scipy.signal import lfilter
 
 from forcegrasp.effects import Effect, catalogue, get_effect
 from forcegrasp.effects.base import Contribution
+from forcegrasp.physics.contact_law import contact_numbers
 from forcegrasp.physics.gripper_file import load_gripper
 from forcegrasp.physics.plant import Plant, write_base
 
@@ -398,6 +399,35 @@ def test_contact_friction_multiplies_that_of_the_scene():
     plant.advance(np.full((4, 2), 0.0255), 500)
     ways = 0.002 - plant.object_position
     assert np.all(np.diff(ways) < -1e-5)
+
+
+@pytest.mark.parametrize("tier", ["reference", "fast"])
+@pytest.mark.parametrize("solref", [(0.02, 1.0), (-2500.0, -100.0)])
+def test_contact_damping_multiplies_damping_and_stiffness_of_the_scenes_contacts(tier, solref):
+    """Where steps are too long for so short a time constant the stiffness is right all the same."""
+    factors = np.array([[1.0, 1.0], [0.4, 1.0], [0.5, 3.0], [2.5, 0.2]])
+    effect = get_effect("contact_damping")
+    plant = make_plant(4, [], tier)
+    plant.field("geom_solref")[:] = solref
+    effect(factors, plant.dt).attach(plant, np.arange(4)).change_model(plant, np.arange(4))
+    geom = plant.object_geoms[0]
+    numbers = contact_numbers(plant.field("geom_solref")[:, geom], plant.field("geom_solimp")[:, geom])
+    np.testing.assert_allclose(numbers[:, 1], factors[:, 1] * numbers[0, 1], rtol=1e-12)
+    most = 1 / plant.dt / 0.99 if solref[0] > 0 else np.inf  # 2 / b is two steps
+    np.testing.assert_allclose(numbers[:, 0], np.minimum(factors[:, 0] * numbers[0, 0], most), rtol=1e-6)
+
+
+def test_the_less_a_touch_is_damped_the_later_its_force_grows_and_the_further_beyond_where_it_settles():
+    factors = np.array([[0.4, 1.0], [1.0, 1.0], [2.0, 1.0]])
+    plant = make_plant(3, [(get_effect("contact_damping"), factors, "", [0, 1, 2])], "reference")
+    start(plant, [0, 1, 2], np.zeros(3))
+    forces = []
+    for _ in range(1000):
+        plant.advance(np.full((3, 2), 0.021))
+        forces.append(plant.pad_force[:, 0])
+    assert np.all(np.diff(forces[40]) > 0.05)  # some 30 ms after the touch
+    assert max(force[0] for force in forces) > 1.5 * max(force[1] for force in forces)
+    np.testing.assert_allclose(forces[-1], forces[-1][1], rtol=0.02)
 
 
 def test_object_friction_holds_an_off_centre_object():

@@ -35,6 +35,8 @@ PLANTS: dict[str, Callable] = {
     "mujoco": MujocoPlant,
     "mujoco_multiccd": partial(MujocoPlant, multiccd=True),
     "mujoco_rubbing": MujocoPlant,
+    "mujoco_damped": partial(MujocoPlant, solref="0.01 1"),
+    "mujoco_ringing": partial(MujocoPlant, solref="0.02 0.4"),
     "penalty": PenaltyPlant,
     "hertz": partial(PenaltyPlant, power=1.5),
 }
