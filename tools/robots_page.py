@@ -31,7 +31,7 @@ def table() -> Iterator[str]:
             )
             for p, low, high in ranges[name]
         )
-        signed = " (±)" if any(p.low < 0 for p, _, _ in ranges[name]) else ""
+        signed = " (±)" if prior.either_sign and any(p.low < 0 for p, _, _ in ranges[name]) else ""
         yield f"| `{name}` | {100 * prior.chance:.0f} % | {sizes}{signed} | {prior.why} |"
     always = (
         ("servo gains", GAINS),

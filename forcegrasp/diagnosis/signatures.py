@@ -249,7 +249,7 @@ def _single(clean: np.ndarray, change: np.ndarray, residual: np.ndarray, one: Ef
     along = float(unit @ residual)
     factor = along / size
     first, values = one.effect.parameters[0], one.values
-    low = -_REACH if first.low < 0 else 0.0
+    low = -_REACH if first.low < 0 and values[0] != first.null else 0.0
     factor = float(np.clip(factor, low, _REACH))
     gain = 2 * factor * size * along - (factor * size) ** 2
     if not first.logarithmic:  # a threshold that starts at infinity does not scale

@@ -1,4 +1,4 @@
-"""The contact grows stiffer the more it is squeezed."""
+"""The contact grows stiffer the more it is squeezed, or less than in the scene."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ DEPTH_M = 0.001
 
 
 class StiffeningContact(Effect):
-    """A steeper impedance curve of the object's contact, or a spring beside it whose force is a power of the depth.
+    """A steeper or flatter impedance curve of the object's contact, or a spring beside it with a power of the depth.
 
     Power 1 is an elastic layer, 1.5 a round body (Hertz), 3 what hardens as foam does.
     """
@@ -22,13 +22,13 @@ class StiffeningContact(Effect):
     stage = "contact"
     family = "contact"
     needs_object = True
-    symptom = "the curve of force over squeeze is more convex than modelled"
+    symptom = "the curve of force over squeeze is more convex than modelled, or less"
     formula = "d(r) with power p + Δp instead of p (MuJoCo's solimp), and F = F_contact + F₁ (δ / 1 mm)^q"
     source = "MuJoCo's `solimp`, last number; q is 1.5 of round bodies (Hertz 1882), 3 of Duffing's hardening spring"
     look_alikes = ("hunt_crossley_contact", "finger_compliance", "viscoelastic_contact")
     separates = "slow ramps to high force on soft objects"
     parameters = (
-        Parameter("extra_power", "Δp, added to the scene's power", "1", 0.0, 8.0, 1.5),
+        Parameter("extra_power", "Δp, added to the scene's power", "1", -1.0, 8.0, 1.5),
         Parameter("spring_n", "force F₁ of the spring at a depth δ of 1 mm", "N", 0.0, 5.0, 0.05, follows="force"),
         Parameter("spring_power", "power q of the spring", "1", 1.0, 6.0, 3.0, null=3.0, if_missing=3.0),
     )

@@ -22,6 +22,7 @@ class Prior:
     why: str
     fixed: Mapping[str, float] = field(default_factory=dict)  #: parameters that are alike for all robots
     variants: tuple[str, ...] = ()  #: which it may be, all of them alike; any if none is said
+    either_sign: bool = True  #: whether what may be negative is, on half of the robots
 
     def variants_of(self, effect: type[Effect]) -> tuple[str, ...]:
         """The variants of an effect that robots may have."""
@@ -54,7 +55,12 @@ EFFECTS = {
     "backlash": Prior(0.4, 0.2, 2, "assumed: 0.1 to 1.2 mm at a fingertip 45 mm from open to closed"),
     "finger_compliance": Prior(0.3, 0.1, 2, "assumed: printed fingers and soft pads, 500 to 10 000 N/m"),
     "stiffening_contact": Prior(
-        0.5, 0.3, 2, "round and soft bodies stiffen as they are pressed (Hertz: power 1.5)", fixed={"spring_power": 3.0}
+        0.5,
+        0.3,
+        2,
+        "round and soft bodies stiffen as they are pressed (Hertz: power 1.5)",
+        fixed={"spring_power": 3.0},
+        either_sign=False,
     ),
     "viscoelastic_contact": Prior(
         0.3, 0.2, 1, "assumed: foam and rubber creep, hard objects do not", variants=("recovering",)

@@ -219,7 +219,7 @@ def _sizes(
     if (value := prior.fixed.get(parameter.name)) is not None:
         return np.full(count, value)
     size = _log_uniform(rng, *_range(effect, parameter, prior), count)
-    return size * rng.choice([-1, 1], count) if parameter.low < 0 else size
+    return size * rng.choice([-1, 1], count) if parameter.low < 0 and prior.either_sign else size
 
 
 def _factors(rng: np.random.Generator, ends: tuple[float, float, str], size: int | tuple[int, int]) -> np.ndarray:

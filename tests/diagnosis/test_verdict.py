@@ -18,7 +18,7 @@ from forcegrasp.diagnosis.evidence import (
     with_close_rivals,
 )
 from forcegrasp.diagnosis.result import Diagnosis, Step, settle_ties
-from forcegrasp.diagnosis.signatures import Score, of_best_effects, share_together
+from forcegrasp.diagnosis.signatures import Score, _single, of_best_effects, share_together
 from forcegrasp.diagnosis.verdict import conclude, explained_share
 from forcegrasp.effects import get_effect
 from forcegrasp.effects.setting import EffectSetting
@@ -352,6 +352,20 @@ def test_variants_do_not_crowd_out_other_effects():
     assert [score.setting.kind[0].name for score in of_best_effects(scores, 3)] == [
         "backlash", "backlash", "stiction", "force_lag", "backlash",
     ]  # fmt: skip
+
+
+def test_only_what_may_be_negative_is_promised_with_that_sign():
+    """A contact may stiffen less than the scene's; a spring beside it never pulls."""
+    curve, spring = (
+        EffectSetting(get_effect("stiffening_contact"), "", np.array(values))
+        for values in ((0.5, 0.0, 3.0), (0.0, 0.04, 3.0))
+    )
+    change = np.ones(4)
+    less, pulling = (_single(change, change, -change, one) for one in (curve, spring))
+    assert less is not None
+    assert pulling is not None
+    assert (less.gain, less.setting.values[0]) == (4.0, -0.5)
+    assert pulling.gain == 0.0
 
 
 # --- the search ----------------------------------------------------------------------------------------------------

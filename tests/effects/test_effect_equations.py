@@ -238,7 +238,7 @@ def test_viscoelastic_contact_relaxes_to_the_elastic_one():
     assert late.force == pytest.approx(GAIN * (late.position - 0.0215) * FORCE_SCALE, rel=0.03)
 
 
-def test_stiffening_contact_steepens_the_impedance():
+def test_stiffening_contact_changes_the_power_of_the_impedance():
     """At rest F ∝ r d² / (1 − d) with d = d_max y, y = (2r/ρ)^p / 2 below the middle; so the ratio is known."""
     rho, power = 0.0065, 2 + 1.5
 
@@ -250,7 +250,7 @@ def test_stiffening_contact_steepens_the_impedance():
         d = 0.99 * 0.5 * (2 * r / rho) ** p
         return r * d**2 / (1 - d)
 
-    for values, p in (((0.0, 0.0, 3.0), 2.0), ((1.5, 0.0, 3.0), power)):
+    for values, p in (((0.0, 0.0, 3.0), 2.0), ((1.5, 0.0, 3.0), power), ((-1.0, 0.0, 3.0), 1.0)):
         squeeze, force = rest(values)
         assert np.all((squeeze > 0) & (squeeze < rho / 2))
         ratio = force / shape(squeeze, p)

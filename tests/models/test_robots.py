@@ -76,6 +76,12 @@ def test_every_effect_of_a_robot_has_a_prior():
     assert all(0 < p.chance <= 1 and 0 < p.low <= p.high and p.why for p in EFFECTS.values())
 
 
+def test_contacts_of_robots_only_stiffen():
+    robots = draw_robots(load_gripper("tiago"), np.random.default_rng(1), 500)
+    extra = next(e for e in robots.effects if e.effect.name == "stiffening_contact").values[:, 0]
+    assert extra.min() == 0 < extra.max()
+
+
 @pytest.mark.parametrize("name", shipped_grippers())
 def test_robots_of_any_gripper_are_within_bounds_and_have_effects_as_often_as_they_should(name):
     robots = draw_robots(load_gripper(name), np.random.default_rng(1), 2000)
