@@ -144,6 +144,7 @@ _PLANS = {
     "object_friction": _OFF_CENTRE,
     "smooth_object_friction": _OFF_CENTRE,
     "contact_friction": _OFF_CENTRE,
+    "object_mass": _OFF_CENTRE,
     "force_crosstalk": _OFF_CENTRE,
     "swapped_forces": _OFF_CENTRE,
     "object_size": Show("a squeeze, a hold, a release", ((25.8, 0.02, 0.2), (22, 0.01, 0.6), (26.5, 0.01, 0.2))),

@@ -150,7 +150,9 @@ def jobs() -> list[Job]:
         for seed in range(2)
     ]
     found += [
-        Job("contact", (), "", seed, contact) for contact in ("mujoco_damped", "mujoco_ringing") for seed in range(1, 5)
+        Job("contact", (), "", seed, contact)
+        for contact in ("mujoco_damped", "mujoco_ringing", "mujoco_light")
+        for seed in range(1, 5)
     ]
     found += _servo_jobs()
     rng.shuffle(found)
@@ -175,7 +177,7 @@ def right_names(job: Job) -> set[str]:
     called = VARIANT_OF | CALLED | {name: answer for name, (answer, _) in OTHERWISE.items()}
     of_contact = {
         "mujoco_rubbing": "contact_friction", "mujoco_damped": "contact_damping", "mujoco_ringing": "contact_damping",
-        "penalty": "hunt_crossley_contact", "hertz": "hunt_crossley_contact",
+        "mujoco_light": "object_mass", "penalty": "hunt_crossley_contact", "hertz": "hunt_crossley_contact",
     }  # fmt: skip
     also = {of_contact[job.contact]} if job.contact in of_contact else set()
     return {called.get(name, name) for name in job.hidden} | also

@@ -11,9 +11,9 @@ from forcegrasp.physics.plant import Plant
 class ContactFriction(Effect):
     """Another friction wherever something touches the object, the table as well as the pads.
 
-    A simulated object creeps on its table where a finger pushes it, the faster the less friction there is. An object of
-    another mass does so, too: a log hardly tells the two apart, so weigh your objects. MuJoCo's contacts also grow
-    softer as their friction grows, where nothing slides as well; a fit makes up for that by the object's softness.
+    A simulated object creeps on its table where a finger pushes it, the faster the less friction there is. So does an
+    object of another mass (``object_mass``). MuJoCo's contacts also grow softer as their friction grows, where nothing
+    slides as well; a fit makes up for that by the object's softness.
     """
 
     name = "contact_friction"
@@ -23,7 +23,7 @@ class ContactFriction(Effect):
     symptom = "a finger that touches first pushes the object further, or less far; the forces of both differ meanwhile"
     formula = "μ = c μ₀"
     source = "Coulomb's law; the scene's μ₀ is a guess for most objects"
-    look_alikes = ("object_friction", "smooth_object_friction", "coulomb_friction")
+    look_alikes = ("object_friction", "smooth_object_friction", "coulomb_friction", "object_mass")
     separates = "off-centre objects: what resists is felt by the finger that pushes, and not where nothing is touched"
     parameters = (
         Parameter(

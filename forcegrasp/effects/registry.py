@@ -45,6 +45,7 @@ _SHIPPED = (
     "motor_asymmetry",
     "motor_offset",
     "object_friction",
+    "object_mass",
     "smooth_object_friction",
     "object_size",
     "position_deadband",

@@ -11,8 +11,7 @@ from forcegrasp.physics.plant import Plant
 class ObjectBody(Effect):
     """An object of another mass, and other friction wherever something touches it, than the scene's.
 
-    It is drawn with a robot. A diagnosis looks for its friction alone, as ``contact_friction``: no log of a grasp tells
-    another mass from that.
+    It is drawn with a robot. A diagnosis looks for each by itself, as ``contact_friction`` and ``object_mass``.
     """
 
     name = "object_body"

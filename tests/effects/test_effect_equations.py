@@ -430,6 +430,18 @@ def test_the_less_a_touch_is_damped_the_later_its_force_grows_and_the_further_be
     np.testing.assert_allclose(forces[-1], forces[-1][1], rtol=0.02)
 
 
+def test_object_mass_multiplies_that_of_the_scene():
+    factors = np.array([0.25, 1.0, 4.0])
+    plant = make_plant(3, [(get_effect("object_mass"), factors[:, None], "", [0, 1, 2])], "reference")
+    start(plant, [0, 1, 2], np.full(3, 0.002))  # towards the right finger, which touches first
+    body = plant.model.geom_bodyid[plant.object_geoms[0]]
+    np.testing.assert_allclose(plant.field("body_mass")[:, body], factors * plant.model.body_mass[body])
+    np.testing.assert_allclose(plant.field("body_inertia")[:, body], np.outer(factors, plant.model.body_inertia[body]))
+    plant.advance(np.full((3, 2), 0.0255), 500)
+    ways = 0.002 - plant.object_position
+    assert np.all(np.diff(ways) < -1e-5)
+
+
 def test_object_friction_holds_an_off_centre_object():
     def pushed(friction: float) -> tuple[float, float]:
         """How far the object went, and the force on it at the end."""

@@ -35,6 +35,7 @@ PLANTS: dict[str, Callable] = {
     "mujoco": MujocoPlant,
     "mujoco_multiccd": partial(MujocoPlant, multiccd=True),
     "mujoco_rubbing": MujocoPlant,
+    "mujoco_light": partial(MujocoPlant, mass=0.15),
     "mujoco_damped": partial(MujocoPlant, solref="0.01 1"),
     "mujoco_ringing": partial(MujocoPlant, solref="0.02 0.4"),
     "penalty": PenaltyPlant,

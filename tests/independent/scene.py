@@ -26,8 +26,8 @@ _SCENE = """
     <geom name="table" type="plane" size="1 1 0.1"/>
     <body name="object" pos="0 {offset} 0.05">
       <freejoint/>
-      <geom type="cylinder" size="{radius} 0.05" mass="0.4" condim="3" friction="{friction} 0.005 0.0001" priority="1"
-            solref="{solref}" solimp="0 0.99 {rho} 0.5 2"/>
+      <geom type="cylinder" size="{radius} 0.05" mass="{mass}" condim="3" friction="{friction} 0.005 0.0001"
+            priority="1" solref="{solref}" solimp="0 0.99 {rho} 0.5 2"/>
     </body>
     {left}
     {right}
@@ -83,6 +83,7 @@ def compile_model(
     multiccd: bool = False,
     friction: float = 1.0,
     solref: str = "0.02 1",
+    mass: float = 0.4,
 ) -> mujoco.MjModel:
     """One grasp's model. Without a servo, the motor (and its rotor's inertia) is simulated outside MuJoCo.
 
@@ -105,13 +106,13 @@ def compile_model(
         )
     xml = _SCENE.format(
         step=STEP_S, offset=offset, radius=radius, rho=rho, contacts=_MAX_CONTACTS, motors=motors,
-        multiccd="enable" if multiccd else "disable", friction=friction, solref=solref,
+        multiccd="enable" if multiccd else "disable", friction=friction, solref=solref, mass=mass,
         left=finger("left", -1), right=finger("right", 1),
     )  # fmt: skip
     model = mujoco.MjModel.from_xml_string(xml)
     if servo is None:
         # A contact's softness is scaled by these: the object stays the same whatever hangs behind the pad.
-        whole = compile_model(rho, radius, offset, Servo(), friction=friction, solref=solref)
+        whole = compile_model(rho, radius, offset, Servo(), friction=friction, solref=solref, mass=mass)
         model.body_invweight0[:], model.dof_invweight0[:] = whole.body_invweight0, whole.dof_invweight0
     return model
 
@@ -125,6 +126,7 @@ class MujocoPlant:
       multiccd: see :func:`compile_model`.
       friction: of the object, on the table and on the pads.
       solref: time constant and damping ratio of what touches the object.
+      mass: of the object, kg.
     """
 
     def __init__(
@@ -136,10 +138,11 @@ class MujocoPlant:
         multiccd: bool = False,
         friction: float = 1.0,
         solref: str = "0.02 1",
+        mass: float = 0.4,
     ) -> None:
         _silence_log()
         objects = zip(rho, radius, offset, strict=True)
-        models = [compile_model(*values, servo, multiccd, friction, solref) for values in objects]
+        models = [compile_model(*values, servo, multiccd, friction, solref, mass) for values in objects]
         self._batch = batch = Batch(models[0], len(models), 1)
         batch.set_models(models)
         batch.reset()
