@@ -10,7 +10,7 @@ import numpy as np
 
 from forcegrasp.diagnosis.evidence import indistinguishable, rivals_in
 from forcegrasp.diagnosis.exchange import against, steps_of
-from forcegrasp.diagnosis.families import may_join, others_of_its_family, refit_as, refit_without, roughly_as
+from forcegrasp.diagnosis.families import look_alikes_of, may_join, refit_as, refit_without, roughly_as
 from forcegrasp.diagnosis.needless import chained
 from forcegrasp.diagnosis.refine import refine_anyway
 from forcegrasp.diagnosis.result import Candidate, Step
@@ -48,7 +48,7 @@ def _better_of_its_family(study: Study, step: Step, fit: Fit, effects: Sequence[
     own = fit.effect(step.effects[0]).effect
     others = [one.effect for one in fit.problem.effects if one.effect is not own]
     alike = [
-        effect for effect in others_of_its_family(own, effects)
+        effect for effect in look_alikes_of(own, effects)
         if effect.name not in step.effects and may_join(effect, [*others, own])
     ]  # fmt: skip
     for better in refine_anyway(alike, study, fit, own.name) if alike else ():

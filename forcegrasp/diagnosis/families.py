@@ -45,9 +45,11 @@ def look_alike(one: type[Effect], other: type[Effect]) -> bool:
     return one.name in other.look_alikes or other.name in one.look_alikes
 
 
-def others_of_its_family(own: type[Effect], effects: Sequence[type[Effect]]) -> list[type[Effect]]:
-    """Those of the effects that are of one's family and look like it; no mistakes of the set."""
-    return [e for e in effects if e.family == own.family and look_alike(e, own) and not e.of_set]
+def look_alikes_of(
+    own: type[Effect], effects: Sequence[type[Effect]], of_any_family: bool = False
+) -> list[type[Effect]]:
+    """Those of the effects that look like one and are of its family, or of any; no mistakes of the set."""
+    return [e for e in effects if look_alike(e, own) and not e.of_set and (of_any_family or e.family == own.family)]
 
 
 def _contained(effect: type[Effect]) -> set[str]:

@@ -25,7 +25,7 @@ from forcegrasp.diagnosis.result import Candidate, Step
 from forcegrasp.diagnosis.screen import MAX_GAIN_FACTOR, Screen
 from forcegrasp.diagnosis.signatures import Background, Score, best_effects, direction, of_best_effects
 from forcegrasp.diagnosis.study import Study
-from forcegrasp.diagnosis.verdict import LEAST_SHARE
+from forcegrasp.diagnosis.verdict import EXPLAINED_FAR, LEAST_SHARE
 from forcegrasp.effects import Effect
 from forcegrasp.identify.base_fit import rms_error
 from forcegrasp.identify.cross_validation import rms
@@ -179,13 +179,14 @@ class _Start:
         leaves_more = rms_error(best.fit, self._study.target) > _ALL_FITTED
         return leaves_more and not (self.place(best)[0] or best.replaces or best.effect.of_set)
 
-    def _better_of_its_family(
+    def _better_look_alikes(
         self, best: Candidate, effects: Sequence[type[Effect]], null: np.ndarray
     ) -> list[Candidate]:
-        """Rough fits with look-alikes of one's family in its place, those that leave less than it does on few grasps.
+        """Rough fits with look-alikes of one in its place, those that leave less than it does on few grasps.
 
         Of two kinds of friction the wrong one may have the better signature by far, where both are to grow much larger
-        than signatures are. Where the best one is fitted, the others start from what it has found.
+        than signatures are. Where the best one is fitted, the others start from what it has found. One that explains
+        little may be of the wrong family, too.
 
         Args:
           best: a candidate that was fitted to the end.
@@ -193,7 +194,7 @@ class _Start:
           null: gains of the best signature of noise.
         """
         name, own = best.effect.name, best.effect
-        alike = families.others_of_its_family(own, effects)
+        alike = families.look_alikes_of(own, effects, of_any_family=best.share < EXPLAINED_FAR)
         for effect in alike:
             self._study.progress(f"trying {effect.name} in place of {name}")
         fits = refine_anyway(alike, self._study, best.fit, name)
@@ -249,7 +250,7 @@ class _Start:
             elif first.effect.family not in families_tried and self._may_be_a_look_alike(first):
                 families_tried.add(first.effect.family)
                 fitted = {c.effect for c in every}
-                better = self._better_of_its_family(first, [e for e in effects if e not in fitted], null)
+                better = self._better_look_alikes(first, [e for e in effects if e not in fitted], null)
                 alike |= {c.effect.name: [] for c in better}
                 every += better
             else:
