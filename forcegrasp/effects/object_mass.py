@@ -32,6 +32,11 @@ class ObjectMass(Effect):
     order = 2
 
     def change_model(self, plant: Plant, which: np.ndarray) -> None:
-        rows, body = self.rows[which], plant.model.geom_bodyid[plant.object_geoms[0]]
-        plant.field("body_mass")[rows, body] *= self["factor"][which, 0]
-        plant.field("body_inertia")[rows, body] *= self["factor"][which]
+        multiply_mass(plant, self.rows[which], self["factor"][which])
+
+
+def multiply_mass(plant: Plant, rows: np.ndarray, factor: np.ndarray) -> None:
+    """Makes the objects of some rows heavier by a factor, ``(n, 1)``, evenly."""
+    body = plant.model.geom_bodyid[plant.object_geoms[0]]
+    plant.field("body_mass")[rows, body] *= factor[:, 0]
+    plant.field("body_inertia")[rows, body] *= factor

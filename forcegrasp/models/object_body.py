@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from forcegrasp.effects.base import Effect, Parameter
+from forcegrasp.effects.object_mass import multiply_mass
 from forcegrasp.physics.plant import Plant
 
 
@@ -27,8 +28,6 @@ class ObjectBody(Effect):
     )
 
     def change_model(self, plant: Plant, which: np.ndarray) -> None:
-        rows, body = self.rows[which], plant.model.geom_bodyid[plant.object_geoms[0]]
-        mass, friction = self["mass_factor"][which], self["friction_factor"][which]
-        plant.field("body_mass")[rows, body] *= mass[:, 0]
-        plant.field("body_inertia")[rows, body] *= mass
-        plant.field("geom_friction")[rows, :, 0] *= friction
+        rows = self.rows[which]
+        multiply_mass(plant, rows, self["mass_factor"][which])
+        plant.field("geom_friction")[rows, :, 0] *= self["friction_factor"][which]
