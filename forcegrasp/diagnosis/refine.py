@@ -18,9 +18,10 @@ from forcegrasp.identify.problem import Problem
 from forcegrasp.identify.side_by_side import side_by_side
 from forcegrasp.short_repr import ShortRepr
 
-# At its best size an effect promises nearly what a fit will gain, and fitted to few grasps what it gains on all: one
-# with less than this share of the best gain has lost.
-_LOST, _LOST_IF_FITTED = 0.4, 0.7
+# At its best size an effect promises nearly what a fit will gain: one with less than this share of the best has lost.
+_LOST = 0.4
+#: The same of what effects gain that are fitted, to few grasps or roughly.
+LOST_IF_FITTED = 0.7
 #: A rough fit whose cost is no smaller share of another's is no better; rough ones end within a tenth of that.
 NO_BETTER = 0.99
 
@@ -55,7 +56,7 @@ def refine(scores: Sequence[Score], study: Study, fit: Fit, background: Backgrou
     fits = side_by_side([partial(_fit_from, part.vector, setting, some, part) for setting in settings])
     if some is study:
         return [Refined(score, one) for (_, score), one in zip(pairs, fits, strict=True)]
-    racing = _in_the_race([part.cost - one.cost for one in fits], _LOST_IF_FITTED)
+    racing = _in_the_race([part.cost - one.cost for one in fits], LOST_IF_FITTED)
     left = [i for i in racing if not _adds_nothing(fits[i], fits)]
     tasks = []
     for few in (fits[i] for i in left):
@@ -82,7 +83,7 @@ def refine_anyway(effects: Sequence[type[Effect]], study: Study, fit: Fit, witho
     if some is study:
         return few
     tasks = []
-    for index in _in_the_race([part.cost - one.cost for one in few], _LOST_IF_FITTED):
+    for index in _in_the_race([part.cost - one.cost for one in few], LOST_IF_FITTED):
         setting = few[index].effects[-1]
         study.progress(f"refitting with {setting.effect.name} {setting.variant} on all grasps")
         tasks.append(partial(roughly_as, [setting], fit, without, study))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from functools import partial
 
 import numpy as np
@@ -20,7 +20,7 @@ from forcegrasp.diagnosis.evidence import (
 from forcegrasp.diagnosis.look_beside import look_beside
 from forcegrasp.diagnosis.noise_check import unexpected_noise
 from forcegrasp.diagnosis.other_starts import other_starts
-from forcegrasp.diagnosis.refine import NO_BETTER, refine, refine_anyway
+from forcegrasp.diagnosis.refine import LOST_IF_FITTED, NO_BETTER, refine, refine_anyway
 from forcegrasp.diagnosis.result import Candidate, Step
 from forcegrasp.diagnosis.screen import MAX_GAIN_FACTOR, Screen
 from forcegrasp.diagnosis.signatures import Background, Score, best_effects, direction, of_best_effects
@@ -179,6 +179,28 @@ class _Start:
         leaves_more = rms_error(best.fit, self._study.target) > _ALL_FITTED
         return leaves_more and not (self.place(best)[0] or best.replaces or best.effect.of_set)
 
+    def _rivals(self, best: Candidate, candidates: Sequence[Candidate], at_the_end: Collection[str]) -> list[Candidate]:
+        """Rough fits that gained nearly as much as one that leaves more than noise at the end.
+
+        Of a lighter object and a softer damper of its contacts the wrong one may be ahead of the other roughly, where
+        other parameters have not followed yet.
+
+        Args:
+          best: what was fitted to the end.
+          candidates: all there are.
+          at_the_end: names of those that were fitted to the end, too.
+        """
+        rough = [c for c in candidates if c.effect.name not in at_the_end and not c.replaces]
+        least = LOST_IF_FITTED * (self._fit.cost - best.fit.cost)
+        return [c for c in rough if self._fit.cost - c.fit.cost > least]
+
+    def _leads_further(self, rough: Candidate, best: Candidate) -> bool:
+        """Whether a rough fit comes to less than one that was fitted to the end, on few grasps."""
+        some, part = self._study.on_few(best.fit)
+        own = self._study.on_few(rough.fit)[1]
+        self._study.progress(f"holding {rough.effect.name} against {best.effect.name} on few grasps")
+        return fit_exactly(some.target, own.problem, some.simulators, own.vector).cost < NO_BETTER * part.cost
+
     def _better_look_alikes(
         self, best: Candidate, effects: Sequence[type[Effect]], null: np.ndarray
     ) -> list[Candidate]:
@@ -247,6 +269,11 @@ class _Start:
                 # fitted to the end the others are no better than this rough one: it is to be fitted, too
                 names.add(first.effect.name)
                 (every[0],) = self._at_the_end([first], alike)
+            elif self._may_be_a_look_alike(first) and (rivals := self._rivals(first, every, names)):
+                names.update(c.effect.name for c in rivals)
+                nearer = self._at_the_end([c for c in rivals if self._leads_further(c, first)], alike)
+                fitted = {c.effect.name: c for c in nearer}
+                every = [fitted.get(c.effect.name, c) for c in every]
             elif first.effect.family not in families_tried and self._may_be_a_look_alike(first):
                 families_tried.add(first.effect.family)
                 fitted = {c.effect for c in every}

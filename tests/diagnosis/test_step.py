@@ -19,6 +19,7 @@ from forcegrasp.diagnosis.study import Study
 from forcegrasp.effects import catalogue
 from forcegrasp.effects.for_gripper import effect_of
 from forcegrasp.identify.cross_validation import make_folds
+from forcegrasp.identify.fit import fit_once
 from forcegrasp.identify.fit_set import fit_model
 from forcegrasp.identify.noise_floor import beyond_fit, numerical_error
 from forcegrasp.identify.progress import silent
@@ -56,10 +57,38 @@ def looked(creeping, effects, *seen: str, **more) -> Step:
     return look_further(study, base.fit, screen, effects, np.random.default_rng(0), **more)
 
 
-def test_a_look_alike_of_its_family_is_fitted_in_the_place_of_what_leaves_more_than_noise(creeping):
-    step = looked(creeping, [PRESLIDING, SMOOTH], "presliding")
-    assert step.effects[0] == "smooth_friction"
-    assert step.error_after < 1.05 < next(c for c in step.candidates if c.effect is PRESLIDING).error_after
+@pytest.fixture(scope="module")
+def alike(creeping) -> Step:
+    """A step whose signatures promised one kind of friction, and another was hidden."""
+    return looked(creeping, [PRESLIDING, SMOOTH], "presliding")
+
+
+def test_a_look_alike_of_its_family_is_fitted_in_the_place_of_what_leaves_more_than_noise(alike):
+    assert alike.effects[0] == "smooth_friction"
+    assert alike.error_after < 1.05 < next(c for c in alike.candidates if c.effect is PRESLIDING).error_after
+
+
+def test_a_rough_fit_that_gained_nearly_as_much_is_held_against_what_leaves_more_than_noise(
+    creeping, alike, monkeypatch
+):
+    """A lighter object was ahead of softer contacts, roughly, and took two more effects with it."""
+    study, base = creeping
+    at_the_end = {c.effect: c for c in alike.candidates}
+    ahead, truth = at_the_end[PRESLIDING], at_the_end[SMOOTH]
+    problem, vector, fixed = truth.fit.problem, truth.fit.vector.copy(), np.zeros(len(truth.fit.vector), bool)
+    vector[-2] *= 0.8
+    rough = fit_once(study.target, problem, study.simulators, vector, base.fit.correction, rounds=0, free=fixed)
+    rough = dataclasses.replace(truth, fit=rough, share=0.8 * ahead.share, gains=0.8 * ahead.gains)
+    start = _Start(study, base.fit)
+    monkeypatch.setattr(_Start, "_at_the_end", lambda _, some, __: [at_the_end[c.effect] for c in some])
+    monkeypatch.setattr(_Start, "_better_look_alikes", lambda *_: [])
+    ordered, _ = start.refine_on_reference_tier([[ahead], [rough]], [PRESLIDING, SMOOTH], np.zeros(1))
+    assert [one.effect for one in ordered] == [SMOOTH, PRESLIDING]
+    assert ordered[0].error_after < 1.05
+    assert start._rivals(ahead, [rough], set()) == [rough]
+    assert start._rivals(ahead, [rough], {"smooth_friction"}) == []
+    assert start._rivals(ahead, [dataclasses.replace(rough, fit=base.fit)], set()) == []
+    assert not start._leads_further(ahead, truth)
 
 
 def test_where_noise_alone_is_left_no_look_alike_is_fitted(creeping, monkeypatch):
