@@ -129,6 +129,7 @@ _PLANS = {
         ((25, 0.02, 0.2), (19, 0.003, 0.3), (26, 0.006, 0.2)),
     ),
     "contact_damping": Show("two fast touches", ((25, 0.02, 0.2), (21, JUMP, 0.5), (26, 0.02, 0.2), (22, JUMP, 0.5))),
+    "contact_onset": Show("two fast touches", ((25, 0.02, 0.2), (21, JUMP, 0.5), (26, 0.02, 0.2), (22, JUMP, 0.5))),
     "hunt_crossley_contact": Show(
         "a slow squeeze to a high force, a release, and a fast touch",
         ((25, 0.02, 0.2), (19, 0.003, 0.3), (26, 0.02, 0.2), (20, JUMP, 0.4)),

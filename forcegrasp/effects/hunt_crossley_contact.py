@@ -27,7 +27,7 @@ class HuntCrossleyContact(Effect):
     family = "contact"
     needs_object = True
     needs_parallel_pads = True
-    instead_of = ("stiffening_contact", "contact_damping")
+    instead_of = ("stiffening_contact", "contact_damping", "contact_onset")
     symptom = "force grows otherwise with the squeeze, at every speed; touches are less damped, or more"
     formula = "F = F_ρ (δ / ρ)^p max(0, 1 + λ dδ/dt) in place of MuJoCo's, δ the depth, ρ the width of its solimp"
     source = "Hunt and Crossley 1975; p is 1 of flat pads on a bed of springs, 1.5 of round bodies (Hertz 1882)"

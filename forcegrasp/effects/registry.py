@@ -23,6 +23,7 @@ _SHIPPED = (
     "command_delay",
     "contact_damping",
     "contact_friction",
+    "contact_onset",
     "coulomb_friction",
     "direction_friction",
     "elastic_transmission",

@@ -35,7 +35,7 @@ class Prior:
 #: finger_compliance and viscoelastic_contact do, rate_limited_lag, which rate_limit and actuator_lag do,
 #: contact_friction and object_mass, which are parts of object_body, and hunt_crossley_contact, for robots keep the
 #: scene's contact and stiffen it. Nor has one an effect that came later (encoder_scale, motor_asymmetry, return_spring,
-#: contact_damping), or such a variant, lest robots change that policies were compared on.
+#: contact_damping, contact_onset), or such a variant, lest robots change that policies were compared on.
 EFFECTS = {
     "command_deadband": Prior(0.3, 1 / 3, 3, "the paper's robot: its driver sends no command below 0.3 mm"),
     "command_delay": Prior(0.6, 0.1, 0.7, "assumed: from a bus cycle to one control step of 40 ms"),

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from forcegrasp.physics.protocols import PlantEffect
+from forcegrasp.physics.places import places
+from forcegrasp.physics.protocols import Contribution, PlantEffect
 from forcegrasp.physics.sensors import ReadingEffects
 
 
@@ -27,6 +28,9 @@ class AttachedEffects:
         )
         self._of_commands = [effect for effect in self._command if effect.is_known_beforehand]
         self._of_motion = [effect for effect in self._act if effect.follows_motion]
+        self._acting_at = [(effect, places(effect.rows)) for effect in self._act]
+        #: Names of what :meth:`contribute` may have set to something else than 0 in its last call.
+        self.given = set(Contribution._fields)
         self.readings = ReadingEffects(effects)
         #: Whether any acts on what happens in a step, and not only on the model or by what is commanded.
         self.act_in_steps = any(
@@ -110,21 +114,22 @@ class AttachedEffects:
             low[effect.rows], high[effect.rows] = effect.motor_range(low[effect.rows], high[effect.rows])
         return low, high
 
-    def contribute(self, totals: Sequence[np.ndarray]) -> bool:
+    def contribute(self, totals: Contribution) -> bool:
         """Sums up what they contribute to a step; returns whether any may.
 
         Args:
-          totals: set to the sums, of all rows, in the order of :class:`~forcegrasp.physics.protocols.Contribution`.
-            An effect finds those of the ones before it.
+          totals: set to the sums, of all rows. An effect finds those of the ones before it.
         """
         if not self._act:
             return False
-        for total in totals:
-            total[:] = 0
-        for effect in self._act:
-            for total, added in zip(totals, effect.act(), strict=True):
+        for name in self.given:
+            getattr(totals, name)[:] = 0
+        self.given.clear()
+        for effect, rows in self._acting_at:
+            for name, total, added in zip(Contribution._fields, totals, effect.act(), strict=True):
                 if added is not None:
-                    total[effect.rows] += added
+                    total[rows] += added
+                    self.given.add(name)
         return True
 
     def interaction(self, force: np.ndarray) -> np.ndarray:

@@ -11,7 +11,7 @@ from forcegrasp.physics.attached_effects import AttachedEffects
 from forcegrasp.physics.contact_law import contact_numbers
 from forcegrasp.physics.gripper import OF_READINGS, START_VELOCITY, Gripper
 from forcegrasp.physics.model_fields import ModelFields
-from forcegrasp.physics.protocols import PlantEffect
+from forcegrasp.physics.protocols import Contribution, PlantEffect
 
 # What motor_force and outside_force are made of.
 _FORCES = ("qfrc_actuator", "qfrc_spring", "qfrc_bias")
@@ -51,7 +51,7 @@ class Plant(ModelFields):
         self.pad_shift_m, self.finger_push_n, self._contact_shift_m = np.zeros((3, n, 2))
         self.object_push_n = np.zeros(n)
         pushes = self.finger_push_n, self.object_push_n, self.damping, self.motor_push
-        self._contributed = (self.friction, self.pad_shift_m, *pushes, self._contact_shift_m)
+        self._contributed = Contribution(self.friction, self.pad_shift_m, *pushes, self._contact_shift_m)
         self.position = np.zeros((n, self.motors))  #: of the motors (left, right, or the one), m or rad; 0 is closed
         #: Sum of each finger's contact forces at the last physics step, before f_α, newtons, ``(n, 2)``.
         self.pad_force = np.zeros((n, 2))
@@ -321,8 +321,12 @@ class Plant(ModelFields):
         if not self.gripper.is_servo:
             self._applied[:, self.object_dof] = self.object_push_n
 
+    def _is_given(self, name: str) -> bool:
+        """Whether effects contribute anything of this name to this step."""
+        return name in self.effects.given and bool(getattr(self._contributed, name).any())
+
     def _write_friction(self) -> None:
-        if not self.friction.any() and "dof_frictionloss" not in self._fields:
+        if "dof_frictionloss" not in self._fields and not self._is_given("friction"):
             return
         if self._friction_written is not None and np.array_equal(self.friction, self._friction_written):
             return
@@ -336,11 +340,11 @@ class Plant(ModelFields):
                 self.stiffen_friction(dof)
 
     def _write_damping(self) -> None:
-        if self.damping.any() or "dof_damping" in self._fields:
+        if "dof_damping" in self._fields or self._is_given("damping"):
             self.field("dof_damping")[:, self._motor_v] = self.base("dof_damping")[:, self._motor_v] + self.damping
 
     def _write_pad_shift(self) -> None:
-        if not self.pad_shift_m.any() and "geom_pos" not in self._fields:
+        if "geom_pos" not in self._fields and not self._is_given("pad_shift_m"):
             return
         shifts = self.pad_shift_m + self._contact_shift_m
         for side, pads in enumerate(self._pads):

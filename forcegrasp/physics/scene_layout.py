@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 import functools
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import mujoco
@@ -13,6 +12,7 @@ import numpy as np
 from forcegrasp.physics.gripper import Gripper, effort_sensor, own_sensor
 from forcegrasp.physics.gripper_parts import Finger
 from forcegrasp.physics.opening import command_law, least_distance, pad_geoms
+from forcegrasp.physics.places import places
 
 
 class SceneLayout:
@@ -33,8 +33,8 @@ class SceneLayout:
         self.actuators = [model.actuator(motor.actuator).id for motor in gripper.motors]
         # where motors stand in the engine's arrays: slices, for they are read and written in every step
         self._motor_qpos = [int(joint.qposadr[0]) for joint in joints]
-        self._motor_q = _places(self._motor_qpos)
-        self._motor_v, self._drives = _places(self.motor_dofs), _places(self.actuators)
+        self._motor_q = places(self._motor_qpos)
+        self._motor_v, self._drives = places(self.motor_dofs), places(self.actuators)
         self._pads = [_Pads.find(model, finger.body) for finger in gripper.fingers]
         self._signs = np.array([motor.sign for motor in gripper.motors])
         self._origins = np.array([motor.closed for motor in gripper.motors])
@@ -186,13 +186,3 @@ def _reading(model: mujoco.MjModel, side: str, finger: Finger) -> slice:
     """Where the numbers stand whose sum is a side's force; of sensors that were added, the normal forces alone."""
     sensor = model.sensor(finger.force_sensor or own_sensor(side))
     return slice(sensor.adr[0], sensor.adr[0] + sensor.dim[0], 1 if finger.force_sensor else 3)
-
-
-def _places(indices: Sequence[int]) -> slice | np.ndarray:
-    """These indices, in this order: as a slice if they are evenly spaced, which is faster."""
-    steps = set(np.diff(indices).tolist())
-    if len(steps) > 1 or 0 in steps:
-        return np.array(indices, int)
-    step = int(next(iter(steps), 1))
-    end = int(indices[-1]) + (1 if step > 0 else -1)
-    return slice(int(indices[0]), None if end < 0 else end, step)

@@ -430,6 +430,30 @@ def test_the_less_a_touch_is_damped_the_later_its_force_grows_and_the_further_be
     np.testing.assert_allclose(forces[-1], forces[-1][1], rtol=0.02)
 
 
+def test_contact_onset_moves_the_impedance_that_contacts_begin_with():
+    shares = np.array([-1.0, -0.5, 0.0, 0.5, 1.0])
+    effect = get_effect("contact_onset")
+    plant = make_plant(5, [], "reference")
+    plant.field("geom_solimp")[:, :, :2] = 0.2, 0.9
+    effect(shares[:, None], plant.dt).attach(plant, np.arange(5)).change_model(plant, np.arange(5))
+    solimp = plant.field("geom_solimp")
+    np.testing.assert_allclose(solimp[:, plant.object_geoms[0], 0], [0.0, 0.1, 0.2, 0.55, 0.9], rtol=1e-12)
+    assert (solimp[..., 1] == 0.9).all()
+    others = np.delete(np.arange(solimp.shape[1]), plant.object_geoms)
+    assert (solimp[:, others, 0] == 0.2).all()
+
+
+def test_a_contact_that_begins_with_more_impedance_presses_sooner():
+    plant = make_plant(3, [(get_effect("contact_onset"), np.array([[0.0], [0.1], [0.4]]), "", [0, 1, 2])], "reference")
+    start(plant, [0, 1, 2], np.zeros(3))
+    forces = []
+    for _ in range(1000):
+        plant.advance(np.full((3, 2), 0.021))
+        forces.append(plant.pad_force[:, 0])
+    assert np.all(np.diff(forces[32]) > 0.1)  # within 2 ms of the touch
+    assert np.all(np.diff(plant.position[:, 0]) > 1e-4)  # and holds at less depth
+
+
 def test_object_mass_multiplies_that_of_the_scene():
     factors = np.array([0.25, 1.0, 4.0])
     plant = make_plant(3, [(get_effect("object_mass"), factors[:, None], "", [0, 1, 2])], "reference")

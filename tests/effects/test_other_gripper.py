@@ -55,12 +55,6 @@ def test_all_null_values_at_once_change_no_bit():
     assert rollout(*((e, e.null_values(), "") for e in catalogue().values())) == bare()
 
 
-@pytest.mark.parametrize(("effect", "variant"), CASES)
-def test_typical_values_change_something(effect, variant):
-    slides_on_a_rail = effect.name == "contact_friction"  # pads press it, and nothing rubs along it
-    assert (rollout((effect, effect.typical_values(), variant)) == bare()) == slides_on_a_rail
-
-
 def test_coulomb_friction_adds_to_the_joints_own():
     """The servo's spring holds what both together may: the base parameter is not overwritten."""
     added = 0.04

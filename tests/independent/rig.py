@@ -38,6 +38,7 @@ PLANTS: dict[str, Callable] = {
     "mujoco_light": partial(MujocoPlant, mass=0.15),
     "mujoco_damped": partial(MujocoPlant, solref="0.01 1"),
     "mujoco_ringing": partial(MujocoPlant, solref="0.02 0.4"),
+    "mujoco_firm": partial(MujocoPlant, least=0.5),
     "penalty": PenaltyPlant,
     "hertz": partial(PenaltyPlant, power=1.5),
 }

@@ -27,7 +27,7 @@ _SCENE = """
     <body name="object" pos="0 {offset} 0.05">
       <freejoint/>
       <geom type="cylinder" size="{radius} 0.05" mass="{mass}" condim="3" friction="{friction} 0.005 0.0001"
-            priority="1" solref="{solref}" solimp="0 0.99 {rho} 0.5 2"/>
+            priority="1" solref="{solref}" solimp="{least} 0.99 {rho} 0.5 2"/>
     </body>
     {left}
     {right}
@@ -84,6 +84,7 @@ def compile_model(
     friction: float = 1.0,
     solref: str = "0.02 1",
     mass: float = 0.4,
+    least: float = 0.0,
 ) -> mujoco.MjModel:
     """One grasp's model. Without a servo, the motor (and its rotor's inertia) is simulated outside MuJoCo.
 
@@ -106,13 +107,13 @@ def compile_model(
         )
     xml = _SCENE.format(
         step=STEP_S, offset=offset, radius=radius, rho=rho, contacts=_MAX_CONTACTS, motors=motors,
-        multiccd="enable" if multiccd else "disable", friction=friction, solref=solref, mass=mass,
+        multiccd="enable" if multiccd else "disable", friction=friction, solref=solref, mass=mass, least=least,
         left=finger("left", -1), right=finger("right", 1),
     )  # fmt: skip
     model = mujoco.MjModel.from_xml_string(xml)
     if servo is None:
         # A contact's softness is scaled by these: the object stays the same whatever hangs behind the pad.
-        whole = compile_model(rho, radius, offset, Servo(), friction=friction, solref=solref, mass=mass)
+        whole = compile_model(rho, radius, offset, Servo(), friction=friction, solref=solref, mass=mass, least=least)
         model.body_invweight0[:], model.dof_invweight0[:] = whole.body_invweight0, whole.dof_invweight0
     return model
 
@@ -127,6 +128,7 @@ class MujocoPlant:
       friction: of the object, on the table and on the pads.
       solref: time constant and damping ratio of what touches the object.
       mass: of the object, kg.
+      least: impedance of what touches the object at no depth.
     """
 
     def __init__(
@@ -139,10 +141,11 @@ class MujocoPlant:
         friction: float = 1.0,
         solref: str = "0.02 1",
         mass: float = 0.4,
+        least: float = 0.0,
     ) -> None:
         _silence_log()
         objects = zip(rho, radius, offset, strict=True)
-        models = [compile_model(*values, servo, multiccd, friction, solref, mass) for values in objects]
+        models = [compile_model(*values, servo, multiccd, friction, solref, mass, least) for values in objects]
         self._batch = batch = Batch(models[0], len(models), 1)
         batch.set_models(models)
         batch.reset()
