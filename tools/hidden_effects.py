@@ -177,7 +177,8 @@ def right_names(job: Job) -> set[str]:
     called = VARIANT_OF | CALLED | {name: answer for name, (answer, _) in OTHERWISE.items()}
     of_contact = {
         "mujoco_rubbing": "contact_friction", "mujoco_damped": "contact_damping", "mujoco_ringing": "contact_damping",
-        "mujoco_light": "object_mass", "mujoco_firm": "contact_onset", "penalty": "hunt_crossley_contact", "hertz": "hunt_crossley_contact",
+        "mujoco_light": "object_mass", "mujoco_firm": "contact_onset", "penalty": "hunt_crossley_contact",
+        "hertz": "hunt_crossley_contact",
     }  # fmt: skip
     also = {of_contact[job.contact]} if job.contact in of_contact else set()
     return {called.get(name, name) for name in job.hidden} | also
