@@ -40,6 +40,9 @@ MOST_EFFECTS = 8
 _MANY = 12
 # Where the base fit stopped short, parameters are a little off: so many times the floor is as good as nothing left.
 _AS_GOOD_AS_NOTHING = 1.1
+# If that is also less than this share of what was beyond the noise, effects that were found are nearly right, and what
+# takes the rest makes up for their forms: behind a lag, in another engine's contacts, objects were ten times too light.
+_LITTLE = 0.1
 
 
 def diagnose(
@@ -116,7 +119,7 @@ def diagnose(
             target, study = weighed, dataclasses.replace(study, target=weighed)
         step, fit = drop_needless(study, step, fit, len(base.fit.problem.effects))
         steps.append(step)
-        if not _is_worth_looking(study, fit):
+        if not _is_worth_looking(study, fit) or _leaves_little(study, fit, error_before, floor):
             break
     steps, fit = simplify(study, steps, fit, len(base.fit.problem.effects))
     steps, fit = merge(study, steps, fit, effects, len(base.fit.problem.effects))
@@ -235,6 +238,12 @@ def _is_worth_looking(study: Study, fit: Fit) -> bool:
     """Whether a model leaves more than noise, or what seems to be stronger noise: only that none is found tells."""
     left, noise = _left(study, fit)
     return bool(left) or (noise is not None and noise.stronger)
+
+
+def _leaves_little(study: Study, fit: Fit, error_before: float, floor: float) -> bool:
+    """Whether effects leave next to nothing, and little of what there was before them."""
+    error = study.error(study.heldout(fit))
+    return error < _AS_GOOD_AS_NOTHING * floor and explained_share(error_before, error) > 1 - _LITTLE
 
 
 def _left(study: Study, fit: Fit) -> tuple[str, Noise | None]:

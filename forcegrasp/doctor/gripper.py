@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 _NOISE = 0.5
 # Share by which a reading may differ from what presses: the paper's sensors add tangential forces, 2 % here.
 _MISSED = 0.1
+# Share of their inertia that motors may get from the integrator.
+_HEAVIER = 0.1
 _PAGE = "see docs/your-gripper.md"
 
 
@@ -92,6 +94,9 @@ def _grasp(gripper: Gripper) -> Iterator[Finding]:
     yield fine("grasp", f"an object of {radius:.3g} mm radius is pressed with {forces} N by full steps for 5 s")
     if gripper.force == "sensors":
         yield from _sensors(gripper, pressed, force[-1])
+    if (heavier := _heavier(plant)) > _HEAVIER:
+        told = f"implicit steps of {1e3 * plant.dt:g} ms make motors {100 * heavier:.0f} % heavier than the scene says"
+        yield note("time step", f"{told}, and forces that are fitted to a set with them; shorter steps do so less")
     noise = np.array([gripper.training.position_std] * place.shape[1] + [gripper.training.force_std_n] * force.shape[1])
     other = np.concatenate(_pressed(gripper, Plant(gripper, 1, threads=1, other_collisions=True)), axis=1)
     if not noise.any():
@@ -115,6 +120,23 @@ def _sensors(gripper: Gripper, pressed: np.ndarray, read: np.ndarray) -> Iterato
             yield warning("sensors", told, f"look at its site or bodies, and its sign; {_PAGE}")
         else:
             yield fine("sensors", told)
+
+
+def _heavier(plant: Plant) -> float:
+    """Largest share of a motor's inertia M that the integrator adds to it: h (k_v + damping) ÷ M.
+
+    MuJoCo's documentation, Computation, "Numerical integration": implicit steps h solve with M − h ∂f/∂v for M.
+    """
+    import mujoco
+    import numpy as np
+
+    model, dofs = plant.model, plant.motor_dofs
+    resists = model.dof_damping[dofs].copy()
+    of_joints = model.actuator_trntype[plant.actuators] == mujoco.mjtTrn.mjTRN_JOINT
+    if model.opt.integrator in (mujoco.mjtIntegrator.mjINT_IMPLICIT, mujoco.mjtIntegrator.mjINT_IMPLICITFAST):
+        per_speed = -model.actuator_biasprm[plant.actuators, 2] * model.actuator_gear[plant.actuators, 0] ** 2
+        resists += np.where(of_joints, per_speed, 0.0)
+    return float(np.max(model.opt.timestep * resists / plant.batch.expand("dof_M0")[0, dofs]))
 
 
 def _pressed(gripper: Gripper, plant: Plant) -> tuple[np.ndarray, np.ndarray]:

@@ -18,8 +18,8 @@ class HuntCrossleyContact(Effect):
     """Pads and object press on each other by a power of the depth, and harder while they approach.
 
     MuJoCo's contacts have a curve of force over depth of their own, are damped strongly, and press by how the bodies
-    accelerate. Here only depth and its rate count. Pads press then and do not rub: the object has to stand on
-    something.
+    accelerate. Here only depth and its rate count. Objects that the gripper's parameters make stiffer, or more damped,
+    are so here, too, by the same factor. Pads press then and do not rub: the object has to stand on something.
     """
 
     name = "hunt_crossley_contact"
@@ -29,7 +29,10 @@ class HuntCrossleyContact(Effect):
     needs_parallel_pads = True
     instead_of = ("stiffening_contact", "contact_damping", "contact_onset")
     symptom = "force grows otherwise with the squeeze, at every speed; touches are less damped, or more"
-    formula = "F = F_ρ (δ / ρ)^p max(0, 1 + λ dδ/dt) in place of MuJoCo's, δ the depth, ρ the width of its solimp"
+    formula = (
+        "F = F_ρ k/k₀ (δ / ρ)^p max(0, 1 + λ b/b₀ dδ/dt) in place of MuJoCo's, δ the depth, ρ the width of its solimp,"
+        " k/k₀ and b/b₀ an object's stiffness and damping ÷ the scene's"
+    )
     source = "Hunt and Crossley 1975; p is 1 of flat pads on a bed of springs, 1.5 of round bodies (Hertz 1882)"
     look_alikes = ("stiffening_contact", "viscoelastic_contact", "finger_compliance", "object_size")
     separates = "slow ramps to high force, and touches at several speeds"
@@ -49,13 +52,15 @@ class HuntCrossleyContact(Effect):
 
     def init(self, which: np.ndarray) -> State:
         plant, rows = self.plant, self.rows[which]
-        zero = np.zeros((len(which), 2))
+        zero, factors = np.zeros((len(which), 2)), plant.contact_factors(rows)
         return {
             "surface": untouched(which),
             "reach": pad_reach(self)[which],
             "rate": zero,
             "push": zero.copy(),
             "width_m": plant.field("geom_solimp")[rows, plant.object_geoms[0], 2][:, None],
+            "damped": factors[:, :1],
+            "firm": factors[:, 1:],
             "mass": plant.mass_between(rows),
             # no motor can press harder; a long time step that overshoots must not be thrown back with more
             "strongest": plant.strongest_press(rows),
@@ -74,12 +79,13 @@ class HuntCrossleyContact(Effect):
         rate = (state["reach"] - reach) / dt
         depth = np.maximum(depth_in_object(self, self.pad_force, reach), 0.0)
         there = np.isfinite(self["force_n"]) & (depth > 0)
-        spring = np.where(there, self["force_n"], 0.0) * (depth / state["width_m"]) ** self["power"]
-        grown = 1 + self["damping_s_m"] * rate
+        spring = np.where(there, self["force_n"] * state["firm"], 0.0) * (depth / state["width_m"]) ** self["power"]
+        per_speed = self["damping_s_m"] * state["damped"]
+        grown = 1 + per_speed * rate
         # Where a step is too long for so stiff or so damped a contact its force is that of the step's end, as far as
         # is needed; what else accelerates pad and object is what did in the last step.
         stiffness = self["power"] * spring * grown / np.maximum(depth, 1e-9)
-        damping = self["damping_s_m"] * spring
+        damping = per_speed * spring
         late_k, late_c = np.maximum(stiffness * dt - mass / dt, 0.0), np.maximum(damping - mass / dt, 0.0)
         others = rate - state["rate"] + state["push"] * dt / mass
         push = spring * grown + late_k * (rate + others) + late_c * others

@@ -26,7 +26,8 @@ _CONFOUNDED, _WELL_KNOWN = 0.98, 0.1
 def standard_errors(fit: Fit, target: Target, numerical: Sequence[np.ndarray] = ()) -> np.ndarray:
     """Standard errors of the fitted coordinates, ``(p,)``: by chance, and by the model's own numerical error.
 
-    Where a size jumps, its 95 % interval reaches at least as far as nothing changes.
+    Where a size jumps, its 95 % interval reaches at least as far as nothing changes; of what changes nothing at all, as
+    far as its bounds.
 
     Args:
       fit: the fit.
@@ -34,6 +35,9 @@ def standard_errors(fit: Fit, target: Target, numerical: Sequence[np.ndarray] = 
       numerical: from :func:`~forcegrasp.identify.noise_floor.numerical_error`, each ``(G, S, C)``.
     """
     errors = np.sqrt(chance_errors(fit) ** 2 + np.sum(numerical_shifts(fit, numerical) ** 2, axis=0))
+    of_jumps = np.array([entry.jumps for entry in fit.problem.entries], bool)
+    idle = ~of_jumps & ~fit.slopes.any(axis=0)
+    errors = np.where(idle, (fit.problem.high - fit.problem.low) / Z95, errors)
     return np.maximum(errors, plateaus(fit, target) / Z95)
 
 

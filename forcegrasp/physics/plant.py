@@ -116,6 +116,13 @@ class Plant(ModelFields):
         geom = self.object_geoms[0]
         return contact_numbers(self.field("geom_solref")[rows, geom], self.field("geom_solimp")[rows, geom])
 
+    def contact_factors(self, rows: np.ndarray) -> np.ndarray:
+        """How many times the scene's damping and stiffness contacts of objects have, ``(len(rows), 2)``."""
+        geom = self.object_geoms[:1]
+        scene = contact_numbers(self.model.geom_solref[geom], self.model.geom_solimp[geom])[:, :2]
+        own = self.contact_numbers(rows)[:, :2]
+        return np.divide(own, scene, out=np.ones_like(own), where=scene > 0)
+
     def presses(self, rows: np.ndarray) -> np.ndarray:
         """Which motors' pads an object pushes against, ``(len(rows), motors)``."""
         touched = self.pad_force[rows] > 0

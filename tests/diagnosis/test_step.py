@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -141,6 +142,7 @@ def test_a_search_fits_anyway_once_and_judges_odd_grasps_again(creeping, monkeyp
     monkeypatch.setattr(search, "look_further", step)
     monkeypatch.setattr(search, "odd_grasps", odd)
     monkeypatch.setattr(search, "_left", lambda *_: ("somewhere", None))
+    monkeypatch.setattr(search, "_leaves_little", lambda *_: False)
     for name in ("exchange", "split"):
         monkeypatch.setattr(search, name, lambda *_: None)
     diagnosis = search.diagnose(study.target, base, study.simulators, [SMOOTH, DELAY], np.random.default_rng(0))
@@ -149,6 +151,29 @@ def test_a_search_fits_anyway_once_and_judges_odd_grasps_again(creeping, monkeyp
     assert [screen is screens[0] for screen in screens] == [True, True, True, False][: len(screens)]
     assert diagnosis.preferred == (("smooth_friction",) if error < 10 else ())
     assert len(diagnosis.odd) == (error > 10)
+
+
+@pytest.mark.parametrize(("little", "looks"), [(0.1, 1), (0.0, 2)])
+def test_a_search_ends_where_little_is_left(creeping, monkeypatch, little, looks):
+    """What takes the rest makes up for the form of what was found: an object ten times too light, behind a lag."""
+    study, base = creeping
+    found, asked = looked(creeping, [SMOOTH, DELAY], anyway=True), []
+    nothing = Step((), (), (), 1.05, 1.05)
+    monkeypatch.setattr(search, "look_further", lambda *_, **__: asked.append(1) or (nothing if asked[1:] else found))
+    monkeypatch.setattr(search, "odd_grasps", lambda *_: ())
+    monkeypatch.setattr(search, "_left", lambda *_: ("somewhere", None))
+    monkeypatch.setattr(search, "_LITTLE", little)
+    diagnosis = search.diagnose(study.target, base, study.simulators, [SMOOTH, DELAY], np.random.default_rng(0))
+    assert diagnosis.preferred == (("smooth_friction",))
+    assert len(asked) == looks
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "is_little"), [(2.4, 1.05, True), (2.4, 1.2, False), (1.2, 1.05, False), (9.0, 1.5, False)]
+)
+def test_little_is_near_the_floor_and_a_small_part_of_what_was_beyond_the_noise(before, after, is_little):
+    study = SimpleNamespace(heldout=lambda fit: None, error=lambda held: after)
+    assert search._leaves_little(study, None, before, 1.02) == is_little
 
 
 def test_an_effect_that_comes_back_after_it_gave_way_is_kept(made_up):

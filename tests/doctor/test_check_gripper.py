@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from forcegrasp.cli.main import main
-from forcegrasp.doctor.gripper import check_gripper
+from forcegrasp.doctor.gripper import _heavier, check_gripper
 from forcegrasp.physics import load_gripper, shipped_grippers
 from forcegrasp.physics.plant import Plant
 
@@ -42,9 +42,30 @@ def said(name: str) -> dict[str, list[str]]:
     return found
 
 
+def _speed_after_a_step(plant: Plant, push: float) -> np.ndarray:
+    """Of the motors, from rest in free air, where a load pushes them, ``(motors,)``."""
+    plant.reset(np.arange(1), np.zeros(1))
+    plant.disturb(np.full(1, push), np.ones(1, bool))
+    plant.advance(plant.position.copy())
+    return plant.velocity[0]
+
+
 @pytest.mark.parametrize("name", [*shipped_grippers(), "so101_jaw", str(SECOND / "second.yaml")])
 def test_grippers_that_work_are_fine(name):
-    assert list(said(name)) == ["fine"]
+    found = said(name)
+    assert set(found) <= {"fine", "note"}
+    assert all("heavier than the scene says" in line for line in found.get("note", []))
+    assert ("note" in found) == (name in ("franka_hand", "robotiq_2f85", str(SECOND / "second.yaml")))
+
+
+@pytest.mark.parametrize(("servo", "integrator"), [("0", "Euler"), ("40", "Euler"), ("40", "implicitfast")])
+def test_how_much_heavier_steps_make_a_motor_is_what_a_push_shows(changed, servo, integrator):
+    lines = {'integrator="implicitfast"': f'integrator="{integrator}"', 'kv="20"': f'kv="{servo}"'}
+    path = changed(xml=lines | {'frictionloss="0.05"': ""})
+    plant = Plant(load_gripper(path), 1, threads=1)
+    still, pushed = (_speed_after_a_step(plant, push) for push in (0.0, 0.5))
+    inertia = 0.5 * plant.dt / (pushed - still)
+    assert inertia / plant.inertia[0] == pytest.approx(1 + _heavier(plant), rel=1e-3)
 
 
 def test_what_follows_from_the_description_is_told_in_users_units():

@@ -157,6 +157,9 @@ class Pads:
     def mass_between(self, rows: np.ndarray) -> np.ndarray:
         return np.full((len(rows), 2), np.inf)
 
+    def contact_factors(self, rows: np.ndarray) -> np.ndarray:
+        return np.ones((len(rows), 2))
+
     def field(self, name: str) -> np.ndarray:
         return {"geom_solimp": np.array([[[0.0, 0.99, self.width_m, 0.5, 2.0]]])}[name]
 
@@ -304,6 +307,27 @@ def test_hunt_crossley_contact_takes_the_place_of_the_scenes(force, power):
     assert plant.press_n == pytest.approx(force * (depth / width) ** power, rel=2e-3)
     assert plant.press_n == pytest.approx(GAIN * (plant.position - 0.0215), rel=2e-3)
     assert (plant.pad_force < 1e-3 * plant.press_n).all()
+
+
+def test_hunt_crossley_contact_is_as_much_stiffer_and_more_damped_as_an_object_is():
+    """By whatever the gripper's parameters write: the width of its solimp, or its solref."""
+    plant = make_plant(2, [], "reference")
+    geom = plant.object_geoms[0]
+    plant.field("geom_solref")[:, geom] = plant.model.geom_solref[geom]
+    plant.field("geom_solref")[1, geom] /= (2.0, 1.5)  # b doubled, k = 1 / (τ ζ)² nine times
+    effect = get_effect("hunt_crossley_contact")(np.array([[1.0, 1.5, 5.0]] * 2), plant.dt).attach(plant, np.arange(2))
+    memory = effect.init(np.arange(2))
+    np.testing.assert_allclose(memory["damped"], [[1.0], [2.0]])
+    np.testing.assert_allclose(memory["firm"], [[1.0], [9.0]])
+    effect.state.update(memory)
+    plant.position[:] = TOUCH_M - 1e-3
+    pushes = []
+    for faster in (0.0, 1e-5):
+        plant.position -= faster
+        effect.state["reach"] = plant.position + faster
+        effect.act()
+        pushes.append(effect.state["push"][:, 0])
+    assert pushes[0][1] == pytest.approx(9 * pushes[0][0], rel=0.05)
 
 
 @pytest.mark.parametrize(

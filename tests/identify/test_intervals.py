@@ -41,6 +41,17 @@ def test_standard_errors_see_what_is_correlated_in_a_grasp():
     assert np.all(correlated > 3 * alone)
 
 
+def test_the_interval_of_what_changes_nothing_reaches_as_far_as_its_bounds():
+    """A power of an impedance that a scene keeps the same at every depth, in the place of ±0."""
+    slopes = random_slopes(4)
+    slopes[..., 2] = 0
+    fit = fit_at(slopes, noise())
+    errors = standard_errors(fit, make())
+    assert 1.96 * errors[2] == pytest.approx(fit.problem.high[2] - fit.problem.low[2])
+    assert any(line.startswith("rho_m of cup is hardly fixed") for line in warnings(fit, errors))
+    assert np.all(errors[[0, 1, 3]] < 0.1)
+
+
 @pytest.mark.parametrize("memory", [0.0, 0.7, 0.9])
 def test_intervals_hold_the_truth_under_noise_with_a_memory(memory):
     """Of 95 % intervals about 95 % do: of a slow and a late response, of one in one grasp, of a fast one in two."""
