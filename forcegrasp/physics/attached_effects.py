@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Generator, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -114,19 +114,20 @@ class AttachedEffects:
             low[effect.rows], high[effect.rows] = effect.motor_range(low[effect.rows], high[effect.rows])
         return low, high
 
-    def contribute(self, totals: Contribution) -> bool:
+    def contribute(self, totals: Mapping[str, np.ndarray]) -> bool:
         """Sums up what they contribute to a step; returns whether any may.
 
         Args:
-          totals: set to the sums, of all rows. An effect finds those of the ones before it.
+          totals: set to the sums, of all rows, by the names and in the order of
+            :class:`~forcegrasp.physics.protocols.Contribution`. An effect finds those of the ones before it.
         """
         if not self._act:
             return False
         for name in self.given:
-            getattr(totals, name)[:] = 0
+            totals[name][:] = 0
         self.given.clear()
         for effect, rows in self._acting_at:
-            for name, total, added in zip(Contribution._fields, totals, effect.act(), strict=True):
+            for (name, total), added in zip(totals.items(), effect.act(), strict=True):
                 if added is not None:
                     total[rows] += added
                     self.given.add(name)

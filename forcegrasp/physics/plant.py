@@ -51,7 +51,8 @@ class Plant(ModelFields):
         self.pad_shift_m, self.finger_push_n, self._contact_shift_m = np.zeros((3, n, 2))
         self.object_push_n = np.zeros(n)
         pushes = self.finger_push_n, self.object_push_n, self.damping, self.motor_push
-        self._contributed = Contribution(self.friction, self.pad_shift_m, *pushes, self._contact_shift_m)
+        totals = self.friction, self.pad_shift_m, *pushes, self._contact_shift_m
+        self._contributed = dict(zip(Contribution._fields, totals, strict=True))
         self.position = np.zeros((n, self.motors))  #: of the motors (left, right, or the one), m or rad; 0 is closed
         #: Sum of each finger's contact forces at the last physics step, before f_α, newtons, ``(n, 2)``.
         self.pad_force = np.zeros((n, 2))
@@ -330,7 +331,7 @@ class Plant(ModelFields):
 
     def _is_given(self, name: str) -> bool:
         """Whether effects contribute anything of this name to this step."""
-        return name in self.effects.given and bool(getattr(self._contributed, name).any())
+        return name in self.effects.given and bool(self._contributed[name].any())
 
     def _write_friction(self) -> None:
         if "dof_frictionloss" not in self._fields and not self._is_given("friction"):
