@@ -10,8 +10,8 @@ from forcegrasp.measure.check_copies import is_noisy
 from forcegrasp.measure.samples import place
 from forcegrasp.measure.schema import MeasurementSet
 
-# So few may agree by chance, as rows and as a share of them.
-_LEAST, _LEAST_SHARE = 5, 0.005
+# So few may agree by chance, as rows and as a share of them; and so many times those that agree with the last but one.
+_LEAST, _LEAST_SHARE, _TIMES = 5, 0.005, 3
 
 
 def check_repeats(measured: MeasurementSet) -> list[str]:
@@ -19,9 +19,11 @@ def check_repeats(measured: MeasurementSet) -> list[str]:
     warnings = []
     for name in (*measured.columns.position, *measured.columns.force):
         signals = [grasp.signals()[name] for grasp in measured.grasps]
-        repeats = _repeats(signals)
+        repeats = _repeats(signals, 1)
         count, rows = sum(int(one.sum()) for one in repeats), sum(len(one) for one in repeats)
-        if count < _LEAST or count < _LEAST_SHARE * rows or not is_noisy(signals):
+        # of readings that are rounded as many agree by chance with the last but one, and no held one does
+        by_chance = sum(int(one.sum()) for one in _repeats(signals, 2))
+        if count < max(_LEAST, _LEAST_SHARE * rows, _TIMES * by_chance) or not is_noisy(signals):
             continue
         first = next(i for i, one in enumerate(repeats) if one.any())
         where = place(measured.path, measured.grasps[first], int(repeats[first].argmax()), name)
@@ -32,10 +34,20 @@ def check_repeats(measured: MeasurementSet) -> list[str]:
     return warnings
 
 
-def _repeats(signals: Sequence[np.ndarray]) -> list[np.ndarray]:
-    """Which readings are the one before, each ``(T,)``, but for values that come back: sensors round, and rest at 0."""
+def _repeats(signals: Sequence[np.ndarray], lag: int) -> list[np.ndarray]:
+    """Which readings are one before, and none between, each ``(T,)``; but for values that come back: sensors rest at 0.
+
+    Args:
+      signals: of a sensor, each ``(T,)``.
+      lag: 1 for the one before, 2 for the last but one.
+    """
     same = [np.r_[False, signal[1:] == signal[:-1]] for signal in signals]
     begins = np.concatenate([signal[~again] for signal, again in zip(signals, same, strict=True)])
     values, counts = np.unique(begins, return_counts=True)
-    once = values[counts == 1]
-    return [again & np.isin(signal, once) for signal, again in zip(signals, same, strict=True)]
+    rare = values[counts == lag]
+    if lag > 1:
+        same = [
+            np.r_[False, False, (s[2:] == s[:-2]) & ~again[2:] & ~again[1:-1]]
+            for s, again in zip(signals, same, strict=True)
+        ]
+    return [again & np.isin(signal, rare) for signal, again in zip(signals, same, strict=True)]

@@ -7,6 +7,7 @@ import pytest
 from measured_rig import OPEN_M, change, make_set, standard_grasps
 
 from forcegrasp.measure import check_set
+from forcegrasp.measure.check_repeats import check_repeats
 
 RNG = np.random.default_rng(3)
 
@@ -56,6 +57,18 @@ def test_held_readings_are_told_with_place_and_share():
 @pytest.mark.parametrize("change_grasps", [list, rounded, at_rest])
 def test_what_rounds_rests_or_is_as_it_should_be_is_not_told(change_grasps):
     assert told(change_grasps(noisy(standard_grasps()))) == []
+
+
+@pytest.mark.parametrize(("share", "lines"), [(0.0, 0), (0.05, 1)])
+def test_readings_that_agree_by_chance_are_not_told_and_held_ones_are_beside_them(share, lines):
+    """Where positions creep over a grid that is finer than the noise some are the one before, and never come back."""
+    creeping = []
+    for number, g in enumerate(standard_grasps()):
+        ramp = 2e-5 * np.arange(len(g.force_n))[:, None] + 0.0066 * number
+        noise = 3e-5 * RNG.standard_normal(g.position_m.shape)
+        force = g.force_n + 0.013 * RNG.standard_normal(g.force_n.shape)
+        creeping.append(change(g, position_m=np.round(ramp + noise, 5), force_n=force))
+    assert len(check_repeats(make_set(held(creeping, share)))) == lines
 
 
 def test_a_simulation_without_noise_is_not_told():
