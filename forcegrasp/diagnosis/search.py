@@ -40,7 +40,7 @@ MOST_EFFECTS = 8
 _MANY = 12
 # Where the base fit stopped short, parameters are a little off: so many times the floor is as good as nothing left.
 _AS_GOOD_AS_NOTHING = 1.1
-# If that is also less than this share of what was beyond the noise, effects that were found are nearly right, and what
+# If that is also less than this share of what was beyond the floor, effects that were found are nearly right, and what
 # takes the rest makes up for their forms: behind a lag, in another engine's contacts, objects were ten times too light.
 _LITTLE = 0.1
 
@@ -243,7 +243,7 @@ def _is_worth_looking(study: Study, fit: Fit) -> bool:
 def _leaves_little(study: Study, fit: Fit, error_before: float, floor: float) -> bool:
     """Whether effects leave next to nothing, and little of what there was before them."""
     error = study.error(study.heldout(fit))
-    return error < _AS_GOOD_AS_NOTHING * floor and explained_share(error_before, error) > 1 - _LITTLE
+    return error < _AS_GOOD_AS_NOTHING * floor and explained_share(error_before, error, noise=floor) > 1 - _LITTLE
 
 
 def _left(study: Study, fit: Fit) -> tuple[str, Noise | None]:
