@@ -130,13 +130,13 @@ def _heavier(plant: Plant) -> float:
     import mujoco
     import numpy as np
 
-    model, dofs = plant.model, plant.motor_dofs
-    resists = model.dof_damping[dofs].copy()
+    model = plant.model
+    resists = model.dof_damping[plant.motor_dofs].copy()
     of_joints = model.actuator_trntype[plant.actuators] == mujoco.mjtTrn.mjTRN_JOINT
     if model.opt.integrator in (mujoco.mjtIntegrator.mjINT_IMPLICIT, mujoco.mjtIntegrator.mjINT_IMPLICITFAST):
         per_speed = -model.actuator_biasprm[plant.actuators, 2] * model.actuator_gear[plant.actuators, 0] ** 2
         resists += np.where(of_joints, per_speed, 0.0)
-    return float(np.max(model.opt.timestep * resists / plant.batch.expand("dof_M0")[0, dofs]))
+    return float(np.max(plant.dt * resists / plant.inertia[0]))
 
 
 def _pressed(gripper: Gripper, plant: Plant) -> tuple[np.ndarray, np.ndarray]:

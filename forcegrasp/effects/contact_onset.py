@@ -33,4 +33,4 @@ class ContactOnset(Effect):
         solimp, rows, share = plant.field("geom_solimp"), self.rows[which], self["share"][which, 0]
         for geom in plant.object_geoms:
             first, deep = solimp[rows, geom, 0], solimp[rows, geom, 1]
-            solimp[rows, geom, 0] = first + np.where(share > 0, share * (deep - first), share * first)
+            solimp[rows, geom, 0] = first + share * np.where(share > 0, deep - first, first)

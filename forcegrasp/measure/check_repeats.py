@@ -19,10 +19,8 @@ def check_repeats(measured: MeasurementSet) -> list[str]:
     warnings = []
     for name in (*measured.columns.position, *measured.columns.force):
         signals = [grasp.signals()[name] for grasp in measured.grasps]
-        repeats = _repeats(signals, 1)
+        repeats, by_chance = _repeats(signals)
         count, rows = sum(int(one.sum()) for one in repeats), sum(len(one) for one in repeats)
-        # of readings that are rounded as many agree by chance with the last but one, and no held one does
-        by_chance = sum(int(one.sum()) for one in _repeats(signals, 2))
         if count < max(_LEAST, _LEAST_SHARE * rows, _TIMES * by_chance) or not is_noisy(signals):
             continue
         first = next(i for i, one in enumerate(repeats) if one.any())
@@ -34,20 +32,16 @@ def check_repeats(measured: MeasurementSet) -> list[str]:
     return warnings
 
 
-def _repeats(signals: Sequence[np.ndarray], lag: int) -> list[np.ndarray]:
-    """Which readings are one before, and none between, each ``(T,)``; but for values that come back: sensors rest at 0.
+def _repeats(signals: Sequence[np.ndarray]) -> tuple[list[np.ndarray], int]:
+    """Which readings are the one before, each ``(T,)``, and how many are the last but one, and not the one between.
 
-    Args:
-      signals: of a sensor, each ``(T,)``.
-      lag: 1 for the one before, 2 for the last but one.
+    But for values that come back besides: sensors round, and rest at 0. Of readings that are rounded as many agree by
+    chance with the last but one as with the one before, and no held one does.
     """
     same = [np.r_[False, signal[1:] == signal[:-1]] for signal in signals]
     begins = np.concatenate([signal[~again] for signal, again in zip(signals, same, strict=True)])
     values, counts = np.unique(begins, return_counts=True)
-    rare = values[counts == lag]
-    if lag > 1:
-        same = [
-            np.r_[False, False, (s[2:] == s[:-2]) & ~again[2:] & ~again[1:-1]]
-            for s, again in zip(signals, same, strict=True)
-        ]
-    return [again & np.isin(signal, rare) for signal, again in zip(signals, same, strict=True)]
+    once, twice = (values[counts == times] for times in (1, 2))
+    pairs = list(zip(signals, same, strict=True))
+    returns = [(s[2:] == s[:-2]) & ~again[2:] & ~again[1:-1] & np.isin(s[2:], twice) for s, again in pairs]
+    return [again & np.isin(signal, once) for signal, again in pairs], sum(int(one.sum()) for one in returns)

@@ -10,6 +10,7 @@ from scipy.signal import lfilter
 
 from forcegrasp.effects import Effect, catalogue, get_effect
 from forcegrasp.effects.base import Contribution
+from forcegrasp.effects.touch import pad_reach
 from forcegrasp.physics.contact_law import contact_numbers
 from forcegrasp.physics.gripper_file import load_gripper
 from forcegrasp.physics.plant import Plant, write_base
@@ -319,15 +320,12 @@ def test_hunt_crossley_contact_is_as_much_stiffer_and_more_damped_as_an_object_i
     memory = effect.init(np.arange(2))
     np.testing.assert_allclose(memory["damped"], [[1.0], [2.0]])
     np.testing.assert_allclose(memory["firm"], [[1.0], [9.0]])
-    effect.state.update(memory)
-    plant.position[:] = TOUCH_M - 1e-3
-    pushes = []
-    for faster in (0.0, 1e-5):
-        plant.position -= faster
-        effect.state["reach"] = plant.position + faster
+    effect.state.update(memory, surface=pad_reach(effect) + 1e-3)
+    for rate in (0.0, 0.05):
+        effect.state["reach"] = pad_reach(effect) + rate * plant.dt
         effect.act()
-        pushes.append(effect.state["push"][:, 0])
-    assert pushes[0][1] == pytest.approx(9 * pushes[0][0], rel=0.05)
+        soft, hard = effect.state["push"][:, 0]
+        assert hard / soft == pytest.approx(9 * (1 + 10 * rate) / (1 + 5 * rate), rel=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -441,14 +439,19 @@ def test_contact_damping_multiplies_damping_and_stiffness_of_the_scenes_contacts
     np.testing.assert_allclose(numbers[:, 0], np.minimum(factors[:, 0] * numbers[0, 0], most), rtol=1e-6)
 
 
-def test_the_less_a_touch_is_damped_the_later_its_force_grows_and_the_further_beyond_where_it_settles():
-    factors = np.array([[0.4, 1.0], [1.0, 1.0], [2.0, 1.0]])
-    plant = make_plant(3, [(get_effect("contact_damping"), factors, "", [0, 1, 2])], "reference")
-    start(plant, [0, 1, 2], np.zeros(3))
-    forces = []
+def squeezed(name: str, values: np.ndarray) -> tuple[Plant, list[np.ndarray]]:
+    """What is left of a fast squeeze of 2 s with an effect, a row of values each, and the left forces ``(rows,)``."""
+    rows, forces = list(range(len(values))), []
+    plant = make_plant(len(values), [(get_effect(name), values, "", rows)], "reference")
+    start(plant, rows, np.zeros(len(values)))
     for _ in range(1000):
-        plant.advance(np.full((3, 2), 0.021))
+        plant.advance(np.full((len(values), 2), 0.021))
         forces.append(plant.pad_force[:, 0])
+    return plant, forces
+
+
+def test_the_less_a_touch_is_damped_the_later_its_force_grows_and_the_further_beyond_where_it_settles():
+    _, forces = squeezed("contact_damping", np.array([[0.4, 1.0], [1.0, 1.0], [2.0, 1.0]]))
     assert np.all(np.diff(forces[40]) > 0.05)  # some 30 ms after the touch
     assert max(force[0] for force in forces) > 1.5 * max(force[1] for force in forces)
     np.testing.assert_allclose(forces[-1], forces[-1][1], rtol=0.02)
@@ -468,12 +471,7 @@ def test_contact_onset_moves_the_impedance_that_contacts_begin_with():
 
 
 def test_a_contact_that_begins_with_more_impedance_presses_sooner():
-    plant = make_plant(3, [(get_effect("contact_onset"), np.array([[0.0], [0.1], [0.4]]), "", [0, 1, 2])], "reference")
-    start(plant, [0, 1, 2], np.zeros(3))
-    forces = []
-    for _ in range(1000):
-        plant.advance(np.full((3, 2), 0.021))
-        forces.append(plant.pad_force[:, 0])
+    plant, forces = squeezed("contact_onset", np.array([[0.0], [0.1], [0.4]]))
     assert np.all(np.diff(forces[32]) > 0.1)  # within 2 ms of the touch
     assert np.all(np.diff(plant.position[:, 0]) > 1e-4)  # and holds at less depth
 
