@@ -117,6 +117,11 @@ _PLANS = {
         "squeezes of growing strength, and a slow release",
         ((23.8, 0.02, 0.4), (22, 0.02, 0.4), (20, 0.02, 0.4), (18, 0.02, 0.4), (26.5, 0.01, 0.2)),
     ),
+    "friction_asymmetry": _STEPS,
+    "compliance_asymmetry": Show(
+        "squeezes of growing strength, and a slow release",
+        ((23.8, 0.02, 0.4), (22, 0.02, 0.4), (20, 0.02, 0.4), (18, 0.02, 0.4), (26.5, 0.01, 0.2)),
+    ),
     "motor_asymmetry": _STEPS,
     "return_spring": _STEPS_OF_SEVERAL_SIZES,
     "encoder_scale": _STEPS,

@@ -103,18 +103,20 @@ def simpler(setting: EffectSetting, nested: Nested, gripper: Gripper) -> EffectS
     values = effect.typical_values()
     for own, its in nested.same.items():
         values[effect.index(its)] = setting.values[setting.effect.index(own)]
-    return EffectSetting(effect, effect.variants[0], values)
+    variant = setting.variant if setting.variant in effect.variants else effect.variants[0]
+    return EffectSetting(effect, variant, values)
 
 
 def richer(setting: EffectSetting, container: type[Effect]) -> list[EffectSetting]:
     """Settings of an effect that contains this one: shared values carried over, its own at all sizes that are tried."""
     nested = next(n for n in container.contains if n.effect == setting.effect.name)
     found: dict[bytes, EffectSetting] = {}
+    variant = setting.variant if setting.variant in container.variants else container.variants[0]
     for trial in [container.typical_values(), *container.trials()]:
         values = np.array(trial, float)
         for own, its in nested.same.items():
             values[container.index(own)] = setting.values[setting.effect.index(its)]
-        found[values.tobytes()] = EffectSetting(container, container.variants[0], values)
+        found[values.tobytes()] = EffectSetting(container, variant, values)
     return list(found.values())
 
 

@@ -23,7 +23,7 @@ from forcegrasp.diagnosis.screen import Screen
 from forcegrasp.diagnosis.split import split
 from forcegrasp.diagnosis.step import FAR, look_further
 from forcegrasp.diagnosis.study import Study
-from forcegrasp.diagnosis.verdict import MUCH, conclude, explained_share
+from forcegrasp.diagnosis.verdict import EXPLAINED_FAR, MUCH, conclude, explained_share
 from forcegrasp.effects import Effect
 from forcegrasp.identify.base_fit import BaseFit
 from forcegrasp.identify.cross_validation import evidence_folds, make_folds, rms_of_grasps
@@ -158,15 +158,17 @@ def _concluded(begun: _Begun, study: Study, steps: Sequence[Step], fit: Fit) -> 
             fit = asked
             error_after, (left, noise, alone) = study.error(study.heldout(fit)), _left_by_many(study, fit)
     found = kept_steps(steps)
-    # a missing effect makes the error rough, and the base fit stop short: then only what leaves nothing is an answer
-    if not base.converged and (not found or (left and error_after > _AS_GOOD_AS_NOTHING * floor)):
+    only_of_set = all(s.candidates and s.candidates[0].effect.of_set for s in found)
+    share = study.explained(target.before_rounding(study.heldout(base.fit)), study.heldout(fit))
+    # a missing effect makes the error rough, and the base fit stop short: then what leaves more may be a look-alike
+    leaves_more = bool(left) and error_after > _AS_GOOD_AS_NOTHING * floor and share < EXPLAINED_FAR
+    if not base.converged and (not found or leaves_more):
         return Diagnosis(
             Verdict.NOT_FITTED, (), (), base, base.fit, target, begun.folds, error_before, error_before, odd=begun.odd
         )
-    only_of_set = all(s.candidates and s.candidates[0].effect.of_set for s in found)
     verdict = conclude(
         [s.verdict for s in found if s.verdict],
-        study.explained(target.before_rounding(study.heldout(base.fit)), study.heldout(fit)),
+        share,
         error_after,
         floor,
         bool(left),

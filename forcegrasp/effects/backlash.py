@@ -56,6 +56,11 @@ class Backlash(Effect):
             "further": np.zeros((len(which), 2)),
         }
 
+    @property
+    def gap(self) -> np.ndarray:
+        """Lost motion, m or rad, broadcast with ``(rows, motors)``."""
+        return self["gap_m"]
+
     def command(self, command: np.ndarray, fresh: np.ndarray) -> np.ndarray:
         return self._follow(command) if self.variant == "command" else command
 
@@ -67,11 +72,11 @@ class Backlash(Effect):
         shift = self.plant.to_sides(pad - motor)
         if self.variant == "play":
             return Contribution(pad_shift_m=shift, contact_shift_m=self._for_pads_that_stand(pad == before, shift))
-        self.state["pad"] = pad = np.where(self.plant.presses(self.rows), motor + self["gap_m"] / 2, pad)
+        self.state["pad"] = pad = np.where(self.plant.presses(self.rows), motor + self.gap / 2, pad)
         return Contribution(pad_shift_m=self.plant.to_sides(pad - motor))
 
     def _follow(self, motor: np.ndarray) -> np.ndarray:
-        half = self["gap_m"] / 2
+        half = self.gap / 2
         self.state["pad"] = pad = np.where(half == 0, motor, np.clip(self.state["pad"], motor - half, motor + half))
         return pad
 

@@ -39,8 +39,13 @@ class FingerCompliance(Effect):
     def init(self, which: np.ndarray) -> State:
         return {"deflection": np.zeros((len(which), 2))}
 
+    @property
+    def compliance(self) -> np.ndarray:
+        """Deflection per force, m/N, broadcast with ``(rows, 2)``."""
+        return self["compliance_m_n"]
+
     def act(self) -> Contribution:
         before = self.state["deflection"]
-        gap = self["compliance_m_n"] * self.plant.press_n[self.rows] - before
+        gap = self.compliance * self.plant.press_n[self.rows] - before
         self.state["deflection"] = deflection = before + first_order_weight(self.dt, SETTLING_S) * gap
         return Contribution(pad_shift_m=deflection)

@@ -25,7 +25,7 @@ class MotorAsymmetry(Effect):
     symptom = "in free air one finger lags more than the other; between them the object goes to the weaker side"
     formula = "K_l = (1 + a) K, K_r = (1 − a) K; B_l = (1 + b) B, B_r = (1 − b) B, B all viscous damping of a finger"
     source = "tolerance of motors and gears"
-    look_alikes = ("motor_offset", "coulomb_friction", "force_gain_asymmetry")
+    look_alikes = ("motor_offset", "coulomb_friction", "friction_asymmetry", "force_gain_asymmetry")
     separates = "ramps in both directions at several speeds: an offset does not grow with the speed, a gain's lag does"
     parameters = (
         Parameter("stiffness_share", "share a of the stiffness", "1", -0.5, 0.5, 0.1),

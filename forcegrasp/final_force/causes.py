@@ -41,6 +41,7 @@ _ONSETS = {
         lambda o: {"threshold_m": o.travel_m},
     ),
     "coulomb_friction": Cause("the motor must overcome it first", lambda o: {"force_n": o.motor_n}),
+    "friction_asymmetry": Cause("each motor must overcome its own first, one of them more", _none),
     "stiction": Cause("the motor must overcome it first", lambda o: {"breakaway_n": o.motor_n}),
     "presliding": Cause("the motor must overcome it first, bristles and all", lambda o: {"force_n": o.motor_n}),
     "smooth_friction": Cause("the motor creeps against it, and is not there yet when the force is read", _none),
@@ -50,6 +51,7 @@ _ONSETS = {
         "half the gap is lost: ahead of the encoder always, behind it if one target was held",
         lambda o: {"gap_m": 2 * o.travel_m},
     ),
+    "backlash_asymmetry": Cause("half of each finger's own gap is lost, as with backlash", _none),
     "adhesion": Cause("it pulls on the reading; only if one target was held", _none),
     "force_hysteresis": Cause("half the play's width is missing while loading", lambda o: {"width_n": 2 * o.reading_n}),
     "force_deadzone": Cause(

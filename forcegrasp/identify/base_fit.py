@@ -23,6 +23,8 @@ STARTS, MOST_STARTS = 3, 6
 _GRASPS_PER_OBJECT = 2
 # Starts end in the same place if their costs agree to this share, or to this much per residual.
 _SAME_SHARE, _SAME_COST = 0.01, 0.002
+# Up to so many times the noise, a fit is where it should be, wherever others ended.
+_NOISE_ALONE = 1.1
 # Where an effect is missing the cost has many minima: starts agree if their costs beyond the noise do to this share.
 _SAME_BEYOND = 0.2
 # Largest slope at an optimum, in standard errors of the parameter; those of a noisy simulator never vanish.
@@ -64,7 +66,7 @@ def fit_base(
     errors = tuple(end.error for end in ends)
     if ends[0].cost - best.cost > cost_tolerance(best, small.target):  # another start found a better place
         first = fit_once(target, problem, simulators, small.enlarge(best.vector))
-    if not _ends_agree(ends, small.target):
+    if not _ends_agree(ends, small.target) and rms_error(first, target) > _NOISE_ALONE:
         spread = ", ".join(f"{error:.2f}" for error in errors)
         reason = f"the starts end in different places (errors of {spread} × noise)"
         return BaseFit(first, errors, False, reason, starts_agree=False)

@@ -24,7 +24,8 @@ _HEAVY = 6.0
 # further than so many times the noise off, and of any fit that is nearer, where steps are small if they are right.
 _FAR, _COUNTS, _COUNTS_NEAR, _SHARES = 3.0, 0.02, 0.05, (1.0, 0.5, 0.25, 0.1)
 # So is one that leaves less than this share of a fold's squares: what was not fitted to is not fitted so much better.
-_TOO_GOOD = 0.25
+# And one that leaves so many times as much: where others hardly fix what a fold shows, a straight step goes anywhere.
+_TOO_GOOD, _TOO_BAD = 0.25, 10.0
 # What fits leave of held-out grasps, with target and folds: a search, its doubts and its report ask for the same.
 _KNOWN: WeakKeyDictionary[Fit, list[tuple[Target, Sequence[np.ndarray], np.ndarray]]] = WeakKeyDictionary()
 
@@ -99,7 +100,8 @@ def _heldout_residual(fit: Fit, target: Target, folds: Sequence[np.ndarray]) -> 
         step = step_of(fit, inner[rest].sum(axis=0), slope[rest].sum(axis=0))
         change, squares = jacobian[fold] @ step, np.sum(residual[fold] ** 2)
         held[fold] = residual[fold] - change
-        if np.sum(change**2) > counts * squares or np.sum(held[fold] ** 2) < _TOO_GOOD * squares:
+        left = np.sum(held[fold] ** 2)
+        if np.sum(change**2) > counts * squares or not _TOO_GOOD * squares <= left <= _TOO_BAD * squares:
             doubtful.append((fold, step))
     if doubtful:
         _simulate(fit, target, doubtful, held)

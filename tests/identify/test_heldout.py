@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from forcegrasp.identify import cross_validation
 from forcegrasp.identify.cross_validation import (
     FOLDS,
     heldout_residual,
@@ -75,6 +76,19 @@ def test_a_parameter_of_the_heldout_grasp_alone_stays_where_it_is():
     without = fit.jacobian[..., :2]
     step = np.linalg.lstsq(without[1:].reshape(-1, 2), fit.residual[1:].ravel(), rcond=None)[0]
     assert held[0] == pytest.approx(fit.residual[0] - without[0] @ step, abs=1e-4)
+
+
+def test_a_straight_step_that_leaves_far_more_than_the_fit_is_simulated(monkeypatch):
+    """A parameter that one grasp shows well and the others hardly goes anywhere without it."""
+    rng, target, asked = np.random.default_rng(0), make(), []
+    monkeypatch.setattr(cross_validation, "_simulate", lambda fit, target, doubtful, held: asked.extend(doubtful))
+    jacobian = rng.standard_normal((G, S, 4, 2))
+    jacobian[0] *= 1000
+    fit = linear_fit(
+        target, jacobian, 20 * rng.standard_normal((G, S, 4))
+    )  # so far off that steps are taken as they are
+    heldout_residual(fit, target, [np.array([k]) for k in range(G)])
+    assert [fold.tolist() for fold, _ in asked] == [[0]]
 
 
 def test_a_step_ends_at_the_bounds():
