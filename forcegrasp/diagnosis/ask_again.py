@@ -67,7 +67,9 @@ def _asked(study: Study, step: Step, rivals: Sequence[Candidate], fit: Fit) -> t
     best = max([first, *judged], key=lambda c: c.heldout_gain)
     if best is not first and indistinguishable(best, first):
         best = first
-    apart = {c.effect.name for c in (first, *judged) if c is not best and not indistinguishable(best, c)}
+    # what the best one leaves is of something else, which may well have decided by no more than that
+    least = best.fit.cost + max(0.0, study.target.beyond_noise(best.fit.residual))
+    apart = {c.effect.name for c in (first, *judged) if c.fit.cost > least and not indistinguishable(best, c)}
     every = dict.fromkeys([*step.effects, *(c.effect.name for c in rivals)])
     names = [best.effect.name, *(n for n in every if n != best.effect.name and n not in apart)]
     new = [c for c in judged if c.effect.name not in {one.effect.name for one in step.candidates}]

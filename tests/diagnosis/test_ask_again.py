@@ -15,6 +15,7 @@ from forcegrasp.diagnosis.result import Step
 from forcegrasp.effects.for_gripper import effect_of
 from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.identify.fit_set import fit_model
+from forcegrasp.identify.target import Target
 from tests.diagnosis.test_families import jaw_with, silent
 from tests.diagnosis.test_needless import step_with
 
@@ -50,6 +51,13 @@ def test_a_rival_that_the_whole_model_rejects_goes(found):
     assert [step.effects for step in left] == [(FRICTION,), (LAG,)]
     assert same is fit
     assert left[1].error_after == pytest.approx(study.error(study.heldout(fit)))
+
+
+def test_a_rival_stays_where_more_is_left_than_tells_it_apart(found, monkeypatch):
+    study, steps, fit = tied(found, FRICTION, DEADBAND)
+    monkeypatch.setattr(Target, "beyond_noise", lambda target, residual: 1e9)
+    left, _ = ask_again(study, steps, fit)
+    assert [step.effects for step in left] == [(FRICTION, DEADBAND), (LAG,)]
 
 
 def test_a_rival_that_does_better_takes_the_place(found):
