@@ -40,10 +40,16 @@ def writing(out: object) -> Generator[None]:
         raise ConfigError(f"out={out}: could not write ({error.strerror})") from error
 
 
-def closest(name: str, known: Iterable[str]) -> str:
-    """Returns ``"; did you mean a, b or c?"`` for the (at most three) closest known names, or the list of all."""
+def closest(name: str, known: Iterable[str], lists_them: str = "") -> str:
+    """Returns ``"; did you mean a, b or c?"`` for the (at most three) closest known names, or the list of all.
+
+    Args:
+      name: that nobody knows.
+      known: the names that there are.
+      lists_them: a command that lists them, for a list that is too long for one line.
+    """
     known = sorted(known)
     near = difflib.get_close_matches(name, known, n=3, cutoff=0.5)
     if near:
         return f"; did you mean {' or '.join(near)}?"
-    return f"; known: {', '.join(known)}"
+    return f"; {lists_them} lists them" if lists_them else f"; known: {', '.join(known)}"

@@ -178,4 +178,4 @@ def check_effects(option: str, names: Sequence[str]) -> None:
     known = catalogue()
     for name in names:
         if name not in known and not (option == "effect" and name.endswith(SUFFIXES)):
-            raise ConfigError(f"{option}={name}: no such effect{closest(name, known)}")
+            raise ConfigError(f"{option}={name}: no such effect{closest(name, known, 'forcegrasp effects')}")

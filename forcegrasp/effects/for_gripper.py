@@ -79,7 +79,7 @@ def effect_of(name: str, gripper: Gripper) -> type[Effect]:
         return known[name]
     if name in catalogue():
         raise ConfigError(f"effect {name}: {why_left_out(catalogue()[name], gripper)}")
-    raise ConfigError(f"effect {name}: no such effect{closest(name, known)}")
+    raise ConfigError(f"effect {name}: no such effect{closest(name, known, 'forcegrasp effects')}")
 
 
 def _variants(effect: type[Effect], traits: _Traits) -> tuple[str, ...]:

@@ -107,5 +107,5 @@ def get_effect(name: str) -> type[Effect]:
     if name == NoEffect.name:
         return NoEffect
     if name not in catalogue():
-        raise ConfigError(f"effect {name}: no such effect{closest(name, catalogue())}")
+        raise ConfigError(f"effect {name}: no such effect{closest(name, catalogue(), 'forcegrasp effects')}")
     return catalogue()[name]

@@ -85,7 +85,12 @@ def test_every_effect_can_be_had_by_name():
 
 @pytest.mark.parametrize(
     ("name", "near"),
-    [("backlsh", "backlash"), ("coulomb", "coulomb_friction"), ("force_offset", "force_"), ("", "known: ")],
+    [
+        ("backlsh", "backlash"),
+        ("coulomb", "coulomb_friction"),
+        ("force_offset", "force_"),
+        ("", "forcegrasp effects lists them"),
+    ],
 )
 def test_unknown_names_tell_the_closest(name, near):
     with pytest.raises(ConfigError, match="no such effect") as caught:

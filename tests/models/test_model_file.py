@@ -191,7 +191,7 @@ BROKEN = {
     "object's parameter out of bounds": ("high: 0.007", "high: 7", ["objects.sponge.rho_m: must lie in"]),
     "grasp's parameter unknown": ("    offset_m:", "    ofset_m:", ["grasps.g001.ofset_m", "did you mean offset_m"]),
     "unknown effect": ("  backlash:", "  backlsh:", ["effects: ", "no such effect", "did you mean backlash"]),
-    "effect is a number": ("  backlash:", "  3:", ["effects: ", "no such effect"]),
+    "effect is a number": ("  backlash:", "  3:", ["effects: ", "no such effect", "forcegrasp effects lists them"]),
     "effects are a list": (GOOD[GOOD.index("effects:") :], "effects: [backlash]", ["effects: must be a mapping"]),
     "effects are an empty list": (GOOD[GOOD.index("effects:") :], "effects: []", ["effects: must be a mapping"]),
     "effect without parameters": (
