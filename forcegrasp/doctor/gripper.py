@@ -92,6 +92,10 @@ def _grasp(gripper: Gripper) -> Iterator[Finding]:
         return
     forces = " and ".join(f"{newtons:.3g}" for newtons in pressed)
     yield fine("grasp", f"an object of {radius:.3g} mm radius is pressed with {forces} N by full steps for 5 s")
+    deep = -1e3 * plant.clearance(np.arange(1))[0].min(axis=1)
+    if deep.min() > 0:
+        depths, stiff = " and ".join(f"{mm:.3g}" for mm in deep), 1e3 * pressed.mean() / deep.mean()
+        yield fine("stiffness", f"pads are {depths} mm in the object then: {float(f'{stiff:.3g}'):g} N/m on each side")
     if gripper.force == "sensors":
         yield from _sensors(gripper, pressed, force[-1])
     if (heavier := _heavier(plant)) > _HEAVIER:

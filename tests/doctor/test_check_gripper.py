@@ -68,6 +68,18 @@ def test_how_much_heavier_steps_make_a_motor_is_what_a_push_shows(changed, servo
     assert inertia / plant.inertia[0] == pytest.approx(1 + _heavier(plant), rel=1e-3)
 
 
+def test_a_contact_of_one_impedance_is_as_stiff_as_its_solref_says(changed):
+    """docs/your-gripper.md: in proportion, so that one look tells what to write for a stiffness that is known."""
+    found = []
+    for stiffness in (4000, 20000):
+        path = changed(
+            xml={'solref="-900 -60" solimp="0.6 0.95 0.004 0.5 2"': f'solref="-{stiffness} -60" solimp="0.5 0.5 0.001"'}
+        )
+        (line,) = (line for line in said(path)["fine"] if "N/m on each side" in line)
+        found.append(float(line.split(" N/m")[0].split()[-1]))
+    assert found[1] / found[0] == pytest.approx(5.0, rel=0.02)
+
+
 def test_what_follows_from_the_description_is_told_in_users_units():
     lines = " ".join(said("robotiq_2f85")["fine"])
     for told in ("85.0 mm between the pads when open", "0.8 rad", "q_rad, qdes_rad, f_l_n, f_r_n", "7.21 and 7.21 N"):
