@@ -16,6 +16,7 @@ from forcegrasp.diagnosis.odd_grasps import odd_grasps
 from forcegrasp.diagnosis.session_drift import order_in_session, session_drift
 from forcegrasp.diagnosis.shifted_rows import WORTH_A_FIT, left_by_shift
 from forcegrasp.diagnosis.signatures import Background
+from forcegrasp.diagnosis.swapped_positions import positions_are_swapped, with_positions_swapped
 from forcegrasp.diagnosis.tolerance import MOST, WORTH, Moved, move_given, wanted_moves
 from forcegrasp.diagnosis.verdict import EXPLAINED, LEAST_SHARE
 from forcegrasp.identify.base_fit import rms_error
@@ -141,6 +142,10 @@ def suspects(loaded: Loaded[MeasurementSet], target: Target, fit: Fit) -> list[F
             return dataclasses.replace(grasp, command_m=command_row_later(grasp.command_m, side))
 
         found.append(Fault("late_side", words, check, _changed(loaded, right_side)))
+    if positions_are_swapped(target, fit):
+        words = f"{listed(measured.columns.position)} stand for one another"
+        check = "which encoder each column is written from: move one finger by hand"
+        found.append(Fault("swapped_positions", words, check, _changed(loaded, lambda _, g: with_positions_swapped(g))))
     # rows that do not keep step with commands make a clock seem off: that must not hide the rest
     moved = wanted_moves(measured, target, fit) if all(one.name == "time_scale" for one in found) else None
     most = None if moved is None or moved.is_within else _most_radii(loaded, moved.radii_apart())

@@ -223,6 +223,12 @@ def row_early(values: np.ndarray) -> np.ndarray:
             "what qdes_r_m commands is done one row later",
             lambda i, g: {"command_m": np.column_stack([g.command_m[:, 0], row_early(g.command_m[:, 1])])},
         ),
+        (
+            "sound",
+            "swapped_positions",
+            "q_l_m and q_r_m stand for one another",
+            lambda i, g: {"position_m": g.position_m[:, ::-1]},
+        ),
         ("pressed_harder", "early_row", "positions and forces are", lambda i, g: {"command_m": row_late(g.command_m)}),
     ],
 )
