@@ -27,6 +27,8 @@ _SAME_SHARE, _SAME_COST = 0.01, 0.002
 _NOISE_ALONE = 1.1
 # Where an effect is missing the cost has many minima: starts agree if their costs beyond the noise do to this share.
 _SAME_BEYOND = 0.2
+# A fit had stopped short if on few grasps it goes on by this share of what it leaves beyond the noise.
+_WENT_ON = 0.5
 # Largest slope at an optimum, in standard errors of the parameter; those of a noisy simulator never vanish.
 _MAX_GRADIENT = 5.0
 
@@ -64,8 +66,11 @@ def fit_base(
         progress(f"base model, start {len(ends)} of {MOST_STARTS}, on a few grasps: {ends[-1].error:.2f} × noise")
     best = min(ends, key=lambda end: end.cost)
     errors = tuple(end.error for end in ends)
-    if ends[0].cost - best.cost > cost_tolerance(best, small.target):  # another start found a better place
-        first = fit_once(target, problem, simulators, small.enlarge(best.vector))
+    tolerance, noise = cost_tolerance(best, small.target), small.target.cost_of_noise
+    # another start found a better place, or this one went on: a fit of all grasps had stopped short
+    if ends[0].cost - best.cost > tolerance or small.cost - best.cost > max(tolerance, _WENT_ON * (small.cost - noise)):
+        again = fit_once(target, problem, simulators, small.enlarge(best.vector))
+        first = min([first, again], key=lambda fit: fit.cost)
     if not _ends_agree(ends, small.target) and rms_error(first, target) > _NOISE_ALONE:
         spread = ", ".join(f"{error:.2f}" for error in errors)
         reason = f"the starts end in different places (errors of {spread} × noise)"
@@ -146,6 +151,7 @@ class Subset:
 
     def __init__(self, target: Target, keep: np.ndarray, fitted: Fit) -> None:
         self.target, part = target.subset(keep), fitted.subset(keep)
+        self.cost = part.cost  #: of the fit of all grasps, on these
         self.problem, self.known, self._correction = part.problem, part.vector, part.correction
         self._simulators = Simulators(self.problem)
         self._fitted = fitted

@@ -20,7 +20,7 @@ from forcegrasp.diagnosis.signatures import Background, Score, Signatures, best_
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.effects import get_effect
 from forcegrasp.effects.setting import EffectSetting
-from forcegrasp.identify import cross_validation
+from forcegrasp.identify import base_fit, cross_validation
 from forcegrasp.identify import fit as fit_module
 from forcegrasp.identify.base_fit import BaseFit, check_gradient, fit_base, rms_error
 from forcegrasp.identify.cross_validation import heldout_residual, make_folds, rms
@@ -274,6 +274,32 @@ def test_several_starts_agree(fitted):
     assert len(told) == 3  # each start
     assert np.ptp(base.errors) < 0.02
     assert distance(base.fit, fitted.errors).max() < 2
+
+
+def test_a_fit_that_stopped_short_is_led_on_by_few_grasps(fitted, monkeypatch):
+    starts = []
+
+    def once(target, problem, simulators, start, **more):
+        starts.append(start)
+        if len(starts) == 1:  # ends where it begins
+            more |= {"free": np.zeros(len(problem), bool)}
+        return fit_once(target, problem, simulators, start, **more)
+
+    monkeypatch.setattr(base_fit, "fit_once", once)
+    base = fit_base(fitted.target, fitted.problem, fitted.simulators, np.random.default_rng(0))
+    assert len(starts) == 2
+    assert base.converged
+    assert rms_error(base.fit, fitted.target) == pytest.approx(rms_error(fitted.fit, fitted.target), rel=0.01)
+
+
+def test_a_fit_that_leaves_noise_alone_needs_no_second_start(fitted, monkeypatch):
+    monkeypatch.setattr(base_fit, "_ends_agree", lambda ends, target: False)
+    start = fitted.target, fitted.problem, fitted.simulators
+    assert fit_base(*start, np.random.default_rng(0)).converged
+    monkeypatch.setattr(base_fit, "_NOISE_ALONE", 0.9)
+    apart = fit_base(*start, np.random.default_rng(0))
+    assert not apart.converged
+    assert "the starts end in different places" in apart.reason
 
 
 def test_a_fit_that_ended_on_a_slope_is_not_believed(fitted):
