@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from forcegrasp.diagnosis import search
+from forcegrasp.diagnosis import step as step_module
 from forcegrasp.diagnosis.families import look_alike
 from forcegrasp.diagnosis.few import with_few
 from forcegrasp.diagnosis.odd_grasps import OddGrasp
@@ -67,6 +68,27 @@ def alike(creeping) -> Step:
 def test_a_look_alike_of_its_family_is_fitted_in_the_place_of_what_leaves_more_than_noise(alike):
     assert alike.effects[0] == "smooth_friction"
     assert alike.error_after < 1.05 < next(c for c in alike.candidates if c.effect is PRESLIDING).error_after
+
+
+def test_whatever_promises_half_of_the_best_is_refitted(creeping, monkeypatch):
+    study, base = creeping
+    refitted: list[str] = []
+    monkeypatch.setattr(step_module, "_REFITTED", 1)
+    monkeypatch.setattr(
+        _Start, "refit", lambda self, scores, null: refitted.extend(s.setting.effect.name for s in scores) or []
+    )
+
+    class Three(Screen):
+        def look(self, *arguments):
+            look = super().look(*arguments)
+            first, second, third = look.scores[:3]
+            gains = (first, 1.0), (second, 0.6), (third, 0.4)
+            return dataclasses.replace(look, worth_a_fit=tuple(dataclasses.replace(s, gain=g) for s, g in gains))
+
+    effects = [PRESLIDING, SMOOTH, OFFSET]
+    screen = Three(effects, study)
+    look_further(study, base.fit, screen, effects, np.random.default_rng(0))
+    assert len(refitted) == 2
 
 
 def test_a_rough_fit_that_gained_nearly_as_much_is_held_against_what_leaves_more_than_noise(

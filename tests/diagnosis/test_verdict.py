@@ -375,7 +375,7 @@ def test_only_what_may_be_negative_is_promised_with_that_sign():
 def found_by(made_up, monkeypatch):
     """Runs the search with steps that are given."""
 
-    def run(*steps: Step) -> Diagnosis:
+    def run(*steps: Step, converged: bool = True) -> Diagnosis:
         following = iter((*steps, Step((), (), (), 1.0, 1.0)))
         base = made_up.base.fit
         monkeypatch.setattr(search, "look_further", lambda *a: next(following))
@@ -386,7 +386,8 @@ def found_by(made_up, monkeypatch):
         effects = [get_effect(name) for name in ("force_bias", "force_drift", "backlash", "stiction")]
         nothing = cast(Any, SimpleNamespace())
         assert base.problem.effects == ()
-        return search.diagnose(made_up.target, made_up.base, nothing, effects, np.random.default_rng(0))
+        gate = dataclasses.replace(made_up.base, converged=converged)
+        return search.diagnose(made_up.target, gate, nothing, effects, np.random.default_rng(0))
 
     return run
 
@@ -402,6 +403,14 @@ def test_effects_lists_what_was_found_and_then_the_rivals(made_up, found_by):
     assert diagnosis.effects == ("force_bias", "force_drift", "stiction", "backlash")
     assert diagnosis.preferred == ("force_bias", "force_drift")
     assert diagnosis.explained > 0.95
+
+
+def test_where_the_base_fit_stopped_short_what_explains_most_is_an_answer(made_up, found_by, monkeypatch):
+    bias, drift = made_up.diagnosis("one_of").steps[0].candidates
+    half = dataclasses.replace(bias, fit=drift.fit)
+    for candidate, most, verdict in ((bias, 0.9, "effect"), (half, 0.9, "not_fitted"), (half, 0.5, "effect")):
+        monkeypatch.setattr(search, "EXPLAINED_FAR", most)
+        assert found_by(Step(("force_bias",), (candidate,), (), 2.0, 1.6), converged=False).verdict == verdict
 
 
 def test_intervals_are_those_of_the_final_fit(made_up, found_by):
