@@ -25,7 +25,7 @@ MISTAKES = [
     (["effect"], "did you mean effects"),
     (["effects", "backlsh"], "did you mean backlash"),
     (["effects", "friction"], "load_friction"),
-    (["effects", ""], "known: "),
+    (["effects", ""], "forcegrasp effects lists them"),
     (["effects", "backlash", "adhesion"], "one name at a time"),
     # presets
     (["train", "experiment=no_id"], "did you mean no_ib"),

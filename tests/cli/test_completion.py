@@ -26,7 +26,7 @@ TYPED = {
     "forcegrasp train physics.tier=": {"reference", "fast"},
     "forcegrasp train hydra/l": {"hydra/launcher="},
     "forcegrasp train action.inductive_bias=t": {"true"},
-    "forcegrasp effects backl": {"backlash"},
+    "forcegrasp effects backl": {"backlash", "backlash_asymmetry"},
     "forcegrasp completion ": {"--help", *SHELLS},
     "forcegrasp evaluate policies=no_i": {"no_ib"},
     "forcegrasp evaluate 'policies=[no_ib,for": {"policies=[no_ib,force_pi"},

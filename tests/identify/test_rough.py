@@ -25,7 +25,7 @@ def test_larger_steps_are_kept_where_they_lead_further(made_up, monkeypatch, lef
         return dataclasses.replace(fit, residual=share * fit.residual)
 
     end = SimpleNamespace(vector=fit.vector, cost=fit.cost, error=1.0)
-    small = SimpleNamespace(known=None, fit=lambda start: end, problem=None, target=made_up.target)
+    small = SimpleNamespace(known=None, cost=fit.cost, fit=lambda start: end, problem=None, target=made_up.target)
     for name, value in {
         "fit_once": lambda *a: fit,
         "fit_exactly": fit_exactly,
