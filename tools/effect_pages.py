@@ -56,6 +56,10 @@ _STEPS_OF_SEVERAL_SIZES = Show(
     "steps of 0.6, 1.8 and 4.5 mm, and a slow ramp",
     ((26.9, JUMP, 0.4), (25.1, JUMP, 0.5), (26.5, 0.006, 0.2), (22, JUMP, 0.7), (23.2, 0.006, 0.2)),
 )
+_SQUEEZES = Show(
+    "squeezes of growing strength, and a slow release",
+    ((23.8, 0.02, 0.4), (22, 0.02, 0.4), (20, 0.02, 0.4), (18, 0.02, 0.4), (26.5, 0.01, 0.2)),
+)
 _PLANS = {
     "command_deadband": Show(
         "steps of 0.2 mm and of 0.4 mm in free air, a squeeze, a release in increments of 0.1 mm",
@@ -113,15 +117,9 @@ _PLANS = {
         "squeezes of growing strength",
         ((23.8, 0.02, 0.4), (22, 0.02, 0.4), (20, 0.02, 0.4), (18, 0.02, 0.4), (26.5, 0.03, 0.2)),
     ),
-    "finger_compliance": Show(
-        "squeezes of growing strength, and a slow release",
-        ((23.8, 0.02, 0.4), (22, 0.02, 0.4), (20, 0.02, 0.4), (18, 0.02, 0.4), (26.5, 0.01, 0.2)),
-    ),
+    "finger_compliance": _SQUEEZES,
     "friction_asymmetry": _STEPS,
-    "compliance_asymmetry": Show(
-        "squeezes of growing strength, and a slow release",
-        ((23.8, 0.02, 0.4), (22, 0.02, 0.4), (20, 0.02, 0.4), (18, 0.02, 0.4), (26.5, 0.01, 0.2)),
-    ),
+    "compliance_asymmetry": _SQUEEZES,
     "motor_asymmetry": _STEPS,
     "return_spring": _STEPS_OF_SEVERAL_SIZES,
     "encoder_scale": _STEPS,

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from forcegrasp.cli.results import write_json
-from forcegrasp.errors import ConfigError, closest
+from forcegrasp.errors import ConfigError
 
 if TYPE_CHECKING:
     from typing_extensions import TypeIs
@@ -172,10 +172,10 @@ def effect_to_add(name: str, gripper: Gripper) -> type[Effect]:
 
 def check_effects(option: str, names: Sequence[str]) -> None:
     """Raises ConfigError about a name that no effect of the catalogue has, before anything is read."""
-    from forcegrasp.effects import catalogue
     from forcegrasp.effects.law import SUFFIXES
+    from forcegrasp.effects.registry import catalogue, no_such_effect
 
     known = catalogue()
     for name in names:
         if name not in known and not (option == "effect" and name.endswith(SUFFIXES)):
-            raise ConfigError(f"{option}={name}: no such effect{closest(name, known, 'forcegrasp effects')}")
+            raise no_such_effect(f"{option}={name}", name, known)

@@ -103,21 +103,25 @@ def simpler(setting: EffectSetting, nested: Nested, gripper: Gripper) -> EffectS
     values = effect.typical_values()
     for own, its in nested.same.items():
         values[effect.index(its)] = setting.values[setting.effect.index(own)]
-    variant = setting.variant if setting.variant in effect.variants else effect.variants[0]
-    return EffectSetting(effect, variant, values)
+    return EffectSetting(effect, _variant_like(setting, effect), values)
 
 
 def richer(setting: EffectSetting, container: type[Effect]) -> list[EffectSetting]:
     """Settings of an effect that contains this one: shared values carried over, its own at all sizes that are tried."""
     nested = next(n for n in container.contains if n.effect == setting.effect.name)
     found: dict[bytes, EffectSetting] = {}
-    variant = setting.variant if setting.variant in container.variants else container.variants[0]
+    variant = _variant_like(setting, container)
     for trial in [container.typical_values(), *container.trials()]:
         values = np.array(trial, float)
         for own, its in nested.same.items():
             values[container.index(own)] = setting.values[setting.effect.index(its)]
         found[values.tobytes()] = EffectSetting(container, variant, values)
     return list(found.values())
+
+
+def _variant_like(setting: EffectSetting, effect: type[Effect]) -> str:
+    """The variant of an effect that a setting of another one has, or the first where it has none of that name."""
+    return setting.variant if setting.variant in effect.variants else effect.variants[0]
 
 
 def refit_as(setting: EffectSetting, fit: Fit, without: str | Collection[str], study: Study) -> Fit:

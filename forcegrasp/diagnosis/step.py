@@ -86,8 +86,8 @@ def look_further(
     if anyway:
         candidates = start.fit_anyway(look.scores, look.null)
     else:
-        near = [s for s in look.worth_a_fit if s.gain > _NEAR_THE_BEST * look.worth_a_fit[0].gain]
-        count = max(_REFITTED, len(best_effects(near, len(near))))
+        near = [score for score in look.worth_a_fit if score.gain > _NEAR_THE_BEST * look.worth_a_fit[0].gain]
+        count = max(_REFITTED, len({score.setting.effect for score in near}))
         candidates = start.refit(of_best_effects(look.worth_a_fit, count), look.null)
     candidates = [one for one in candidates if _least_cost(one.fit, fit) < most]
     candidates += start.refit_richer(richer, look.null)

@@ -7,9 +7,8 @@ import dataclasses
 import numpy as np
 
 from forcegrasp.effects.backlash import Backlash
-from forcegrasp.effects.base import Nested, Parameter
-
-_SIDES = np.array([1.0, -1.0])
+from forcegrasp.effects.base import Nested
+from forcegrasp.effects.each_finger import SHARE, of_each
 
 
 class BacklashAsymmetry(Backlash):
@@ -27,11 +26,11 @@ class BacklashAsymmetry(Backlash):
     separates = "pauses, reversals and partial releases in contact, of either finger"
     parameters = (
         dataclasses.replace(Backlash.parameters[0], doc="mean lost motion g of both", trials=(3e-4, 1e-3)),
-        Parameter("share", "share a by which the left one has more", "1", -1.0, 1.0, 0.5, null=0.5, trials=(-1.0, 1.0)),
+        SHARE,
     )
     contains = (Nested("backlash", at={"share": 0.0}, same={"gap_m": "gap_m"}),)
     order = 4
 
     @property
     def gap(self) -> np.ndarray:
-        return self["gap_m"] * (1 + self["share"] * _SIDES)
+        return of_each(self, "gap_m")

@@ -6,10 +6,9 @@ import dataclasses
 
 import numpy as np
 
-from forcegrasp.effects.base import Nested, Parameter
+from forcegrasp.effects.base import Nested
+from forcegrasp.effects.each_finger import SHARE, of_each
 from forcegrasp.effects.finger_compliance import FingerCompliance
-
-_SIDES = np.array([1.0, -1.0])
 
 
 class ComplianceAsymmetry(FingerCompliance):
@@ -28,11 +27,11 @@ class ComplianceAsymmetry(FingerCompliance):
         dataclasses.replace(
             FingerCompliance.parameters[0], doc="mean deflection per force c of both", trials=(3e-4, 1e-3)
         ),
-        Parameter("share", "share a by which the left one gives more", "1", -1.0, 1.0, 0.5, null=0.5, trials=(-1, 1)),
+        SHARE,
     )
     contains = (Nested("finger_compliance", at={"share": 0.0}, same={"compliance_m_n": "compliance_m_n"}),)
     order = 5
 
     @property
     def compliance(self) -> np.ndarray:
-        return self["compliance_m_n"] * (1 + self["share"] * _SIDES)
+        return of_each(self, "compliance_m_n")

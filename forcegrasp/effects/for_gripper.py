@@ -10,8 +10,8 @@ import numpy as np
 
 from forcegrasp.effects.base import Effect, Parameter
 from forcegrasp.effects.none import NoEffect
-from forcegrasp.effects.registry import catalogue
-from forcegrasp.errors import ConfigError, closest
+from forcegrasp.effects.registry import catalogue, no_such_effect
+from forcegrasp.errors import ConfigError
 from forcegrasp.physics.gripper import Gripper
 
 
@@ -79,7 +79,7 @@ def effect_of(name: str, gripper: Gripper) -> type[Effect]:
         return known[name]
     if name in catalogue():
         raise ConfigError(f"effect {name}: {why_left_out(catalogue()[name], gripper)}")
-    raise ConfigError(f"effect {name}: no such effect{closest(name, known, 'forcegrasp effects')}")
+    raise no_such_effect(f"effect {name}", name, known)
 
 
 def _variants(effect: type[Effect], traits: _Traits) -> tuple[str, ...]:

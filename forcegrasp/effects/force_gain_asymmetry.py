@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from forcegrasp.effects.base import Effect, Parameter
+from forcegrasp.effects.each_finger import SIDES
 
 
 class ForceGainAsymmetry(Effect):
@@ -23,4 +24,4 @@ class ForceGainAsymmetry(Effect):
     least_channels = 2
 
     def read_force(self, force: np.ndarray) -> np.ndarray:
-        return force * (1 + self["share"] * np.array([1.0, -1.0]))
+        return force * (1 + self["share"] * SIDES)

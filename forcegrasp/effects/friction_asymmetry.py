@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from forcegrasp.effects.base import Contribution, Effect, Nested, Parameter
-
-_SIDES = np.array([1.0, -1.0])
+from forcegrasp.effects.each_finger import SHARE, of_each
 
 
 class FrictionAsymmetry(Effect):
@@ -26,10 +23,10 @@ class FrictionAsymmetry(Effect):
     separates = "reversals of each finger in free air: servos of unlike gains lag by what grows with the speed"
     parameters = (
         Parameter("force_n", "mean friction F_c of both", "N", 0.0, 0.5, 0.03, trials=(0.02, 0.06), follows="effort"),
-        Parameter("share", "share a by which the left one has more", "1", -1.0, 1.0, 0.5, null=0.5, trials=(-1.0, 1.0)),
+        SHARE,
     )
     contains = (Nested("coulomb_friction", at={"share": 0.0}, same={"force_n": "force_n"}),)
     order = 14
 
     def act(self) -> Contribution:
-        return Contribution(friction=self["force_n"] * (1 + self["share"] * _SIDES))
+        return Contribution(friction=of_each(self, "force_n"))

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from forcegrasp.effects.base import Contribution, Effect, Parameter, State
+from forcegrasp.effects.each_finger import SIDES
 from forcegrasp.physics.plant import Plant
-
-_SIDES = np.array([1.0, -1.0])
 
 
 class MotorAsymmetry(Effect):
@@ -39,7 +38,7 @@ class MotorAsymmetry(Effect):
 
     def change_model(self, plant: Plant, which: np.ndarray) -> None:
         rows = self.rows[which]
-        for actuator, side in zip(plant.actuators, _SIDES, strict=True):
+        for actuator, side in zip(plant.actuators, SIDES, strict=True):
             stiffer = 1 + side * self["stiffness_share"][which, 0]
             plant.field("actuator_gainprm")[rows, actuator, 0] *= stiffer
             plant.field("actuator_biasprm")[rows, actuator, 1] *= stiffer
@@ -48,7 +47,7 @@ class MotorAsymmetry(Effect):
         plant, rows = self.plant, self.rows[which, None]
         of_servo = -plant.field("actuator_biasprm")[rows, plant.actuators, 2]
         of_joint = plant.base("dof_damping")[rows, plant.motor_dofs]
-        return {"damping": self["damping_share"][which] * _SIDES * (of_servo + of_joint)}
+        return {"damping": self["damping_share"][which] * SIDES * (of_servo + of_joint)}
 
     def act(self) -> Contribution:
         return Contribution(damping=self.state["damping"])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from collections.abc import Iterable
 from importlib import import_module
 from importlib.metadata import entry_points
 
@@ -98,6 +99,11 @@ def _shipped(name: str) -> type[Effect]:
     return getattr(import_module(f"forcegrasp.effects.{name}"), name.title().replace("_", ""))
 
 
+def no_such_effect(asked: str, name: str, known: Iterable[str]) -> ConfigError:
+    """What to raise where somebody asked for an effect of this name, in these words."""
+    return ConfigError(f"{asked}: no such effect{closest(name, known, 'forcegrasp effects')}")
+
+
 def get_effect(name: str) -> type[Effect]:
     """Returns an effect by name.
 
@@ -107,5 +113,5 @@ def get_effect(name: str) -> type[Effect]:
     if name == NoEffect.name:
         return NoEffect
     if name not in catalogue():
-        raise ConfigError(f"effect {name}: no such effect{closest(name, catalogue(), 'forcegrasp effects')}")
+        raise no_such_effect(f"effect {name}", name, catalogue())
     return catalogue()[name]

@@ -84,9 +84,8 @@ def test_a_straight_step_that_leaves_far_more_than_the_fit_is_simulated(monkeypa
     monkeypatch.setattr(cross_validation, "_simulate", lambda fit, target, doubtful, held: asked.extend(doubtful))
     jacobian = rng.standard_normal((G, S, 4, 2))
     jacobian[0] *= 1000
-    fit = linear_fit(
-        target, jacobian, 20 * rng.standard_normal((G, S, 4))
-    )  # so far off that steps are taken as they are
+    far_off = 20 * rng.standard_normal((G, S, 4))  # so far that steps are taken as they are
+    fit = linear_fit(target, jacobian, far_off)
     heldout_residual(fit, target, [np.array([k]) for k in range(G)])
     assert [fold.tolist() for fold, _ in asked] == [[0]]
 
