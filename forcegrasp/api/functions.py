@@ -18,6 +18,7 @@ from forcegrasp.identify.loading import Loaded
 from forcegrasp.identify.progress import Progress, silent
 from forcegrasp.measure import FinalForceTable, MeasurementSet
 from forcegrasp.models.model_file import Model, read_model, write_model
+from forcegrasp.replay.time_limit import time_limit
 from forcegrasp.reports.results import (
     AddResult,
     CompareResult,
@@ -104,6 +105,7 @@ def diagnose(
     *,
     effects: str | Sequence[str] = (),
     law: bool = False,
+    minutes: float = 0.0,
     seed: int = 0,
     progress: Progress | None = None,
 ) -> DiagnoseResult | TableResult:
@@ -114,15 +116,17 @@ def diagnose(
       model: what to start from, as for :func:`compare`; its parameters are fitted again. The base model by default.
       effects: names of the effects to try; the whole catalogue by default.
       law: look for a formula where no effect explains what is left; takes minutes.
+      minutes: end after so many minutes with what was found by then, and ``stopped`` says so; no limit if 0.
       seed: of the fit's starts and of the null distribution.
       progress: takes lines about what is done, such as ``print``; silent by default.
 
     Raises:
       MeasurementError: if the set can't be right, or has too few grasps to hold any out.
+      OutOfTimeError: if the time was over before the base model was fitted.
       ConfigError: if an effect is unknown, the model can't be read or is of another gripper, or one of them is given
         for a table of final forces.
     """
-    validate(DiagnoseConfig(seed=seed))
+    validate(DiagnoseConfig(minutes=minutes, seed=seed))
     only = (effects,) if isinstance(effects, str) else tuple(effects)
     measuring.check_effects("effects", only)
     loaded, show = _open(data, progress)
@@ -130,7 +134,9 @@ def diagnose(
         return _analyse(loaded, "diagnosis", model=model, effects=only)
     tried = diagnose_set.chosen_effects(loaded.gripper, only)
     given, loaded = (None, loaded) if model is None else _beside(model, loaded, show)
-    diagnosis, _ = diagnose_set.diagnose_set(loaded, given, [effect.name for effect in tried], seed, show, law=law)
+    names = [effect.name for effect in tried]
+    with time_limit(minutes):
+        diagnosis, _ = diagnose_set.diagnose_set(loaded, given, names, seed, show, law=law)
     return DiagnoseResult(loaded, diagnosis, advise(diagnosis), tuple(tried), only, _file_of(model))
 
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from forcegrasp.cli.results import default_out, need_sets, print_table, progress_printer
@@ -14,6 +17,8 @@ NOTES = """
                    forces, with meta.yaml and table.csv
   model=FILE       what forcegrasp fit or add wrote; its parameters are fitted again
   'effects=[A,B]'  see forcegrasp effects
+  minutes=10       a set with many effects may take longer; Ctrl-C ends it, too. What was found by then is told and
+                   written, and the way to go on from there
 
   The verdict is one of: effect (one or several, in the order found), one_of (these data can't tell which), data (the
   set seems to be wrong, not the model), explained (nothing is missing), unknown (none of the effects), not_fitted (the
@@ -25,8 +30,8 @@ NOTES = """
 """
 
 
-def run(config: DiagnoseConfig) -> None:
-    """Runs the verb."""
+def run(config: DiagnoseConfig) -> int:
+    """Runs the verb; returns the exit status."""
     folders = need_sets(config.data)
 
     from forcegrasp.cli.measuring import (
@@ -40,7 +45,9 @@ def run(config: DiagnoseConfig) -> None:
     )
     from forcegrasp.diagnosis import diagnose_set
     from forcegrasp.diagnosis.advice import advise
+    from forcegrasp.diagnosis.cut_short import INTERRUPTED
     from forcegrasp.identify import loading
+    from forcegrasp.replay.time_limit import time_limit
     from forcegrasp.reports import diagnosis as diagnosis_report
     from forcegrasp.reports.next_step import added_law, next_grasp_words
     from forcegrasp.reports.results import BASE_MODEL, FOUND_MODEL, NEXT_GRASP, PROPOSED_LAW, DiagnoseResult
@@ -50,12 +57,13 @@ def run(config: DiagnoseConfig) -> None:
     loaded = loading.load(folders)
     if is_table(loaded):
         report_table(loaded, "diagnosis", out, model=config.model, effects=config.effects)
-        return
+        return 0
     tried = diagnose_set.chosen_effects(loaded.gripper, config.effects)
     model, loaded = take_model(Path(config.model), loaded) if config.model else (None, loaded)
     tell_warnings(loaded)
     names, progress = [e.name for e in tried], progress_printer()
-    diagnosis, _ = diagnose_set.diagnose_set(loaded, model, names, config.seed, progress, law=config.law)
+    with time_limit(config.minutes), sigterm_as_ctrl_c():
+        diagnosis, _ = diagnose_set.diagnose_set(loaded, model, names, config.seed, progress, law=config.law)
     advice = advise(diagnosis)
     result = DiagnoseResult(loaded, diagnosis, advice, tuple(tried), tuple(config.effects), config.model)
     if (table := diagnosis_report.printed(diagnosis)) is not None:
@@ -75,6 +83,25 @@ def run(config: DiagnoseConfig) -> None:
         print(f"wrote {law}: the law, to name, edit and add: {told}")
     print("\n".join(f"{'or' if k else 'next'}: {command}" for k, command in enumerate(result.commands(out))))
     write_results(out, result)
+    return 130 if diagnosis.stopped == INTERRUPTED else 0
+
+
+@contextmanager
+def sigterm_as_ctrl_c() -> Iterator[None]:
+    """Lets a scheduler, or ``timeout``, end what it began as a person would."""
+
+    def interrupt(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    try:
+        before = signal.signal(signal.SIGTERM, interrupt)
+    except ValueError:  # not the main thread
+        yield
+        return
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 VERB = Verb(

@@ -174,6 +174,9 @@ class DiagnoseConfig:
     out: str = option("", "where to write report.html, diagnosis.json and models; runs/diagnose_TIME if empty")
     effects: list[str] = option([], "effects to consider; all of the catalogue if empty")
     law: bool = option(False, "look for a formula where no effect explains what is left; takes minutes")
+    minutes: float = option(
+        0.0, "end after so many minutes, with what was found by then; no limit if 0", unit="min", low=0, high=1e5
+    )
     seed: int = option(0, "seed of the fit's starts and of the null distribution", low=0, high=2**31 - 1)
 
 

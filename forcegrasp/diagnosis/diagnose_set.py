@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from forcegrasp.diagnosis.cut_short import REASONS, cut_short
 from forcegrasp.diagnosis.doubt import leaves_less, more_likely, with_fault
 from forcegrasp.diagnosis.faults import Fault, besides, leaves_nothing, suspects
 from forcegrasp.diagnosis.late_rows import may_be_late_rows
@@ -44,8 +45,11 @@ def diagnose_set(
 ) -> tuple[Diagnosis, Simulators]:
     """Which effects are missing, or what is wrong with the set; with ``law`` also a formula for what no effect tells.
 
+    Ctrl-C, or the end of a time limit, ends it with what was found by then, once the base model is fitted.
+
     Raises:
       MeasurementError: if there are too few grasps to hold any out.
+      OutOfTimeError: if the time was over before the base model was fitted.
       ConfigError: if an effect is unknown, or can't show on this gripper.
     """
     if loaded.held_out < LEAST_GRASPS:
@@ -86,10 +90,17 @@ def diagnose_set(
         """The diagnosis of a set, and that of the set with moves within its tolerance if it wants any."""
         first = None if of_set.gripper.is_servo else MovesFirst(of_set)
         found = search(target, simulators, base, may_be_given=first)
-        further = moved(found, of_set)
-        if further is None and first is not None and first.asked:  # it was no move after all
-            found = search(target, simulators, base)
+        if found.stopped:
+            return found, None
+        try:
             further = moved(found, of_set)
+            if further is None and first is not None and first.asked:  # it was no move after all
+                again = search(target, simulators, base)
+                if again.stopped:
+                    return dataclasses.replace(found, stopped=again.stopped), None
+                found, further = again, moved(again, of_set)
+        except REASONS as reason:
+            return dataclasses.replace(found, stopped=cut_short(reason, progress)), None
         return found, further
 
     def as_said() -> tuple[Diagnosis, Simulators]:
@@ -99,9 +110,13 @@ def diagnose_set(
     said = fitted(loaded)
 
     def with_law(diagnosis: Diagnosis, simulators: Simulators) -> tuple[Diagnosis, Simulators]:
-        rng = np.random.default_rng(seed + 2)
-        found = find_law(diagnosis, simulators, rng, progress) if law else None
-        return dataclasses.replace(may_be_late_rows(diagnosis, loaded), law=found, law_sought=law), simulators
+        rng, found, stopped = np.random.default_rng(seed + 2), None, diagnosis.stopped
+        try:
+            found = find_law(diagnosis, simulators, rng, progress) if law and not stopped else None
+        except REASONS as reason:
+            stopped = cut_short(reason, progress)
+        told, sought = may_be_late_rows(diagnosis, loaded), law and not stopped
+        return dataclasses.replace(told, law=found, law_sought=sought, stopped=stopped), simulators
 
     def put_right(fault: Fault) -> tuple[Fault, Fitted] | None:
         progress(f"fitting the set with {fault.name} put right")
@@ -115,22 +130,36 @@ def diagnose_set(
                 return wider, more
         return fault, right
 
-    for suspect in suspects(loaded, said[0], said[2].fit):
-        if (better := put_right(suspect)) is not None:
-            fault, right = better
-            # what is a little off besides shows once the fault does not hide it
-            further, on_moved = (search(*right), None) if fault.moved else search_and_move(fault.put_right, *right)
-            if on_moved is not None:
-                further, simulators = on_moved
-                right, fault = (further.target, simulators, further.base), besides(fault, further.fault)
-            if not fault.is_borne_out(further.fit):  # an effect had made it seem so
-                continue
-            found = with_fault(further, fault.told_by(further.fit), (said[0], said[2].fit))
-            # else effects may do as well without it
-            certain = found.verdict is Verdict.DATA and not (found.left or fault.moved or fault.of_most)
-            likely = found if certain else more_likely(found, search(*said))
-            return with_law(likely, right[1] if likely.target.grasps is right[0].grasps else said[1])
-    return with_law(*as_said())
+    def put_right_or_as_said() -> tuple[Diagnosis, Simulators]:
+        for suspect in suspects(loaded, said[0], said[2].fit):
+            if (better := put_right(suspect)) is not None:
+                fault, right = better
+                # what is a little off besides shows once the fault does not hide it
+                further, on_moved = (search(*right), None) if fault.moved else search_and_move(fault.put_right, *right)
+                if on_moved is not None:
+                    further, simulators = on_moved
+                    right, fault = (further.target, simulators, further.base), besides(fault, further.fault)
+                if not further.stopped and not fault.is_borne_out(further.fit):  # an effect had made it seem so
+                    continue
+                found = with_fault(further, fault.told_by(further.fit), (said[0], said[2].fit))
+                # else effects may do as well without it
+                certain = found.verdict is Verdict.DATA and not (found.left or fault.moved or fault.of_most)
+                likely = found
+                if not (certain or found.stopped):
+                    without = search(*said)
+                    stopped = without.stopped
+                    likely = dataclasses.replace(found, stopped=stopped) if stopped else more_likely(found, without)
+                return likely, right[1] if likely.target.grasps is right[0].grasps else said[1]
+        return as_said()
+
+    try:
+        diagnosis, simulators = put_right_or_as_said()
+    except REASONS as reason:  # before any search had begun
+        stopped = cut_short(reason, progress)
+        target, simulators, base = said
+        nothing = diagnose(target, base, simulators, [], np.random.default_rng(seed + 1), progress)
+        diagnosis = dataclasses.replace(nothing, stopped=stopped)
+    return with_law(diagnosis, simulators)
 
 
 def chosen_effects(gripper: Gripper, names: Sequence[str]) -> list[type[Effect]]:

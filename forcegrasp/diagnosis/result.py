@@ -157,6 +157,7 @@ class Diagnosis(ShortRepr):
     #: The same with effects that explain too little to be believed, if there are; a move within tolerance may bear
     #: them out.
     bolder: Diagnosis | None = None
+    stopped: str = ""  #: why the search was cut short, in words; empty if it was not
     alone: str = ""  #: the one grasp that shows more than noise, in words, where all others show none; empty if none
 
     @property

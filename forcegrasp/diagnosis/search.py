@@ -9,40 +9,36 @@ from dataclasses import dataclass
 import numpy as np
 
 from forcegrasp.diagnosis import families
-from forcegrasp.diagnosis.ask_again import ask_again
-from forcegrasp.diagnosis.evidence import LEAST_SHARE_TOGETHER, with_close_rivals
+from forcegrasp.diagnosis.conclusion import Begun, concluded
+from forcegrasp.diagnosis.cut_short import REASONS, cut_short
+from forcegrasp.diagnosis.evidence import LEAST_SHARE_TOGETHER
 from forcegrasp.diagnosis.exchange import exchange
 from forcegrasp.diagnosis.few import with_few
+from forcegrasp.diagnosis.left_over import AS_GOOD_AS_NOTHING, is_worth_looking, leaves_little, left_over
 from forcegrasp.diagnosis.look_beside import look_beside
 from forcegrasp.diagnosis.merge import merge
 from forcegrasp.diagnosis.needless import chained, drop_needless, simplify
-from forcegrasp.diagnosis.noise_check import Noise, unexpected_noise
-from forcegrasp.diagnosis.odd_grasps import OddGrasp, odd_grasps
-from forcegrasp.diagnosis.result import Diagnosis, Step, kept_steps, settle_ties
+from forcegrasp.diagnosis.odd_grasps import odd_grasps
+from forcegrasp.diagnosis.result import Diagnosis, Step, kept_steps
 from forcegrasp.diagnosis.screen import Screen
 from forcegrasp.diagnosis.split import split
 from forcegrasp.diagnosis.step import FAR, look_further
 from forcegrasp.diagnosis.study import Study
-from forcegrasp.diagnosis.verdict import EXPLAINED_FAR, MUCH, conclude, explained_share
+from forcegrasp.diagnosis.verdict import explained_share
 from forcegrasp.effects import Effect
 from forcegrasp.identify.base_fit import BaseFit
-from forcegrasp.identify.cross_validation import evidence_folds, make_folds, rms_of_grasps
+from forcegrasp.identify.cross_validation import evidence_folds, make_folds
 from forcegrasp.identify.fit import Fit, Simulators
-from forcegrasp.identify.noise_floor import beyond_fit, excess, numerical_error, numerical_floor
+from forcegrasp.identify.noise_floor import beyond_fit, numerical_error, numerical_floor
 from forcegrasp.identify.progress import Progress, silent
 from forcegrasp.identify.target import Target
 from forcegrasp.identify.verdict import Verdict
 from forcegrasp.identify.weights import reweigh
 
+#: Whether what a set gives, moved within its tolerance, may explain what a fit leaves.
+MayBeGiven = Callable[[Target, Fit], bool]
 #: Largest number of effects that are looked for.
 MOST_EFFECTS = 8
-# Of so many grasps one alone says nothing of the gripper: where fingers push an object is a matter of chance.
-_MANY = 12
-# Where the base fit stopped short, parameters are a little off: so many times the floor is as good as nothing left.
-_AS_GOOD_AS_NOTHING = 1.1
-# If that is also less than this share of what was beyond the floor, effects that were found are nearly right, and what
-# takes the rest makes up for their forms: behind a lag, in another engine's contacts, objects were ten times too light.
-_LITTLE = 0.1
 
 
 def diagnose(
@@ -53,7 +49,7 @@ def diagnose(
     rng: np.random.Generator,
     progress: Progress = silent,
     start: tuple[Fit, Sequence[Step]] | None = None,
-    may_be_given: Callable[[Target, Fit], bool] | None = None,
+    may_be_given: MayBeGiven | None = None,
 ) -> Diagnosis:
     """Adds effects to a fitted base model for as long as the evidence holds.
 
@@ -67,27 +63,60 @@ def diagnose(
       start: a fit with the effects that steps have found before, to go on from; the base model by default.
       may_be_given: whether what the set gives, moved within its tolerance, may explain what a fit leaves: then effects
         that promise too little are not fitted.
+
+    Ctrl-C, or the end of a time limit, ends the search with what was found by then.
     """
     first, before = (base.fit, ()) if start is None else start
-    fit = first
-    numerical = numerical_error(fit, target)
-    study = Study(target, simulators, evidence_folds(target.grasps), beyond_fit(fit, numerical), progress)
+    numerical = numerical_error(first, target)
+    study = Study(target, simulators, evidence_folds(target.grasps), beyond_fit(first, numerical), progress)
     folds = tuple(make_folds(target.grasps))
     error_before = study.error(target.before_rounding(study.heldout(base.fit)))
-    odd = odd_grasps(target, fit)
+    odd = odd_grasps(target, first)
     if any(grasp.like for grasp in odd):  # nothing can be learnt of the gripper until labels are right
         labels = ("object_labels",)
         return Diagnosis(
-            Verdict.DATA, labels, (), base, fit, target, folds, error_before, error_before, left="labels", odd=odd
+            Verdict.DATA, labels, (), base, first, target, folds, error_before, error_before, left="labels", odd=odd
         )
     floor = numerical_floor(study.numerical, target)
-    steps: list[Step] = list(before)
+    begun = Begun(base, first, numerical, odd, folds, error_before, floor, effects)
+    steps = list(before)
     if (rounding := target.rounding) is not None and start is None:
         progress(f"found {rounding.effect.name}: readings are multiples of one step")
-        steps.append(Step((rounding.effect.name,), (), (), error_before, study.error(study.heldout(fit))))
+        steps.append(Step((rounding.effect.name,), (), (), error_before, study.error(study.heldout(first))))
+    so_far = _SoFar((study, steps, first))
+    try:
+        if start is None or is_worth_looking(study, first):
+            _add_effects(so_far, begun, rng, may_be_given)
+        _tidy_up(so_far, begun)
+        return _believed(so_far, begun)
+    except REASONS as reason:
+        stopped = cut_short(reason, progress)
+        return dataclasses.replace(concluded(begun, *so_far.sure, in_a_hurry=True), stopped=stopped)
+
+
+#: A study, the steps that found effects, and a fit with all of them.
+Found = tuple[Study, list[Step], Fit]
+
+
+@dataclass(eq=False)
+class _SoFar:
+    """What a search has found, to be taken whenever it is cut short: each changes all at once."""
+
+    all: Found
+    believed: Found | None = None  #: what is, if the rest explains too little in the end
+
+    @property
+    def sure(self) -> Found:
+        """What is believed whatever else may be found."""
+        return self.believed or self.all
+
+
+def _add_effects(so_far: _SoFar, begun: Begun, rng: np.random.Generator, may_be_given: MayBeGiven | None) -> None:
+    """Adds one effect after the other."""
+    effects = begun.effects
+    study, steps, fit = so_far.all
     screen, screened, tried_anyway = Screen(effects, study), fit, False
-    believed: tuple[list[Step], Fit, Study] | None = None  # what is, if the rest explains too little in the end
-    for _ in range(MOST_EFFECTS if start is None or _is_worth_looking(study, fit) else 0):
+    for _ in range(MOST_EFFECTS):
         untried = left_to_try(effects, fit, steps)
         richer = list(families.extensions(fit, effects))
         if not untried and not richer:
@@ -95,8 +124,9 @@ def diagnose(
         study = with_few(study, fit)
         step = look_further(study, fit, screen, untried, rng, richer)
         # what is on trial has no look-alikes that are worth the time
-        much = not step.effects and believed is None and step.error_before > _AS_GOOD_AS_NOTHING * floor
-        much = much and not (may_be_given is not None and may_be_given(target, fit))
+        much = not step.effects and so_far.believed is None
+        much = much and step.error_before > AS_GOOD_AS_NOTHING * begun.floor
+        much = much and not (may_be_given is not None and may_be_given(study.target, fit))
         if much and screened is not fit:  # beside what was found since, others may do something else
             screen, screened = Screen(effects, study), fit
             step = look_further(study, fit, screen, untried, rng, richer)
@@ -108,83 +138,44 @@ def diagnose(
             steps, step = two or (steps, found or step)
             tried_anyway = True  # it takes long, and where it has helped signatures lead on
         if not step.effects:
-            steps.append(step)
+            so_far.all = study, [*steps, step], fit
             break
-        if step.of_many and believed is None:
+        if step.of_many and so_far.believed is None:
             nothing = dataclasses.replace(step, effects=(), error_after=step.error_before)
-            believed = [*steps, nothing], fit, study
-        progress(f"found {step.effects[0]}: held-out error {step.error_before:.2f} → {step.error_after:.2f} × noise")
-        weighed, fit = reweigh(target, step.candidates[0].fit, simulators)
-        if weighed is not target:
-            target, study = weighed, dataclasses.replace(study, target=weighed)
-        step, fit = drop_needless(study, step, fit, len(base.fit.problem.effects))
-        steps.append(step)
-        if not _is_worth_looking(study, fit) or _leaves_little(study, fit, error_before, floor):
-            break
-    steps, fit = simplify(study, steps, fit, len(base.fit.problem.effects))
-    steps, fit = merge(study, steps, fit, effects, len(base.fit.problem.effects))
-    steps, fit = _look_beside_all(study, steps, fit, simulators)
-    begun = _Begun(base, first, numerical, odd, folds, error_before, floor, effects)
-    found = _concluded(begun, study, steps, fit)
-    if believed is None or _convincing(believed[2], believed[1], study, fit):
-        return found
-    steps, fit, study = believed
-    return dataclasses.replace(_concluded(begun, study, steps, fit), bolder=found)
-
-
-@dataclass(frozen=True, eq=False)
-class _Begun:
-    """What a search began with."""
-
-    base: BaseFit
-    fit: Fit
-    numerical: tuple[np.ndarray, ...]
-    odd: tuple[OddGrasp, ...]
-    folds: tuple[np.ndarray, ...]
-    error: float
-    floor: float
-    effects: Sequence[type[Effect]]
-
-
-def _concluded(begun: _Begun, study: Study, steps: Sequence[Step], fit: Fit) -> Diagnosis:
-    """What the steps of a search, and a fit with all effects that they found, add up to."""
-    base, target, floor, error_before = begun.base, study.target, begun.floor, begun.error
-    error_after, (left, noise, alone) = study.error(study.heldout(fit)), _left_by_many(study, fit)
-    much_left = bool(left) and error_after > MUCH * floor
-    steps = settle_ties([with_close_rivals(step) for step in steps] if much_left else steps)
-    if not much_left:  # what is still missing could decide between them again
-        steps, asked = ask_again(study, steps, fit, begun.effects if error_after > floor else ())
-        if asked is not fit:
-            fit = asked
-            error_after, (left, noise, alone) = study.error(study.heldout(fit)), _left_by_many(study, fit)
-    found = kept_steps(steps)
-    only_of_set = all(s.candidates and s.candidates[0].effect.of_set for s in found)
-    share = study.explained(target.before_rounding(study.heldout(base.fit)), study.heldout(fit))
-    # a missing effect makes the error rough, and the base fit stop short: then what leaves more may be a look-alike
-    leaves_more = bool(left) and error_after > _AS_GOOD_AS_NOTHING * floor and share < EXPLAINED_FAR
-    if not base.converged and (not found or leaves_more):
-        return Diagnosis(
-            Verdict.NOT_FITTED, (), (), base, base.fit, target, begun.folds, error_before, error_before, odd=begun.odd
+            so_far.believed = study, [*steps, nothing], fit
+        study.progress(
+            f"found {step.effects[0]}: held-out error {step.error_before:.2f} → {step.error_after:.2f} × noise"
         )
-    verdict = conclude(
-        [s.verdict for s in found if s.verdict],
-        share,
-        error_after,
-        floor,
-        bool(left),
-        only_of_set,
-        whole_recordings=len(target.recordings) > 1,
-    )
-    names = [s.effects[0] for s in found] if verdict.names_effects else []
-    if verdict is Verdict.ONE_OF:
-        names += [name for s in found for name in s.effects[1:]]
-    numerical, odd = begun.numerical, begun.odd
-    if fit is not begun.fit:  # what was missing may have made them odd
-        numerical, odd = numerical_error(fit, target), odd_grasps(target, fit)
-    return Diagnosis(
-        verdict, tuple(dict.fromkeys(names)), tuple(steps), base, fit, target, begun.folds, error_before, error_after,
-        numerical, floor, left, odd, noise, alone=alone,
-    )  # fmt: skip
+        target, fit = reweigh(study.target, step.candidates[0].fit, study.simulators)
+        if target is not study.target:
+            study = dataclasses.replace(study, target=target)
+        step, fit = drop_needless(study, step, fit, begun.given)
+        steps = [*steps, step]
+        so_far.all = study, steps, fit
+        if not is_worth_looking(study, fit) or leaves_little(study, fit, begun.error, begun.floor):
+            break
+
+
+def _tidy_up(so_far: _SoFar, begun: Begun) -> None:
+    """Leaves out and puts together what can be, now that all is found, and fits effects that jump once more."""
+    study, steps, fit = so_far.all
+    steps, fit = simplify(study, steps, fit, begun.given)
+    so_far.all = study, steps, fit
+    steps, fit = merge(study, steps, fit, begun.effects, begun.given)
+    so_far.all = study, steps, fit
+    so_far.all = study, *_look_beside_all(study, steps, fit)
+
+
+def _believed(so_far: _SoFar, begun: Begun) -> Diagnosis:
+    """What all that was found adds up to; or what is sure of it, where the rest explains too little."""
+    study, steps, fit = so_far.all
+    found = concluded(begun, study, steps, fit)
+    if so_far.believed is None:
+        return found
+    before, _, fewer = so_far.believed
+    if _convincing(before, fewer, study, fit):
+        return found
+    return dataclasses.replace(concluded(begun, *so_far.believed), bolder=found)
 
 
 def _fitted_anyway(
@@ -195,11 +186,11 @@ def _fitted_anyway(
     return step if step.effects else None
 
 
-def _look_beside_all(study: Study, steps: Sequence[Step], fit: Fit, simulators: Simulators) -> tuple[list[Step], Fit]:
+def _look_beside_all(study: Study, steps: Sequence[Step], fit: Fit) -> tuple[list[Step], Fit]:
     """The steps and a fit from better sizes of effects that jump: what was found later may have moved them."""
     further = fit
     for place in range(len(fit.problem.effects)):
-        further = look_beside(further, study.target, simulators, place)
+        further = look_beside(further, study.target, study.simulators, place)
     if further is fit or not kept_steps(steps):
         return list(steps), further
     return chained(steps, study.error(study.heldout(further))), further
@@ -217,43 +208,4 @@ def left_to_try(effects: Sequence[type[Effect]], fit: Fit, steps: Sequence[Step]
 def _convincing(before: Study, fewer: Fit, study: Study, fit: Fit) -> bool:
     """Whether effects that explain little each leave nothing together, or little of what was left before them."""
     error, left = before.error(before.heldout(fewer)), study.error(study.heldout(fit))
-    return not _left(study, fit)[0] or explained_share(error, left) >= LEAST_SHARE_TOGETHER
-
-
-def _left_by_many(study: Study, fit: Fit) -> tuple[str, Noise | None, str]:
-    """The same where no single grasp shows it; and what one shows, in words, where all others show noise alone."""
-    (left, noise), target = _left(study, fit), study.target
-    if not left or target.gripper.is_servo or len(target.grasps) < _MANY:
-        return left, noise, ""
-    held = study.heldout(fit)
-    for index in np.argsort(-np.nansum(held**2, axis=(1, 2))):
-        others = held.copy()
-        others[index] = np.nan
-        noise = unexpected_noise(others, study.numerical, target, fit.predicted)
-        if noise is not None or not excess(others, study.numerical, target):
-            grasp, error = target.grasps[index], rms_of_grasps(fit.residual, target)[index]
-            return "", noise, f"grasp {grasp.name} of {grasp.object} ({error:.2f} × noise)"
-    return left, None, ""
-
-
-def _is_worth_looking(study: Study, fit: Fit) -> bool:
-    """Whether a model leaves more than noise, or what seems to be stronger noise: only that none is found tells."""
-    left, noise = _left(study, fit)
-    return bool(left) or (noise is not None and noise.stronger)
-
-
-def _leaves_little(study: Study, fit: Fit, error_before: float, floor: float) -> bool:
-    """Whether effects leave next to nothing, and little of what there was before them."""
-    error = study.error(study.heldout(fit))
-    return error < _AS_GOOD_AS_NOTHING * floor and explained_share(error_before, error, noise=floor) > 1 - _LITTLE
-
-
-def _left(study: Study, fit: Fit) -> tuple[str, Noise | None]:
-    """Where held-out residuals are more than noise, in words; and the noise, if it is not as assumed."""
-    held = study.heldout(fit)
-    noise = unexpected_noise(held, study.numerical, study.target, fit.predicted)
-    # where a fit of all grasps leaves nothing no effect is missing, nor is noise larger: others say too little of a
-    # held-out one's object, or with their parameters it goes another way
-    if not excess(fit.residual, study.numerical, study.target):
-        return "", None if noise and noise.stronger else noise
-    return ("" if noise else excess(held, study.numerical, study.target)), noise
+    return not left_over(study, fit)[0] or explained_share(error, left) >= LEAST_SHARE_TOGETHER

@@ -15,6 +15,7 @@ from forcegrasp.measure.schema import MeasuredGrasp
 from forcegrasp.physics.gripper import START_VELOCITY, Gripper
 from forcegrasp.physics.plant import Plant, write_base
 from forcegrasp.physics.sensors import ReadingEffects
+from forcegrasp.replay.time_limit import check_time
 from forcegrasp.short_repr import ShortRepr
 
 #: Threads of the engine; 0 uses every core. Programs that run several diagnoses side by side set it to 1.
@@ -166,6 +167,7 @@ class Replay:
 
         Raises:
           PhysicsError: if a row diverged, and the replay is strict.
+          OutOfTimeError: if the time within which all is to be done is over.
         """
         n, rows_at_once = len(grasp), max(1, _CHUNK // self._steps)
         if n > rows_at_once:
@@ -175,6 +177,7 @@ class Replay:
                 chunk = {name: value[part] for name, value in base.items()}
                 parts.append(self.simulate(grasp[part], chunk, [_cut(e, part) for e in effects], driver_reads))
             return join(parts)
+        check_time()
         late_s = np.zeros(n)
         if not self.gripper.is_servo:
             effects = [self._at_whole_steps(e, late_s) for e in effects]
@@ -202,6 +205,7 @@ class Replay:
             position[:, 1:], force[:, 1:], objects[:, 1:] = plant.play(commands, fresh)
         else:
             for step in range(self._steps - 1):
+                check_time()
                 new = self._fresh[step, grasp]
                 if self._encoders_known:
                     plant.recorded_position = self._encoder[step, grasp]

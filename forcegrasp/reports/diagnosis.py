@@ -42,6 +42,7 @@ from forcegrasp.reports.diagnosis_words import (
     recordings_sentence,
     row_sentence,
     shares_sentence,
+    stopped_words,
 )
 from forcegrasp.reports.findings import (
     candidate_json,
@@ -70,6 +71,7 @@ def diagnosis_json(diagnosis: Diagnosis, advice: Advice | None, tried: Sequence[
         "set": name,
         "answer": answer(diagnosis),
         "verdict": diagnosis.verdict,
+        "stopped": diagnosis.stopped,
         "effects": list(diagnosis.effects),
         "preferred": list(diagnosis.preferred),
         "explained_share": diagnosis.explained,
@@ -126,7 +128,7 @@ def answer(diagnosis: Diagnosis) -> str:
     of_model, of_set = _of_model(diagnosis), fault_words(diagnosis)
     alone = f"Only {diagnosis.alone} shows more: look at it." if diagnosis.alone else ""
     parts = (of_model, of_set) if diagnosis.fault_is_rival else (of_set, of_model)
-    return " ".join(filter(None, (*parts, alone)))
+    return " ".join(filter(None, (stopped_words(diagnosis), *parts, alone)))
 
 
 def _missed_objects(d: Diagnosis) -> str:
@@ -163,7 +165,11 @@ def _of_model(diagnosis: Diagnosis) -> str:
         )
     if d.verdict is Verdict.UNKNOWN:
         best = f"{found} would only take it down to {d.error_after:.2f} ×" if found else "no effect explains it"
+        if d.stopped and not found:
+            best = f"up to {d.floor:.2f} is noise"
         missing = "Something is missing, and it is none of the effects I know"
+        if d.stopped:
+            missing = "Something is missing"
         if d.is_uneven_noise:
             missing += ", or the noise grows with speed or force"
         return (

@@ -22,6 +22,7 @@ from forcegrasp.reports.diagnosis_words import (
     odd_words,
     percent,
     shares_sentence,
+    stopped_words,
 )
 from forcegrasp.reports.html import Answer, Command
 from forcegrasp.reports.law import law_words
@@ -52,6 +53,7 @@ def answer_box(diagnosis: Diagnosis, advice: Advice | None, commands: Sequence[C
         what = f"Not the model but the set seems to be wrong: {fault.name}."
     shows_rest = (found or d.verdict is Verdict.UNKNOWN) and not is_of_labels(d)
     rows = [
+        ("Not finished", stopped_words(d) if found else ""),
         ("The set", fault_words(d) if found else ""),
         ("What is wrong", f"{fault.words[0].upper()}{fault.words[1:]}." if fault else ""),
         ("To check", f"{fault.check[0].upper()}{fault.check[1:]}." if fault else ""),

@@ -50,6 +50,14 @@ def lacks(diagnosis: Diagnosis) -> str:
     return f"{_but(diagnosis)}The model lacks {names}."
 
 
+def stopped_words(diagnosis: Diagnosis) -> str:
+    """That a search was cut short, and what that means; empty if it was not."""
+    if not diagnosis.stopped:
+        return ""
+    tried = "what is named here was found by then" if diagnosis.verdict.names_effects else "nothing was found by then"
+    return f"The search did not end, for {diagnosis.stopped}: {tried}, and not all effects were tried."
+
+
 def is_of_labels(diagnosis: Diagnosis) -> bool:
     """Whether grasps have the labels of others, so that nothing else was looked for."""
     return diagnosis.verdict is Verdict.DATA and not kept_steps(diagnosis.steps) and diagnosis.fault is None

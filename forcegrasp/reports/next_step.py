@@ -40,6 +40,10 @@ def after_diagnosis(
     """
     d, again = diagnosis, _line("diagnose", f"data={data}")
     gripper, compared = d.target.gripper, _line("compare", f"data={data}", f"model={known}")
+    if d.stopped and d.verdict.lacks_effects:
+        return [Command("go on from what was found", _line("diagnose", f"data={data}", f"model={found}"))]
+    if d.stopped:
+        return [Command("give it more time", again)]
     if d.verdict is Verdict.NOT_FITTED:
         return [Command("look for what went wrong in single recordings" if gripper.is_servo
                         else "look for grasps that went wrong", _line("compare", f"data={data}"))]  # fmt: skip

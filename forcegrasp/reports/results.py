@@ -225,6 +225,11 @@ class DiagnoseResult(Result):
         return self.diagnosis.effects
 
     @property
+    def stopped(self) -> str:
+        """Why the search ended before all was tried, in words; empty if it did not."""
+        return self.diagnosis.stopped
+
+    @property
     def error_before(self) -> float:
         """rms error on held-out grasps, without any effect."""
         return self.diagnosis.error_before

@@ -9,6 +9,7 @@ import json
 import re
 import subprocess
 import sys
+from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
@@ -17,7 +18,8 @@ from matplotlib.figure import Figure
 import forcegrasp as fg
 from forcegrasp.api import CompareResult, TableResult
 from forcegrasp.cli.main import main
-from forcegrasp.diagnosis import add_effect
+from forcegrasp.diagnosis import add_effect, diagnose_set
+from forcegrasp.diagnosis.cut_short import INTERRUPTED
 from forcegrasp.effects import get_effect
 from forcegrasp.effects.for_gripper import effects_of
 from forcegrasp.errors import ConfigError, MeasurementError
@@ -104,6 +106,25 @@ def test_seed_is_passed_on_and_checked(kind, call, work):
     assert 7 in work.calls[kind]
     with pytest.raises(ConfigError, match="seed=-1: must"):
         call("my_set", seed=-1)
+
+
+def test_minutes_limit_a_diagnosis_and_are_checked(work, monkeypatch):
+    limits = []
+    monkeypatch.setattr("forcegrasp.api.functions.time_limit", lambda m: limits.append(m) or nullcontext())
+    fg.diagnose("my_set", minutes=5)
+    fg.diagnose("my_set")
+    assert limits == [5, 0]
+    with pytest.raises(ConfigError, match="minutes=-1: must"):
+        fg.diagnose("my_set", minutes=-1)
+
+
+@pytest.mark.parametrize(("stopped", "status"), [("", 0), ("its 3 min were over", 0), (INTERRUPTED, 130)])
+def test_only_a_diagnosis_that_was_interrupted_has_another_exit_status(work, monkeypatch, stopped, status):
+    found = dataclasses.replace(work.made_up.diagnosis("effect"), stopped=stopped)
+    monkeypatch.setattr(diagnose_set, "diagnose_set", lambda *_, **__: (found, None))
+    assert fg.diagnose("my_set").stopped == stopped
+    assert main(["diagnose", "my_set", "out=there"]) == status
+    assert json.loads(Path("there/diagnosis.json").read_text())["stopped"] == stopped
 
 
 def test_effects_may_be_one_name_some_or_all(work):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import re
+import runpy
 from pathlib import Path
 
 import pytest
@@ -34,6 +35,14 @@ def test_its_options_are_shown_to_change_something(verb):
     assert not option or option in {name for name, _, _ in leaves(verb.schema)}
     tests = "".join(path.read_text("utf-8") for path in (TESTS / "config").glob("test_options_of_*.py"))
     assert verb.schema.__name__ in tests, "tests/config/test_options_of_small_verbs.py wants a case for each option"
+
+
+@pytest.mark.parametrize(("argument", "status"), [("--version", 0), ("no_verb", 2)])
+def test_the_module_exits_as_the_program_does(argument, status, monkeypatch, capsys):
+    monkeypatch.setattr("sys.argv", ["forcegrasp", argument])
+    with pytest.raises(SystemExit) as ended:
+        runpy.run_module("forcegrasp", run_name="__main__")
+    assert ended.value.code == status
 
 
 def test_usage_follows_from_what_a_verb_takes():

@@ -58,6 +58,7 @@ MEASURED_CASES: dict[type, dict[str, Any]] = {
         "out": "elsewhere",
         "effects": "[backlash]",
         "law": True,
+        "minutes": 5.0,
         "seed": 1,
     },
     AddConfig: {"data": "other", "model": "lagging.yaml", "effect": "adhesion", "out": "elsewhere"},
@@ -119,6 +120,7 @@ def begun(monkeypatch, verb: str, **values: Any) -> dict[str, Any]:
     from forcegrasp.identify.loading import Loaded
     from forcegrasp.identify.target import Target
     from forcegrasp.models.model_file import Model
+    from forcegrasp.replay import time_limit
 
     def told(value: Any) -> Any:
         match value:
@@ -153,7 +155,7 @@ def begun(monkeypatch, verb: str, **values: Any) -> dict[str, Any]:
         whole = diagnose_set.diagnose_set
 
         def noted(*arguments, law):
-            reached["law"] = law
+            reached["law"], reached["minutes"] = law, time_limit._LIMIT.get()[1]
             return whole(*arguments, law=law)
 
         monkeypatch.setattr(diagnose_set, "diagnose_set", noted)

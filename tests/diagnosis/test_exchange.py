@@ -139,7 +139,7 @@ def test_the_search_goes_on_where_noise_seems_to_be_stronger_than_said(rubbing, 
     _, target, simulators, base = rubbing
     signals = np.ones(target.signals.shape[-1])
     noise = Noise(times * signals, times * signals, signals > 0, 0 * signals, 0 * signals)
-    monkeypatch.setattr("forcegrasp.diagnosis.search._left", lambda *_: ("", noise))
+    monkeypatch.setattr("forcegrasp.diagnosis.left_over.left_over", lambda *_: ("", noise))
     looked = []
 
     def recorded(*arguments, anyway: bool = False) -> Step:

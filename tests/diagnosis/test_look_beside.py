@@ -87,9 +87,9 @@ def test_in_the_end_all_effects_are_looked_beside(monkeypatch, better):
         return after if better and place == 1 else fit
 
     monkeypatch.setattr(search, "look_beside", beside)
-    study = SimpleNamespace(target=None, error=lambda held: held, heldout=lambda _: 1.1)
+    study = SimpleNamespace(target=None, simulators=None, error=lambda held: held, heldout=lambda _: 1.1)
     steps = [Step(("one",), (), (), 3.0, 2.0), Step(("two",), (), (), 2.0, 1.5), Step((), (), (), 1.5, 1.5)]
-    left, found = search._look_beside_all(study, steps, fit, None)
+    left, found = search._look_beside_all(study, steps, fit)
     assert places == [0, 1]
     assert found is (after if better else fit)
     assert [step.error_after for step in left] == ([2.0, 1.1, 1.1] if better else [2.0, 1.5, 1.5])

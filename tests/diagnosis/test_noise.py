@@ -8,8 +8,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from forcegrasp.diagnosis.left_over import left_by_many, left_over
 from forcegrasp.diagnosis.noise_check import Noise, is_uneven_noise, unexpected_noise
-from forcegrasp.diagnosis.search import _left, _left_by_many
 from forcegrasp.diagnosis.signatures import Score, null_gains
 from forcegrasp.effects import get_effect
 from forcegrasp.effects.setting import EffectSetting
@@ -364,7 +364,7 @@ def test_what_one_grasp_alone_shows_is_told_and_is_no_missing_effect(grasps, of_
     held[:grasps, 40:60, 0] += 8.0
     fit = SimpleNamespace(residual=held, predicted=np.tile(GRASPS[:1], (MANY, 1, 1)))
     study = SimpleNamespace(target=make(MANY), numerical=(0 * held,) * 2, heldout=lambda _: held.copy())
-    left, noise, alone = _left_by_many(study, fit)
+    left, noise, alone = left_by_many(study, fit)
     assert (bool(left), noise, bool(alone)) == (of_many, None, not of_many)
     told = dataclasses.replace(made_up.diagnosis("explained"), alone=alone)
     assert ("Only grasp g0 of cup (" in diagnosis_report.answer(told)) is not of_many
@@ -376,5 +376,5 @@ def test_only_what_a_fit_of_all_grasps_leaves_can_be_more_noise(fitted, told):
     held = 0.5 * normal(0) if told is False else student(0)
     fit = SimpleNamespace(residual=fitted, predicted=GRASPS)
     study = SimpleNamespace(target=make(), numerical=NOTHING, heldout=lambda _: held)
-    left, noise = _left(study, fit)
+    left, noise = left_over(study, fit)
     assert (left, noise and noise.stronger) == ("", told)

@@ -8,10 +8,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from forcegrasp.diagnosis import search
+from forcegrasp.diagnosis import conclusion, search
 from forcegrasp.diagnosis import step as step_module
 from forcegrasp.diagnosis.families import look_alike
 from forcegrasp.diagnosis.few import with_few
+from forcegrasp.diagnosis.left_over import leaves_little
 from forcegrasp.diagnosis.odd_grasps import OddGrasp
 from forcegrasp.diagnosis.refine import refine_anyway
 from forcegrasp.diagnosis.result import Step, kept_steps
@@ -162,9 +163,10 @@ def test_a_search_fits_anyway_once_and_judges_odd_grasps_again(creeping, monkeyp
         return () if fit.problem.effects else (OddGrasp("3", "thing_0", 9.0),)
 
     monkeypatch.setattr(search, "look_further", step)
-    monkeypatch.setattr(search, "odd_grasps", odd)
-    monkeypatch.setattr(search, "_left", lambda *_: ("somewhere", None))
-    monkeypatch.setattr(search, "_leaves_little", lambda *_: False)
+    for module in (search, conclusion):
+        monkeypatch.setattr(module, "odd_grasps", odd)
+    monkeypatch.setattr("forcegrasp.diagnosis.left_over.left_over", lambda *_: ("somewhere", None))
+    monkeypatch.setattr(search, "leaves_little", lambda *_: False)
     for name in ("exchange", "split"):
         monkeypatch.setattr(search, name, lambda *_: None)
     diagnosis = search.diagnose(study.target, base, study.simulators, [SMOOTH, DELAY], np.random.default_rng(0))
@@ -182,9 +184,10 @@ def test_a_search_ends_where_little_is_left(creeping, monkeypatch, little, looks
     found, asked = looked(creeping, [SMOOTH, DELAY], anyway=True), []
     nothing = Step((), (), (), 1.05, 1.05)
     monkeypatch.setattr(search, "look_further", lambda *_, **__: asked.append(1) or (nothing if asked[1:] else found))
-    monkeypatch.setattr(search, "odd_grasps", lambda *_: ())
-    monkeypatch.setattr(search, "_left", lambda *_: ("somewhere", None))
-    monkeypatch.setattr(search, "_LITTLE", little)
+    for module in (search, conclusion):
+        monkeypatch.setattr(module, "odd_grasps", lambda *_: ())
+    monkeypatch.setattr("forcegrasp.diagnosis.left_over.left_over", lambda *_: ("somewhere", None))
+    monkeypatch.setattr("forcegrasp.diagnosis.left_over._LITTLE", little)
     diagnosis = search.diagnose(study.target, base, study.simulators, [SMOOTH, DELAY], np.random.default_rng(0))
     assert diagnosis.preferred == (("smooth_friction",))
     assert len(asked) == looks
@@ -203,7 +206,7 @@ def test_a_search_ends_where_little_is_left(creeping, monkeypatch, little, looks
 )
 def test_little_is_near_the_floor_and_a_small_part_of_what_was_beyond_it(before, after, floor, is_little):
     study = SimpleNamespace(heldout=lambda fit: None, error=lambda held: after)
-    assert search._leaves_little(study, None, before, floor) == is_little
+    assert leaves_little(study, None, before, floor) == is_little
 
 
 def test_an_effect_that_comes_back_after_it_gave_way_is_kept(made_up):

@@ -159,7 +159,7 @@ def test_what_explains_little_is_believed_together(monkeypatch, before, after, l
     def study(error: float):
         return SimpleNamespace(heldout=lambda fit: error, error=lambda held: held)
 
-    monkeypatch.setattr(search, "_left", lambda study, fit: (left, None))
+    monkeypatch.setattr(search, "left_over", lambda study, fit: (left, None))
     one, other = cast(Any, study(before)), cast(Any, study(after))
     assert search._convincing(one, cast(Any, None), other, cast(Any, None)) == believed
 
