@@ -12,15 +12,17 @@ from forcegrasp.diagnosis.doubt import leaves_less, more_likely, with_fault
 from forcegrasp.diagnosis.faults import Fault, besides, leaves_nothing, suspects
 from forcegrasp.diagnosis.late_rows import may_be_late_rows
 from forcegrasp.diagnosis.law import find_law
+from forcegrasp.diagnosis.left_out import LeaveOutFirst, is_answer, told_of, without
 from forcegrasp.diagnosis.moved_set import MovesFirst, go_on_with_moved, within_tolerance_after_all
 from forcegrasp.diagnosis.result import Diagnosis, Step
-from forcegrasp.diagnosis.search import diagnose
+from forcegrasp.diagnosis.search import MayBeGiven, diagnose
 from forcegrasp.effects import Effect
 from forcegrasp.effects.for_gripper import effect_of, effects_of
 from forcegrasp.errors import MeasurementError
 from forcegrasp.identify import fit_set
 from forcegrasp.identify.base_fit import BaseFit
 from forcegrasp.identify.fit import Fit, Simulators
+from forcegrasp.identify.intervals import listed
 from forcegrasp.identify.loading import Loaded
 from forcegrasp.identify.progress import Progress
 from forcegrasp.identify.target import Target
@@ -69,7 +71,7 @@ def diagnose_set(
         simulators: Simulators,
         base: BaseFit,
         start: tuple[Fit, Sequence[Step]] | None = None,
-        may_be_given: MovesFirst | None = None,
+        may_be_given: MayBeGiven | None = None,
     ) -> Diagnosis:
         rng = np.random.default_rng(seed + 1)
         return diagnose(target, base, simulators, chosen, rng, progress, start, may_be_given)
@@ -88,13 +90,23 @@ def diagnose_set(
         of_set: Loaded[MeasurementSet], target: Target, simulators: Simulators, base: BaseFit
     ) -> tuple[Diagnosis, tuple[Diagnosis, Simulators] | None]:
         """The diagnosis of a set, and that of the set with moves within its tolerance if it wants any."""
-        first = None if of_set.gripper.is_servo else MovesFirst(of_set)
-        found = search(target, simulators, base, may_be_given=first)
+        moves, leave_out = None if of_set.gripper.is_servo else MovesFirst(of_set), LeaveOutFirst()
+
+        def something_else_first(target: Target, fit: Fit) -> bool:
+            move = moves is not None and moves(target, fit)
+            return leave_out(target, fit) or move
+
+        found = search(target, simulators, base, may_be_given=something_else_first)
         if found.stopped:
             return found, None
         try:
             further = moved(found, of_set)
-            if further is None and first is not None and first.asked:  # it was no move after all
+            if further is None and leave_out.names:
+                rest = without_missed(of_set, target, leave_out.names)
+                if rest[0].stopped and not is_answer(rest[0]):
+                    return dataclasses.replace(found, stopped=rest[0].stopped), None
+                further = rest if is_answer(rest[0]) else None
+            if further is None and (leave_out.names or (moves is not None and moves.asked)):  # it was neither
                 again = search(target, simulators, base)
                 if again.stopped:
                     return dataclasses.replace(found, stopped=again.stopped), None
@@ -102,6 +114,18 @@ def diagnose_set(
         except REASONS as reason:
             return dataclasses.replace(found, stopped=cut_short(reason, progress)), None
         return found, further
+
+    def without_missed(
+        of_set: Loaded[MeasurementSet], target: Target, names: Sequence[str]
+    ) -> tuple[Diagnosis, Simulators]:
+        """The diagnosis without these grasps."""
+        progress(f"fitting the set without {listed(names)}, which the model misses most")
+        rest = without(of_set, names)
+        of_rest, simulators, base = fitted(rest)
+        found = search(of_rest, simulators, base, may_be_given=lambda *_: True)
+        further = None if found.stopped else moved(found, rest)
+        found, simulators = further or (found, simulators)
+        return told_of(found, names, target), simulators
 
     def as_said() -> tuple[Diagnosis, Simulators]:
         found, further = search_and_move(loaded, *said)
@@ -146,9 +170,8 @@ def diagnose_set(
                 certain = found.verdict is Verdict.DATA and not (found.left or fault.moved or fault.of_most)
                 likely = found
                 if not (certain or found.stopped):
-                    without = search(*said)
-                    stopped = without.stopped
-                    likely = dataclasses.replace(found, stopped=stopped) if stopped else more_likely(found, without)
+                    as_it_is = search(*said)
+                    likely = dataclasses.replace(more_likely(found, as_it_is), stopped=as_it_is.stopped)
                 return likely, right[1] if likely.target.grasps is right[0].grasps else said[1]
         return as_said()
 

@@ -8,8 +8,8 @@ import numpy as np
 
 from forcegrasp.diagnosis.evidence import LEAST_LEAD, is_beyond_chance
 from forcegrasp.diagnosis.faults import Fault
-from forcegrasp.diagnosis.result import Diagnosis
-from forcegrasp.diagnosis.verdict import explained_share
+from forcegrasp.diagnosis.result import Diagnosis, kept_steps
+from forcegrasp.diagnosis.verdict import EXPLAINED_FAR, explained_share
 from forcegrasp.identify.cross_validation import heldout_residual, log_likelihood, make_folds, rms
 from forcegrasp.identify.fit import Fit
 from forcegrasp.identify.target import Target
@@ -30,7 +30,8 @@ def with_fault(found: Diagnosis, fault: Fault, said: _Fitted) -> Diagnosis:
     found = dataclasses.replace(found, fault=fault, error_before=before, error_moved=right)
     if fault.moved is not None:
         return found
-    if found.verdict is Verdict.EXPLAINED:
+    nearly_all = not kept_steps(found.steps) and explained_share(before, found.error_after) >= EXPLAINED_FAR
+    if found.verdict is Verdict.EXPLAINED or (found.verdict is Verdict.UNKNOWN and nearly_all):
         return dataclasses.replace(found, verdict=Verdict.DATA, effects=(fault.name,))
     effects = (fault.name, *found.effects) if found.verdict.names_effects else ()
     return dataclasses.replace(found, effects=effects)

@@ -67,7 +67,7 @@ def odd_grasps(target: Target, fit: Fit) -> tuple[OddGrasp, ...]:
         rest = np.setdiff1d(np.arange(len(errors)), suspects)
         others = Subset(target, rest, fit)
         problem, vector = others.problem, others.fit(_coordinates(others.problem, (problem, vector))).vector
-        errors = _errors_as(target, np.arange(len(errors)), target.grasps, problem, vector)
+        errors = errors_as(target, np.arange(len(errors)), target.grasps, problem, vector)
         usual = max(1.0, float(np.median(errors[rest])))
     if not suspects.size:
         return ()
@@ -80,7 +80,7 @@ def odd_grasps(target: Target, fit: Fit) -> tuple[OddGrasp, ...]:
     for name in objects:
         pattern = next(grasp for i, grasp in enumerate(target.grasps) if grasp.object == name and i not in suspects)
         relabelled = [dataclasses.replace(g, object=name, radius_m=pattern.radius_m) for g in alone]
-        for k, error in enumerate(_errors_as(target, suspects, relabelled, problem, vector)):
+        for k, error in enumerate(errors_as(target, suspects, relabelled, problem, vector)):
             if name != alone[k].object and error < best.get(k, (np.inf, ""))[0]:
                 best[k] = (float(error), name)
     found = []
@@ -135,7 +135,7 @@ def _coordinates(problem: Problem, known: tuple[Problem, np.ndarray]) -> np.ndar
     return np.array([values.get(entry.name, x) for entry, x in zip(problem.entries, problem.start(), strict=True)])
 
 
-def _errors_as(
+def errors_as(
     target: Target, which: np.ndarray, grasps: Sequence[MeasuredGrasp], problem: Problem, vector: np.ndarray
 ) -> np.ndarray:
     """Errors of these grasps, with labels of their own, under parameters of the others."""

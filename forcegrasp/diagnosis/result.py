@@ -158,6 +158,7 @@ class Diagnosis(ShortRepr):
     #: them out.
     bolder: Diagnosis | None = None
     stopped: str = ""  #: why the search was cut short, in words; empty if it was not
+    left_out: tuple[OddGrasp, ...] = ()  #: grasps of which the rest does not speak, with what the final model leaves
     alone: str = ""  #: the one grasp that shows more than noise, in words, where all others show none; empty if none
 
     @property

@@ -59,7 +59,8 @@ def order_in_session(grasps: Sequence[MeasuredGrasp]) -> np.ndarray:
 def session_drift(target: Target, fit: Fit) -> SessionDrift | None:
     """What drifts, gain or zero, by a linear step from a fit; None unless that is some of what the fit leaves.
 
-    No effect knows which grasp it acts in: as much is enough as of an effect.
+    No effect knows which grasp it acts in: as much is enough as of an effect. But gains or zeros that are as much off
+    in all grasps must not do as well.
 
     Args:
       target: the measurements.
@@ -70,10 +71,10 @@ def session_drift(target: Target, fit: Fit) -> SessionDrift | None:
     left = left_beyond_noise(fit.residual, background, target)
     least, best = (1 - LEAST_SHARE) * max(0.0, left), None
     for of, one_unit in (("gain", forces), ("zero", np.ones_like(forces))):
-        per_unit = np.zeros((*target.signals.shape, forces.shape[-1]))
+        always = np.zeros((*target.signals.shape, forces.shape[-1]))
         for column in range(forces.shape[-1]):
-            per_unit[..., target.axis.forces.start + column, column] = order[:, None] * one_unit[..., column]
-        change, left = linear_step(target, fit, background, per_unit)
-        if left < least:
+            always[..., target.axis.forces.start + column, column] = one_unit[..., column]
+        change, left = linear_step(target, fit, background, order[:, None, None, None] * always)
+        if left < min(least, linear_step(target, fit, background, always)[1]):
             least, best = left, SessionDrift(of, change, left)
     return best

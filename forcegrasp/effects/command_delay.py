@@ -20,6 +20,7 @@ class CommandDelay(Effect):
     separates = "fast steps: a delayed response keeps its corner, a lagged one is rounded"
     parameters = (Parameter("delay_s", "time until a command acts", "s", 0.0, 0.4, 0.06, trials=(0.015, 0.05, 0.12)),)
     order = 1  # after a dead band, which is the driver's
+    least_steps = 1.0
     known_beforehand = ("",)
 
     def init(self, which: np.ndarray) -> State:

@@ -20,6 +20,7 @@ class ForceDelay(Effect):
     separates = "fast steps and first contact: a delayed force keeps its corner"
     parameters = (Parameter("delay_s", "age of a reading", "s", 0.0, 0.5, 0.08, trials=(0.01, 0.03, 0.08, 0.2)),)
     order = 4
+    least_steps = 1.0
     least_channels = 1
 
     def init(self, which: np.ndarray) -> State:

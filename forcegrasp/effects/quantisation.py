@@ -27,7 +27,7 @@ class Quantisation(Effect):
 
     @classmethod
     def trials(cls) -> np.ndarray:
-        return np.empty((0, 2))  # judged by counting, see forcegrasp.identify.rounding
+        return np.empty((0, 2))  # judged by counting, see forcegrasp.measure.rounding
 
     def read_force(self, force: np.ndarray) -> np.ndarray:
         return _round(force, self["force_step_n"])

@@ -25,6 +25,7 @@ class ReadoutSkew(Effect):
     )
     parameters = (Parameter("delay_s", "age of a position", "s", 0.0, 0.2, 0.03, trials=(0.01, 0.04)),)
     order = 8
+    least_steps = 1.0
 
     def init(self, which: np.ndarray) -> State:
         steps = self["delay_s"][which, 0] / self.dt

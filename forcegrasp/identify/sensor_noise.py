@@ -8,9 +8,9 @@ import numpy as np
 
 from forcegrasp.errors import MeasurementError
 from forcegrasp.identify.phases import HELD_S, held_for
-from forcegrasp.identify.rounding import find_step
 from forcegrasp.measure.check_copies import is_noisy
 from forcegrasp.measure.folder import show
+from forcegrasp.measure.rounding import find_step
 from forcegrasp.measure.schema import MeasuredGrasp, MeasurementSet
 
 #: Noise further than this from what the readings show is warned of, or refused.

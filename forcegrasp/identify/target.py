@@ -11,10 +11,10 @@ from forcegrasp.effects.for_gripper import effect_of
 from forcegrasp.effects.quantisation import Quantisation
 from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.identify.phases import find_phases, phases_of
-from forcegrasp.identify.rounding import find_step
 from forcegrasp.identify.sensor_noise import estimate_noise
 from forcegrasp.identify.signal_axis import SignalAxis
 from forcegrasp.identify.windows import cut
+from forcegrasp.measure.rounding import find_step
 from forcegrasp.measure.schema import MeasuredGrasp, MeasurementSet
 from forcegrasp.physics.gripper import SKEW, Gripper
 from forcegrasp.short_repr import ShortRepr

@@ -7,9 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from forcegrasp.measure.check_copies import is_noisy
+from forcegrasp.measure.rounding import find_step
 from forcegrasp.measure.samples import place
 from forcegrasp.measure.schema import MeasurementSet
 
+# Readings that are rounded to steps of more than this share of what they scatter by agree by chance too often.
+_COARSE = 0.1
 # So few may agree by chance, as rows and as a share of them; and so many times those that agree with the last but one.
 _LEAST, _LEAST_SHARE, _TIMES = 5, 0.005, 3
 
@@ -21,7 +24,8 @@ def check_repeats(measured: MeasurementSet) -> list[str]:
         signals = [grasp.signals()[name] for grasp in measured.grasps]
         repeats, by_chance = _repeats(signals)
         count, rows = sum(int(one.sum()) for one in repeats), sum(len(one) for one in repeats)
-        if count < max(_LEAST, _LEAST_SHARE * rows, _TIMES * by_chance) or not is_noisy(signals):
+        few = count < max(_LEAST, _LEAST_SHARE * rows, _TIMES * by_chance)
+        if few or not is_noisy(signals) or _is_coarse(signals):
             continue
         first = next(i for i, one in enumerate(repeats) if one.any())
         where = place(measured.path, measured.grasps[first], int(repeats[first].argmax()), name)
@@ -30,6 +34,12 @@ def check_repeats(measured: MeasurementSet) -> list[str]:
             " sensor with noise does not give: did messages not arrive, and was the last one kept?"
         )
     return warnings
+
+
+def _is_coarse(signals: Sequence[np.ndarray]) -> bool:
+    """Whether a sensor's steps are no smaller than its noise, by the changes between its readings."""
+    changes = np.abs(np.concatenate([np.diff(signal) for signal in signals]))
+    return find_step(np.concatenate(signals)) > _COARSE * float(np.median(changes))
 
 
 def _repeats(signals: Sequence[np.ndarray]) -> tuple[list[np.ndarray], int]:

@@ -34,6 +34,7 @@ from forcegrasp.reports.diagnosis_words import (
     fault_words,
     is_of_labels,
     lacks,
+    left_out_words,
     left_sentence,
     left_share,
     noise_words,
@@ -83,6 +84,7 @@ def diagnosis_json(diagnosis: Diagnosis, advice: Advice | None, tried: Sequence[
         },
         "law": law_json(diagnosis.law),
         "odd_grasps": [dataclasses.asdict(grasp) for grasp in diagnosis.odd],
+        "left_out": [dataclasses.asdict(grasp) for grasp in diagnosis.left_out],
         "alone": diagnosis.alone,
         "uneven_noise": diagnosis.is_uneven_noise,
         "steps": [_step_json(step, diagnosis) for step in diagnosis.steps],
@@ -128,7 +130,7 @@ def answer(diagnosis: Diagnosis) -> str:
     of_model, of_set = _of_model(diagnosis), fault_words(diagnosis)
     alone = f"Only {diagnosis.alone} shows more: look at it." if diagnosis.alone else ""
     parts = (of_model, of_set) if diagnosis.fault_is_rival else (of_set, of_model)
-    return " ".join(filter(None, (stopped_words(diagnosis), *parts, alone)))
+    return " ".join(filter(None, (stopped_words(diagnosis), *parts, alone, left_out_words(diagnosis))))
 
 
 def _missed_objects(d: Diagnosis) -> str:

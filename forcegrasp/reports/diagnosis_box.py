@@ -16,6 +16,7 @@ from forcegrasp.reports.diagnosis_words import (
     is_not_all,
     is_of_labels,
     lacks,
+    left_out_words,
     left_sentence,
     left_share,
     noise_words,
@@ -54,6 +55,7 @@ def answer_box(diagnosis: Diagnosis, advice: Advice | None, commands: Sequence[C
     shows_rest = (found or d.verdict is Verdict.UNKNOWN) and not is_of_labels(d)
     rows = [
         ("Not finished", stopped_words(d) if found else ""),
+        ("Left out", left_out_words(d).removeprefix("Left out: ") if found else ""),
         ("The set", fault_words(d) if found else ""),
         ("What is wrong", f"{fault.words[0].upper()}{fault.words[1:]}." if fault else ""),
         ("To check", f"{fault.check[0].upper()}{fault.check[1:]}." if fault else ""),

@@ -58,6 +58,19 @@ def stopped_words(diagnosis: Diagnosis) -> str:
     return f"The search did not end, for {diagnosis.stopped}: {tried}, and not all effects were tried."
 
 
+def left_out_words(diagnosis: Diagnosis) -> str:
+    """Which grasps the diagnosis does not speak of, and why; empty if it speaks of all."""
+    if not diagnosis.left_out:
+        return ""
+    under = "× noise under the model that was found"
+    named = listed([f"grasp {g.name} of {g.object} ({g.error:.1f} {under})" for g in diagnosis.left_out])
+    one = len(diagnosis.left_out) == 1
+    return (
+        f"Left out: {named}, which the model misses far more than all others; what is said here is of the others alone."
+        f" {'It' if one else 'Each'} went wrong, or shook in a way that no fit can follow."
+    )
+
+
 def is_of_labels(diagnosis: Diagnosis) -> bool:
     """Whether grasps have the labels of others, so that nothing else was looked for."""
     return diagnosis.verdict is Verdict.DATA and not kept_steps(diagnosis.steps) and diagnosis.fault is None

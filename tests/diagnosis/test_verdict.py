@@ -9,7 +9,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from forcegrasp.diagnosis import search
+from forcegrasp.diagnosis import conclusion, search
 from forcegrasp.diagnosis.evidence import (
     LEAST_SHARE_OF_MANY,
     indistinguishable,
@@ -380,7 +380,8 @@ def found_by(made_up, monkeypatch):
         base = made_up.base.fit
         monkeypatch.setattr(search, "look_further", lambda *a: next(following))
         monkeypatch.setattr(search, "_fitted_anyway", lambda *a: None)
-        monkeypatch.setattr(search, "numerical_error", lambda fit, target: (0 * fit.residual + 0.1,) * 2)
+        for module in (search, conclusion):
+            monkeypatch.setattr(module, "numerical_error", lambda fit, target: (0 * fit.residual + 0.1,) * 2)
         monkeypatch.setattr(search, "Screen", lambda *a: None)
         monkeypatch.setattr(search, "with_few", lambda study, fit: study)
         effects = [get_effect(name) for name in ("force_bias", "force_drift", "backlash", "stiction")]
@@ -409,7 +410,7 @@ def test_where_the_base_fit_stopped_short_what_explains_most_is_an_answer(made_u
     bias, drift = made_up.diagnosis("one_of").steps[0].candidates
     half = dataclasses.replace(bias, fit=drift.fit)
     for candidate, most, verdict in ((bias, 0.9, "effect"), (half, 0.9, "not_fitted"), (half, 0.5, "effect")):
-        monkeypatch.setattr(search, "EXPLAINED_FAR", most)
+        monkeypatch.setattr(conclusion, "EXPLAINED_FAR", most)
         assert found_by(Step(("force_bias",), (candidate,), (), 2.0, 1.6), converged=False).verdict == verdict
 
 

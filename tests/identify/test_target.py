@@ -10,11 +10,11 @@ import pytest
 
 from forcegrasp.errors import MeasurementError
 from forcegrasp.identify.phases import PHASES, contacts, find_phases
-from forcegrasp.identify.rounding import find_step
 from forcegrasp.identify.sensor_noise import estimate_noise
 from forcegrasp.identify.signal_axis import SignalAxis
 from forcegrasp.identify.target import make_target
 from forcegrasp.measure import MeasuredGrasp, MeasurementSet
+from forcegrasp.measure.rounding import find_step
 from forcegrasp.physics.gripper_file import load_gripper
 
 SIGMA_M, SIGMA_N = 3e-5, 0.02

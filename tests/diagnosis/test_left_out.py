@@ -1,0 +1,101 @@
+"""One grasp that no fit can follow must not hide what all others show."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections import Counter
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from forcegrasp.diagnosis.diagnose_set import diagnose_set
+from forcegrasp.diagnosis.left_out import is_answer, most_missed, without
+from forcegrasp.identify.verdict import Verdict
+from forcegrasp.reports.diagnosis import answer, diagnosis_json
+from forcegrasp.reports.diagnosis_box import answer_box
+from tests.diagnosis.test_faults_of_the_set import silent, with_model
+from tests.light_set import light_set
+
+OBJECTS = ("a", "b", "c")
+
+
+def missed(*errors: float, servo: bool = False) -> tuple[str, ...]:
+    """Of twelve grasps of three objects, one after the other; the first ones are missed by so much, the rest by 3."""
+    errors = (*errors, *[3.0] * (12 - len(errors)))
+    grasps = tuple(SimpleNamespace(name=str(i), object=OBJECTS[i % 3]) for i in range(12))
+    target = SimpleNamespace(gripper=SimpleNamespace(is_servo=servo), grasps=grasps, mask=np.ones((12, 5), bool))
+    return most_missed(target, SimpleNamespace(residual=np.array(errors)[:, None, None] * np.ones((12, 5, 4))))  # pyright: ignore
+
+
+def test_those_that_are_missed_far_more_than_the_rest_are_the_few_to_leave_out():
+    assert missed(8.0, 9.0) == ("1", "0")
+    assert missed(8.0, 7.0) == ("0",)
+    assert missed() == ()
+
+
+def test_none_is_where_many_are_missed_or_noise_is_all_or_windows_are_of_a_servo():
+    assert missed(8.0, 8.0, 8.0) == ()
+    assert missed(8.0, servo=True) == ()
+    grasps = tuple(SimpleNamespace(name=str(i), object="a") for i in range(12))
+    target = SimpleNamespace(gripper=SimpleNamespace(is_servo=False), grasps=grasps, mask=np.ones((12, 5), bool))
+    residual = np.full((12, 5, 4), 0.5)
+    residual[0] *= 4
+    assert most_missed(target, SimpleNamespace(residual=residual)) == ()  # pyright: ignore[reportArgumentType]
+
+
+def test_an_object_keeps_two_grasps():
+    grasps = tuple(SimpleNamespace(name=str(i), object="a" if i < 3 else "b") for i in range(12))
+    target = SimpleNamespace(gripper=SimpleNamespace(is_servo=False), grasps=grasps, mask=np.ones((12, 5), bool))
+    residual = np.ones((12, 5, 4))
+    residual[[0, 1]] = 9
+    assert most_missed(target, SimpleNamespace(residual=residual)) == ("0",)  # pyright: ignore[reportArgumentType]
+
+
+@pytest.mark.parametrize(
+    ("verdict", "left", "after", "good"),
+    [
+        ("effect", "", 1.0, True),
+        ("effect", "in all", 1.2, True),
+        ("effect", "in all", 3.0, False),
+        ("unknown", "", 1.0, False),
+        ("explained", "", 1.0, False),
+    ],
+)
+def test_only_effects_that_explain_as_good_as_all_of_the_rest_are_an_answer(made_up, verdict, left, after, good):
+    found = dataclasses.replace(made_up.diagnosis(verdict), left=left, error_before=5.0, error_after=after, floor=1.0)
+    assert is_answer(found) == good
+
+
+@pytest.fixture(scope="module")
+def shaken():
+    """Twelve grasps whose force sensors read too little, but for one in which an object shook."""
+    loaded, model = with_model(light_set("force_deadzone threshold_n=0.1", grasps=12))
+    rng = np.random.default_rng(0)
+    bad = loaded.measured.grasps[7]
+    shaking = dataclasses.replace(bad, force_n=bad.force_n * (1 + 4 * rng.choice([-1, 1], (len(bad.time_s), 1))))
+    grasps = tuple(shaking if g is bad else g for g in loaded.measured.grasps)
+    return dataclasses.replace(loaded, measured=dataclasses.replace(loaded.measured, grasps=grasps)), model
+
+
+def test_a_grasp_that_shook_is_left_out_and_told(shaken):
+    loaded, model = shaken
+    diagnosis, _ = diagnose_set(loaded, model, ["force_deadzone", "command_delay"], 0, silent)
+    assert (diagnosis.verdict, diagnosis.effects) == (Verdict.EFFECT, ("force_deadzone",))
+    assert [grasp.name for grasp in diagnosis.left_out] == ["7"]
+    assert diagnosis.error_after < 1.2 < 2 < diagnosis.left_out[0].error
+    assert "7" not in {grasp.name for grasp in diagnosis.target.grasps}
+    told = f"Left out: grasp 7 of {diagnosis.left_out[0].object} ("
+    assert told in answer(diagnosis)
+    rows = dict(answer_box(diagnosis, None, ()).rows)
+    assert rows["Left out"].startswith("grasp 7 of ")
+    (of_json,) = diagnosis_json(diagnosis, None, [], "s")["left_out"]
+    assert of_json["name"] == "7"
+
+
+def test_a_set_without_grasps_has_all_others(shaken):
+    loaded, _ = shaken
+    rest = without(loaded, ["7", "2"])
+    left = [grasp.name for grasp in rest.measured.grasps]
+    assert left == [g.name for g in loaded.measured.grasps if g.name not in ("7", "2")]
+    assert Counter(left).most_common(1)[0][1] == 1
