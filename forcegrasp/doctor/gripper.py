@@ -20,6 +20,8 @@ _NOISE = 0.5
 _MISSED = 0.1
 # Share of their inertia that motors may get from the integrator.
 _HEAVIER = 0.1
+# Speed at which half of its dry friction may let an object creep, m/s: 0.1 mm in a second.
+_CREEPS = 1e-4
 _PAGE = "see docs/your-gripper.md"
 
 
@@ -101,6 +103,9 @@ def _grasp(gripper: Gripper) -> Iterator[Finding]:
     if (heavier := _heavier(plant)) > _HEAVIER:
         told = f"implicit steps of {1e3 * plant.dt:g} ms make motors {100 * heavier:.0f} % heavier than the scene says"
         yield note("time step", f"{told}, and forces that are fitted to a set with them; shorter steps do so less")
+    if (speed := _creep(gripper, plant)) > _CREEPS:
+        told = f"creeps by {1e3 * speed:.2g} mm a second under half of its frictionloss; dry friction would hold it"
+        yield note("object", f"{told}; make it harder by solreffriction and solimpfriction, {_PAGE}")
     noise = np.array([gripper.training.position_std] * place.shape[1] + [gripper.training.force_std_n] * force.shape[1])
     other = np.concatenate(_pressed(gripper, Plant(gripper, 1, threads=1, other_collisions=True)), axis=1)
     if not noise.any():
@@ -141,6 +146,21 @@ def _heavier(plant: Plant) -> float:
         per_speed = -model.actuator_biasprm[plant.actuators, 2] * model.actuator_gear[plant.actuators, 0] ** 2
         resists += np.where(of_joints, per_speed, 0.0)
     return float(np.max(plant.dt * resists / plant.inertia[0]))
+
+
+def _creep(gripper: Gripper, plant: Plant) -> float:
+    """Speed at which the object creeps under half of its joint's ``frictionloss``, m/s; 0 if it has none.
+
+    MuJoCo's documentation, Computation, "Constraint model": a₁ + d b v = (1 − d) a₀, with an impedance d and a damping
+    b; a₁ = 0 once it creeps.
+    """
+    model = plant.model
+    joint = model.joint(gripper.object_joint)
+    dof = int(joint.dofadr[0])
+    (constant, damping), (impedance, most, *_) = model.dof_solref[dof], model.dof_solimp[dof]
+    pushed = 0.5 * model.dof_frictionloss[dof] * model.dof_invweight0[dof]
+    by_speed = 2 / (most * max(constant, 2 * plant.dt)) if constant > 0 else -damping / most
+    return float((1 - impedance) / impedance * pushed / by_speed)
 
 
 def _pressed(gripper: Gripper, plant: Plant) -> tuple[np.ndarray, np.ndarray]:

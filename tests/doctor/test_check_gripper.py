@@ -6,11 +6,12 @@ import dataclasses
 from collections.abc import Callable
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pytest
 
 from forcegrasp.cli.main import main
-from forcegrasp.doctor.gripper import _heavier, check_gripper
+from forcegrasp.doctor.gripper import _creep, _heavier, check_gripper
 from forcegrasp.physics import load_gripper, shipped_grippers
 from forcegrasp.physics.plant import Plant
 
@@ -66,6 +67,28 @@ def test_how_much_heavier_steps_make_a_motor_is_what_a_push_shows(changed, servo
     still, pushed = (_speed_after_a_step(plant, push) for push in (0.0, 0.5))
     inertia = 0.5 * plant.dt / (pushed - still)
     assert inertia / plant.inertia[0] == pytest.approx(1 + _heavier(plant), rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("lines", "told"),
+    [
+        ('frictionloss="0.6"', True),
+        ('frictionloss="0.6" solreffriction="-100 -50"', True),
+        ('frictionloss="0.6" solreffriction="0.004 1" solimpfriction="0.999 0.9999 0.001"', False),
+    ],
+)
+def test_how_fast_an_object_creeps_on_its_table_is_what_a_push_shows(changed, lines, told):
+    path = changed(xml={'damping="2" frictionloss="0.1"': lines})
+    gripper = load_gripper(path)
+    plant = Plant(gripper, 1, threads=1)
+    model, dof = plant.model, int(plant.model.joint(gripper.object_joint).dofadr[0])
+    data = mujoco.MjData(model)
+    data.qpos[model.joint(gripper.object_joint).qposadr[0]] += 0.2  # out of reach of the fingers
+    data.qfrc_applied[dof] = 0.3
+    for _ in range(1000):
+        mujoco.mj_step(model, data)
+    assert data.qvel[dof] == pytest.approx(_creep(gripper, plant), rel=0.02)
+    assert any("creeps by" in line for line in said(path).get("note", [])) == told
 
 
 def test_a_contact_of_one_impedance_is_as_stiff_as_its_solref_says(changed):
