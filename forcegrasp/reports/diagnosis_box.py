@@ -45,7 +45,7 @@ def answer_box(diagnosis: Diagnosis, advice: Advice | None, commands: Sequence[C
     shares = d.shares() if found else {}
     shares |= {"left" if d.left else "noise": left_share(d)} if shares else {}
     fall = f"{d.error_of_base:.2f} → {d.error_after:.2f} × the sensor noise on held-out {d.target.part}s"
-    left = left_sentence(d).removeprefix("what is left is ")
+    left, left_out = left_sentence(d).removeprefix("what is left is "), left_out_words(d).removeprefix("Left out: ")
     # of rivals the next command tells which grasp to record
     record = advice.sentence().removeprefix("record next: ") if advice and d.verdict is not Verdict.ONE_OF else ""
     fault = d.fault if d.verdict is Verdict.DATA and not kept_steps(d.steps) else None  # that is all that was found
@@ -55,7 +55,7 @@ def answer_box(diagnosis: Diagnosis, advice: Advice | None, commands: Sequence[C
     shows_rest = (found or d.verdict is Verdict.UNKNOWN) and not is_of_labels(d)
     rows = [
         ("Not finished", stopped_words(d) if found else ""),
-        ("Left out", left_out_words(d).removeprefix("Left out: ") if found else ""),
+        ("Left out", left_out[:1].upper() + left_out[1:] if found else ""),
         ("The set", fault_words(d) if found else ""),
         ("What is wrong", f"{fault.words[0].upper()}{fault.words[1:]}." if fault else ""),
         ("To check", f"{fault.check[0].upper()}{fault.check[1:]}." if fault else ""),

@@ -88,7 +88,7 @@ def test_a_grasp_that_shook_is_left_out_and_told(shaken):
     told = f"Left out: grasp 7 of {diagnosis.left_out[0].object} ("
     assert told in answer(diagnosis)
     rows = dict(answer_box(diagnosis, None, ()).rows)
-    assert rows["Left out"].startswith("grasp 7 of ")
+    assert rows["Left out"].startswith("Grasp 7 of ")
     (of_json,) = diagnosis_json(diagnosis, None, [], "s")["left_out"]
     assert of_json["name"] == "7"
 
