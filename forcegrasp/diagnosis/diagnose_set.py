@@ -14,7 +14,12 @@ from forcegrasp.diagnosis.faults import Fault, besides, leaves_nothing, suspects
 from forcegrasp.diagnosis.late_rows import may_be_late_rows
 from forcegrasp.diagnosis.law import find_law
 from forcegrasp.diagnosis.left_out import LeaveOutFirst, is_answer, told_of, without
-from forcegrasp.diagnosis.moved_set import MovesFirst, go_on_with_moved, within_tolerance_after_all
+from forcegrasp.diagnosis.moved_set import (
+    MovesFirst,
+    go_on_with_moved,
+    timing_within_tolerance_after_all,
+    within_tolerance_after_all,
+)
 from forcegrasp.diagnosis.result import Diagnosis, Step
 from forcegrasp.diagnosis.search import MayBeGiven, diagnose
 from forcegrasp.effects import Effect
@@ -71,6 +76,7 @@ def diagnose_set(
         target, simulators, base = said
         nothing = diagnose(target, base, simulators, [], np.random.default_rng(seed + 1), progress)
         diagnosis = dataclasses.replace(nothing, stopped=stopped)
+    diagnosis = timing_within_tolerance_after_all(diagnosis, loaded)
     sought, found = law and not diagnosis.stopped, None
     if sought:
         try:

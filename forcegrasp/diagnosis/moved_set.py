@@ -10,14 +10,15 @@ import numpy as np
 
 from forcegrasp.diagnosis.evidence import LEAST_LEAD, LEAST_SHARE_OF_MANY, is_beyond_chance, rivals_in
 from forcegrasp.diagnosis.families import refit_without, roughly_as
-from forcegrasp.diagnosis.faults import Fault, within_tolerance
+from forcegrasp.diagnosis.faults import Fault, besides, within_tolerance
 from forcegrasp.diagnosis.few import with_few
 from forcegrasp.diagnosis.needless import drop_all_needless
 from forcegrasp.diagnosis.result import Candidate, Diagnosis, Step, kept_steps
 from forcegrasp.diagnosis.study import Study
-from forcegrasp.diagnosis.tolerance import all_radii, may_be_moved
+from forcegrasp.diagnosis.tolerance import all_radii, may_be_moved, time_of_reading
 from forcegrasp.diagnosis.verdict import LEAST_SHARE
 from forcegrasp.effects.object_size import ObjectSize
+from forcegrasp.effects.readout_skew import ReadoutSkew
 from forcegrasp.identify.base_fit import BaseFit
 from forcegrasp.identify.cross_validation import evidence_folds
 from forcegrasp.identify.fit import Fit, Simulators, fit_exactly
@@ -67,6 +68,33 @@ def within_tolerance_after_all(found: Diagnosis, loaded: Loaded[MeasurementSet])
     steps = tuple(one for one in found.steps if one is not step)
     others = tuple(name for name in found.effects if name != ObjectSize.name)
     verdict = found.verdict if others else Verdict.EXPLAINED
+    return dataclasses.replace(found, verdict=verdict, effects=others, steps=steps, fault=fault)
+
+
+def timing_within_tolerance_after_all(found: Diagnosis, loaded: Loaded[MeasurementSet]) -> Diagnosis:
+    """The diagnosis without positions that are late by no more than the set's tolerance: that is told as moved.
+
+    Another integrator is half a step ahead or behind, and such a delay takes a little off whatever else is missing.
+
+    Args:
+      found: of the set as it is, or moved or put right.
+      loaded: the set.
+    """
+    step = next((step for step in kept_steps(found.steps) if step.effects == (ReadoutSkew.name,)), None)
+    if step is None or not step.candidates or loaded.gripper.is_servo or found.fault_is_rival:
+        return found
+    (delay_s,) = found.fit.effect(ReadoutSkew.name).values.tolist()
+    moved = time_of_reading(loaded.measured, found.target, delay_s)
+    if moved is None:
+        return found
+    right = loaded if found.fault is None else found.fault.put_right
+    fault = Fault("timing_tolerance", moved.words(), moved.check, right, moved)
+    if found.fault is not None:
+        fault = besides(found.fault, fault)
+    steps = tuple(one for one in found.steps if one is not step)
+    others, verdict = tuple(name for name in found.effects if name != ReadoutSkew.name), found.verdict
+    if not others:
+        verdict = Verdict.UNKNOWN if found.left else Verdict.EXPLAINED
     return dataclasses.replace(found, verdict=verdict, effects=others, steps=steps, fault=fault)
 
 

@@ -138,6 +138,14 @@ def all_radii(measured: MeasurementSet, target: Target, move_m: float) -> Moved 
     return Moved(numbers, np.full(len(numbers), move_m / measured.radius_std_m))
 
 
+def time_of_reading(measured: MeasurementSet, target: Target, delay_s: float) -> Moved | None:
+    """The time of reading moved by so much, s; None if that is more than the tolerance of what is given leaves open."""
+    numbers = tuple(number for number in _numbers(measured, target) if number.kind == SKEW)
+    if not numbers[0].std or abs(delay_s) > _NO_SURPRISE * numbers[0].std:
+        return None
+    return Moved(numbers, np.array([delay_s / numbers[0].std]))
+
+
 def move_given(measured: MeasurementSet, target: Target, fit: Fit, worth: float = WORTH) -> Moved | None:
     """What :func:`wanted_moves` says, if that is within the tolerance of what is given; else None."""
     moved = wanted_moves(measured, target, fit, worth)
