@@ -220,6 +220,8 @@ class _Start:
         """
         name, own = best.effect.name, best.effect
         alike = families.look_alikes_of(own, effects, of_any_family=best.share < EXPLAINED_FAR)
+        # what contains it leaves less whatever is missing: it takes its place in the next step, if it earns that
+        alike = [effect for effect in alike if name not in {nested.effect for nested in effect.contains}]
         for effect in alike:
             self._study.progress(f"trying {effect.name} in place of {name}")
         fits = refine_anyway(alike, self._study, best.fit, name)
