@@ -54,8 +54,9 @@ def stopped_words(diagnosis: Diagnosis) -> str:
     """That a search was cut short, and what that means; empty if it was not."""
     if not diagnosis.stopped:
         return ""
-    tried = "what is named here was found by then" if diagnosis.verdict.names_effects else "nothing was found by then"
-    return f"The search did not end, for {diagnosis.stopped}: {tried}, and not all effects were tried."
+    named = diagnosis.verdict.names_effects or diagnosis.fault is not None
+    found = "what is named here was found by then" if named else "nothing was found by then"
+    return f"The search did not end, for {diagnosis.stopped}: {found}, and not all effects were tried."
 
 
 def left_out_words(diagnosis: Diagnosis) -> str:

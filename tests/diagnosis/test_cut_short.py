@@ -11,6 +11,7 @@ import pytest
 from forcegrasp.cli.diagnose import sigterm_as_ctrl_c
 from forcegrasp.diagnosis.cut_short import INTERRUPTED
 from forcegrasp.diagnosis.diagnose_set import diagnose_set
+from forcegrasp.diagnosis.faults import Fault
 from forcegrasp.diagnosis.search import diagnose
 from forcegrasp.diagnosis.step import look_further
 from forcegrasp.effects.for_gripper import effect_of
@@ -112,6 +113,12 @@ def test_the_answer_says_first_that_not_all_was_tried(made_up, verdict, told, ne
     assert [command.line for command in commands] == [next_line]
     shown = answer_box(found, None, commands)
     assert told in " ".join([shown.what, *(text for _, text in shown.rows)])
+
+
+def test_a_fault_of_the_set_that_was_found_is_not_nothing(made_up):
+    fault = Fault("object_radius", "the radius of foam is 22.0 mm, the set says 23.5 mm", "", made_up.loaded)
+    found = dataclasses.replace(made_up.diagnosis("unknown"), stopped=INTERRUPTED, fault=fault)
+    assert answer(found).startswith("The search did not end, for it was interrupted: what is named here was found")
 
 
 def test_a_schedulers_signal_ends_it_as_ctrl_c_does():
