@@ -17,6 +17,7 @@ from forcegrasp.identify.base_fit import BaseFit
 from forcegrasp.identify.comparison import Comparison
 from forcegrasp.identify.cross_validation import rms
 from forcegrasp.identify.fitted_model import model_of
+from forcegrasp.identify.intervals import listed
 from forcegrasp.identify.loading import Loaded
 from forcegrasp.identify.noise_floor import numerical_error
 from forcegrasp.identify.target import Target
@@ -245,7 +246,12 @@ class DiagnoseResult(Result):
         diagnosis = self.diagnosis
         if not self.verdict.names_effects:
             return self._base_model
-        return model_of(diagnosis.fit, diagnosis.target, self.data, diagnosis.numerical)
+        model = model_of(diagnosis.fit, diagnosis.target, self.data, diagnosis.numerical)
+        if not diagnosis.left_out:
+            return model
+        names = listed([grasp.name for grasp in diagnosis.left_out])
+        warning = f"fitted without {names}, which the model misses far more than all other grasps"
+        return dataclasses.replace(model, warnings=(warning, *model.warnings))
 
     @cached_property
     def _base_model(self) -> Model:

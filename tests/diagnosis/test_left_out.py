@@ -14,6 +14,7 @@ from forcegrasp.diagnosis.left_out import is_answer, most_missed, without
 from forcegrasp.identify.verdict import Verdict
 from forcegrasp.reports.diagnosis import answer, diagnosis_json
 from forcegrasp.reports.diagnosis_box import answer_box
+from forcegrasp.reports.results import DiagnoseResult
 from tests.diagnosis.test_faults_of_the_set import silent, with_model
 from tests.light_set import light_set
 
@@ -91,6 +92,8 @@ def test_a_grasp_that_shook_is_left_out_and_told(shaken):
     assert rows["Left out"].startswith("Grasp 7 of ")
     (of_json,) = diagnosis_json(diagnosis, None, [], "s")["left_out"]
     assert of_json["name"] == "7"
+    result = DiagnoseResult(loaded, diagnosis, None, (), ())
+    assert result.model.warnings[0].startswith("fitted without 7, which the model misses far more")
 
 
 def test_a_set_without_grasps_has_all_others(shaken):
