@@ -62,9 +62,12 @@ def without(loaded: Loaded[MeasurementSet], names: Sequence[str]) -> Loaded[Meas
 
 
 def is_answer(found: Diagnosis) -> bool:
-    """Whether effects explain as good as all that the other grasps show: else nothing was gained by leaving out any."""
+    """Whether effects explain as good as all that the other grasps show: else nothing was gained by leaving out any.
+
+    Or all that the model with them can foretell: others may shake as well, a little.
+    """
     little = not found.left or (found.explained >= EXPLAINED_FAR and found.error_after <= MUCH * found.floor)
-    return found.verdict.lacks_effects and little
+    return found.verdict.lacks_effects and (little or found.error_after <= found.floor_of_model)
 
 
 def told_of(found: Diagnosis, names: Sequence[str], target: Target) -> Diagnosis:

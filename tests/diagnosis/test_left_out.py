@@ -68,6 +68,13 @@ def test_only_effects_that_explain_as_good_as_all_of_the_rest_are_an_answer(made
     assert is_answer(found) == good
 
 
+@pytest.mark.parametrize(("of_model", "good"), [(2.9, False), (3.1, True)])
+def test_so_are_effects_that_leave_no_more_than_their_model_can_foretell(made_up, monkeypatch, of_model, good):
+    found = dataclasses.replace(made_up.diagnosis("effect"), left="in all", error_after=3.0, floor=1.0)
+    monkeypatch.setattr(type(found), "floor_of_model", of_model)
+    assert is_answer(found) == good
+
+
 @pytest.fixture(scope="module")
 def shaken():
     """Twelve grasps whose force sensors read too little, but for one in which an object shook."""
