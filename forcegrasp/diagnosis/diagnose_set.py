@@ -73,9 +73,8 @@ def diagnose_set(
         diagnosis, simulators = _put_right_or_as_said(ways, loaded, said)
     except REASONS as reason:  # before any search had begun
         stopped = cut_short(reason, progress)
-        target, simulators, base = said
-        nothing = diagnose(target, base, simulators, [], np.random.default_rng(seed + 1), progress)
-        diagnosis = dataclasses.replace(nothing, stopped=stopped)
+        nothing = dataclasses.replace(ways, effects=[]).search(*said)
+        diagnosis, simulators = dataclasses.replace(nothing, stopped=stopped), said[1]
     diagnosis = timing_within_tolerance_after_all(diagnosis, loaded)
     sought, found = law and not diagnosis.stopped, None
     if sought:

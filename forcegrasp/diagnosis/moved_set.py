@@ -65,10 +65,7 @@ def within_tolerance_after_all(found: Diagnosis, loaded: Loaded[MeasurementSet])
     if moved is None:
         return found
     fault = Fault("object_tolerance", f"all radii by {1e3 * move_m:+.2g} mm", moved.check, loaded, moved)
-    steps = tuple(one for one in found.steps if one is not step)
-    others = tuple(name for name in found.effects if name != ObjectSize.name)
-    verdict = found.verdict if others else Verdict.EXPLAINED
-    return dataclasses.replace(found, verdict=verdict, effects=others, steps=steps, fault=fault)
+    return _told_as_moved(found, step, fault)
 
 
 def timing_within_tolerance_after_all(found: Diagnosis, loaded: Loaded[MeasurementSet]) -> Diagnosis:
@@ -91,8 +88,13 @@ def timing_within_tolerance_after_all(found: Diagnosis, loaded: Loaded[Measureme
     fault = Fault("timing_tolerance", moved.words(), moved.check, right, moved)
     if found.fault is not None:
         fault = besides(found.fault, fault)
+    return _told_as_moved(found, step, fault)
+
+
+def _told_as_moved(found: Diagnosis, step: Step, fault: Fault) -> Diagnosis:
+    """The diagnosis without a step whose one effect is a move within the tolerance."""
     steps = tuple(one for one in found.steps if one is not step)
-    others, verdict = tuple(name for name in found.effects if name != ReadoutSkew.name), found.verdict
+    others, verdict = tuple(name for name in found.effects if name not in step.effects), found.verdict
     if not others:
         verdict = Verdict.UNKNOWN if found.left else Verdict.EXPLAINED
     return dataclasses.replace(found, verdict=verdict, effects=others, steps=steps, fault=fault)

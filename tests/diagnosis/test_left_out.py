@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections import Counter
 from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -18,15 +19,14 @@ from forcegrasp.reports.results import DiagnoseResult
 from tests.diagnosis.test_faults_of_the_set import silent, with_model
 from tests.light_set import light_set
 
-OBJECTS = ("a", "b", "c")
 
-
-def missed(*errors: float, servo: bool = False) -> tuple[str, ...]:
-    """Of twelve grasps of three objects, one after the other; the first ones are missed by so much, the rest by 3."""
-    errors = (*errors, *[3.0] * (12 - len(errors)))
-    grasps = tuple(SimpleNamespace(name=str(i), object=OBJECTS[i % 3]) for i in range(12))
+def missed(*errors: float, objects: str = "abc" * 4, rest: float = 3.0, servo: bool = False) -> tuple[str, ...]:
+    """Of twelve grasps of these objects; the first ones are missed by so much, the others by ``rest``."""
+    of_each = np.array([*errors, *[rest] * (12 - len(errors))])
+    grasps = tuple(SimpleNamespace(name=str(i), object=name) for i, name in enumerate(objects))
     target = SimpleNamespace(gripper=SimpleNamespace(is_servo=servo), grasps=grasps, mask=np.ones((12, 5), bool))
-    return most_missed(target, SimpleNamespace(residual=np.array(errors)[:, None, None] * np.ones((12, 5, 4))))  # pyright: ignore
+    fit = SimpleNamespace(residual=of_each[:, None, None] * np.ones((12, 5, 4)))
+    return most_missed(cast(Any, target), cast(Any, fit))
 
 
 def test_those_that_are_missed_far_more_than_the_rest_are_the_few_to_leave_out():
@@ -38,19 +38,11 @@ def test_those_that_are_missed_far_more_than_the_rest_are_the_few_to_leave_out()
 def test_none_is_where_many_are_missed_or_noise_is_all_or_windows_are_of_a_servo():
     assert missed(8.0, 8.0, 8.0) == ()
     assert missed(8.0, servo=True) == ()
-    grasps = tuple(SimpleNamespace(name=str(i), object="a") for i in range(12))
-    target = SimpleNamespace(gripper=SimpleNamespace(is_servo=False), grasps=grasps, mask=np.ones((12, 5), bool))
-    residual = np.full((12, 5, 4), 0.5)
-    residual[0] *= 4
-    assert most_missed(target, SimpleNamespace(residual=residual)) == ()  # pyright: ignore[reportArgumentType]
+    assert missed(2.0, objects="a" * 12, rest=0.5) == ()
 
 
 def test_an_object_keeps_two_grasps():
-    grasps = tuple(SimpleNamespace(name=str(i), object="a" if i < 3 else "b") for i in range(12))
-    target = SimpleNamespace(gripper=SimpleNamespace(is_servo=False), grasps=grasps, mask=np.ones((12, 5), bool))
-    residual = np.ones((12, 5, 4))
-    residual[[0, 1]] = 9
-    assert most_missed(target, SimpleNamespace(residual=residual)) == ("0",)  # pyright: ignore[reportArgumentType]
+    assert missed(9.0, 9.0, objects="aaa" + "b" * 9, rest=1.0) == ("0",)
 
 
 @pytest.mark.parametrize(
