@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 
 from forcegrasp.diagnosis.study import Few, Study
-from forcegrasp.identify.fit import Fit, Simulators
+from forcegrasp.identify.fit import Fit, Simulators, cheap_tier
 from forcegrasp.identify.target import Target
 from forcegrasp.replay.replay import Replay
 
@@ -27,7 +27,8 @@ def with_few(study: Study, fit: Fit) -> Study:
         return study
     exact, problem = study.simulators.one_model, fit.subset(keep).problem
     simulators = Simulators(problem, exact)
-    rough = simulators.cheap if exact else Replay(problem.gripper, problem.grasps, "fast")
+    tier = cheap_tier(problem.gripper, "screening")
+    rough = simulators.cheap if exact else Replay(problem.gripper, problem.grasps, tier)
     return dataclasses.replace(study, few=Few(keep, simulators, rough))
 
 

@@ -87,6 +87,7 @@ class Effect:
     alone: ClassVar[str] = ""
     #: Variants that change commands by what is commanded alone, whatever happens, so that it can be known beforehand.
     known_beforehand: ClassVar[tuple[str, ...]] = ()
+    acts_alike: ClassVar[bool] = False  #: what :meth:`act` adds is the same in every step of a grasp
     follows_motion: ClassVar[bool] = False  #: acts by a memory of positions alone, so that measured ones give it
     in_steps: ClassVar[bool] = False  #: as its size grows, what it does stays as it is, jumps, and stays again
     after_noise: ClassVar[bool] = False  #: acts on readings with their noise, as rounding does

@@ -28,6 +28,7 @@ class CoulombFriction(Effect):
     parameters = (
         Parameter("force_n", "friction F_c", "N", 0.0, 0.5, 0.03, trials=(0.005, 0.02, 0.06), follows="effort"),
     )
+    acts_alike = True
 
     def act(self) -> Contribution:
         return Contribution(friction=self["force_n"])

@@ -27,6 +27,7 @@ class FrictionAsymmetry(Effect):
     )
     contains = (Nested("coulomb_friction", at={"share": 0.0}, same={"force_n": "force_n"}),)
     order = 14
+    acts_alike = True
 
     def act(self) -> Contribution:
         return Contribution(friction=of_each(self, "force_n"))

@@ -31,6 +31,7 @@ class MotorAsymmetry(Effect):
         Parameter("damping_share", "share b of the damping", "1", -0.5, 0.5, 0.1),
     )
     order = 8
+    acts_alike = True
 
     @classmethod
     def trials(cls) -> np.ndarray:

@@ -27,6 +27,7 @@ class MotorOffset(Effect):
     )
     order = 3
     per, alone = "motor", "offset"
+    acts_alike = True
 
     @classmethod
     def trials(cls) -> np.ndarray:

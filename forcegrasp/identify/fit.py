@@ -33,7 +33,7 @@ _WORTH, _NEAR = 0.5, 2.0
 
 
 class Simulators:
-    """The replays that a fit needs: the model itself, and a cheap one where the gripper has a fast tier.
+    """The replays that a fit needs: the model itself, and a cheap one where larger steps or a fast tier make one.
 
     Slopes come from the cheap one, and values too, corrected by the difference of the two at a nearby point; so few
     evaluations of the model itself are needed, and what is fitted in the end is the model itself.
@@ -48,6 +48,9 @@ class Simulators:
         self.exact = Replay(gripper, grasps)
         cheap = "reference" if exact else cheap_tier(gripper)
         self.cheap = self.exact if cheap == "reference" else Replay(gripper, grasps, cheap)
+        #: Where a fit of the model itself takes slopes from. With larger steps those of a scene whose joints rub led a
+        #: fit along a flat valley; a sphere says that somebody compared them.
+        self.at_the_end = self.exact if gripper.fast == "none" else self.cheap
         self.step = STEP  #: of the finite differences, in coordinates
 
     @property
@@ -56,9 +59,10 @@ class Simulators:
         return self.cheap is self.exact
 
 
-def cheap_tier(gripper: Gripper) -> str:
-    """Physics tier that is good enough for slopes."""
-    return "reference" if gripper.fast == "none" else "fitting"
+def cheap_tier(gripper: Gripper, tier: str = "fitting") -> str:
+    """Physics tier that is good enough for slopes, or as rough as another; that of the model where it isn't cheaper."""
+    steps = [gripper.compile(name).opt.timestep for name in (tier, "reference")]
+    return "reference" if gripper.fast == "none" and steps[0] == steps[1] else tier
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -202,7 +206,7 @@ def descend_roughly(
 def fit_exactly(
     target: Target, problem: Problem, simulators: Simulators, start: np.ndarray, slopes: np.ndarray | None = None
 ) -> Fit:
-    """Fits the model itself, near an optimum, with slopes from the cheap one.
+    """Fits the model itself, near an optimum, with slopes from the cheap one where the gripper has a fast tier.
 
     For effects with memory, such as play: where the two models differ, no correction makes up for it.
 
@@ -211,7 +215,7 @@ def fit_exactly(
       slopes: of the first k coordinates, as they were found near the start, ``(G, S, C, k)``, which spares finding them
         there.
     """
-    local = _Local(target, problem, simulators.exact, simulators.cheap, None, simulators.step)
+    local = _Local(target, problem, simulators.exact, simulators.at_the_end, None, simulators.step)
     free = np.ones(len(problem), bool)
     start = np.clip(start, problem.low + 1e-9, problem.high - 1e-9)
     if slopes is not None:

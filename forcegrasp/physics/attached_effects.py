@@ -32,9 +32,11 @@ class AttachedEffects:
         #: Names of what :meth:`contribute` may have set to something else than 0 in its last call.
         self.given = set(Contribution._fields)
         self.readings = ReadingEffects(effects)
-        #: Whether any acts on what happens in a step, and not only on the model or by what is commanded.
+        #: Whether any acts by what happens in a step, and not only by the model, by commands, or alike in every step.
         self.act_in_steps = any(
-            effect.hooks() - {"change_model"} and not effect.is_known_beforehand for effect in effects
+            effect.hooks() - ({"change_model", "act"} if effect.acts_alike else {"change_model"})
+            and not effect.is_known_beforehand
+            for effect in effects
         )
 
     def __len__(self) -> int:

@@ -13,6 +13,7 @@ import mujoco
 import numpy as np
 
 from forcegrasp.physics.gripper_parts import Motor
+from forcegrasp.physics.opening import command_law
 
 #: Name of the sphere, after that of the object's geom.
 SPHERE = "{}_pads"
@@ -23,6 +24,9 @@ _PADS, _GROUND = 1, 2
 _LARGEST_PHASE = 0.1
 # An object has come to rest if it is slower than this after so long. m/s and seconds.
 _AT_REST, _SETTLING_S = 1e-3, 0.5
+# A grasp goes the same way where motors are never apart by this share of the way that they go. It closes within so
+# long, presses for as long and opens, and is looked at so often. Seconds.
+_SAME_WAY, _CLOSES_S, _LOOKS_S = 0.02, 0.5, 0.02
 
 
 def compile_fast(
@@ -40,20 +44,59 @@ def compile_fast(
     Raises:
       ValueError: if MuJoCo refuses the scene.
     """
-    reference = spec.compile()
-    _touch_a_sphere(spec, reference, object_geom, axis)
-    model = spec.compile()
+    _touch_a_sphere(spec, spec.compile(), object_geom, axis)
+    model = _take_larger_steps(spec.compile(), motors, object_geom, largest)
+    # To look for contacts that can be solved apart takes longer than to solve those of one gripper together.
+    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_ISLAND
+    return model
+
+
+def with_larger_steps(model: mujoco.MjModel, motors: Sequence[Motor], object_geom: str, largest: int) -> mujoco.MjModel:
+    """Returns a scene's model with larger steps, or as it is where a grasp would go another way with them.
+
+    Args:
+      model: the scene's.
+      motors, object_geom, largest: as for :func:`compile_fast`.
+    """
+    larger = _take_larger_steps(copy.copy(model), motors, object_geom, largest)
+    places, same = _places_in_a_grasp(model, motors), _places_in_a_grasp(larger, motors)
+    if np.abs(same - places).max() < _SAME_WAY * np.ptp(places):
+        return larger
+    return with_larger_steps(model, motors, object_geom, largest // 2) if largest > 2 else model
+
+
+def _places_in_a_grasp(model: mujoco.MjModel, motors: Sequence[Motor]) -> np.ndarray:
+    """Positions of the motors while they close on the object and let go of it, m or rad, ``(times, motors)``."""
+    scale, zero = command_law(motors, model)
+    drives = [model.actuator(motor.actuator).id for motor in motors]
+    joints = [model.joint(motor.joint).qposadr[0] for motor in motors]
+    stroke = np.array([abs(motor.open - motor.closed) for motor in motors])
+    data = mujoco.MjData(model)
+    if model.nkey:
+        mujoco.mj_resetDataKeyframe(model, data, 0)
+    places: list[np.ndarray] = []
+    for now in np.arange(0, 3 * _CLOSES_S, _LOOKS_S):
+        opened = np.clip(abs(now / _CLOSES_S - 1.5) - 0.5, 0, 1)
+        data.ctrl[drives] = opened * stroke * scale + zero
+        while data.time < now:
+            mujoco.mj_step(model, data)
+        places.append(data.qpos[joints].copy())
+    return np.array(places)
+
+
+def _take_larger_steps(
+    model: mujoco.MjModel, motors: Sequence[Motor], object_geom: str, largest: int
+) -> mujoco.MjModel:
+    """Returns the model, changed to take the largest steps at which its servos and contacts are resolved."""
     drives = [model.actuator(motor.actuator).id for motor in motors]
     dofs = [model.joint(motor.joint).dofadr[0] for motor in motors]
     stiffness = model.actuator_gainprm[drives, 0]
-    factor = _step_factor(model, object_geom, stiffness / _moved_inertia(reference, dofs), largest)
+    factor = _step_factor(model, object_geom, stiffness / _moved_inertia(model, dofs), largest)
     larger = (factor - 1) * model.opt.timestep
     model.opt.timestep *= factor
     # A step applies a command to all of it, on average half a step early. What the servo gains by that, stiffness
     # times half a step, is its damping's to lose.
     model.dof_damping[dofs] += stiffness * larger / 2
-    # To look for contacts that can be solved apart takes longer than to solve those of one gripper together.
-    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_ISLAND
     return model
 
 

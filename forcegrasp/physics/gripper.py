@@ -14,7 +14,7 @@ import mujoco
 import numpy as np
 
 from forcegrasp.errors import ConfigError
-from forcegrasp.physics.fast import compile_fast
+from forcegrasp.physics.fast import compile_fast, with_larger_steps
 from forcegrasp.physics.gripper_parts import BaseParameter, Channel, FieldWrite, Finger, Motor, Training
 from forcegrasp.physics.guard import silence_log
 from forcegrasp.physics.opening import OpeningLaw, measure_opening, straight_law
@@ -22,7 +22,7 @@ from forcegrasp.physics.scene_file import check_scene
 from forcegrasp.short_repr import ShortRepr, counted, cut
 
 #: Physics tiers, and how much larger than the scene's own their steps may be.
-TIERS = {"reference": 1, "fitting": 2, "fast": 4}
+TIERS = {"reference": 1, "fitting": 2, "screening": 4, "fast": 4}
 #: Parameters that the simulator itself understands; they need no `writes`.
 SPECIAL = ("force_scale", "radius_m", "offset_m")
 #: Parameter of a mechanism: how much later than a row's command its readings were taken, s. It needs no `writes`.
@@ -253,8 +253,9 @@ class Gripper(ShortRepr):
 
         Args:
           tier: ``"reference"`` is the scene as described; ``"fast"``, where the description has ``fast: sphere``, is
-            ``forcegrasp.physics.fast``; ``"fitting"`` is that with at most twice the step, whose slopes are exact
-            enough for a fit.
+            ``forcegrasp.physics.fast``. The others are for fits, with larger steps of any gripper, and the sphere where
+            the description has it: ``"screening"`` tells effects apart, and ``"fitting"``, with at most twice the step,
+            has slopes that are exact enough for a fit.
 
         Raises:
           ConfigError: if there is no such tier, or MuJoCo refuses the scene.
@@ -265,11 +266,13 @@ class Gripper(ShortRepr):
         if tier not in self._compiled:
             try:
                 spec = self.spec()
-                if TIERS[tier] == 1 or self.fast == "none":
-                    self._compiled[tier] = spec.compile()
+                if tier != "reference" and self.fast == "sphere":
+                    model = compile_fast(spec, self.motors, self.object_geom, self.axis, TIERS[tier])
+                elif tier in ("fitting", "screening") and not self.is_servo and not self.steps_as_its_drive:
+                    model = with_larger_steps(spec.compile(), self.motors, self.object_geom, TIERS[tier])
                 else:
-                    largest = TIERS[tier]
-                    self._compiled[tier] = compile_fast(spec, self.motors, self.object_geom, self.axis, largest)
+                    model = spec.compile()
+                self._compiled[tier] = model
             except (ValueError, RuntimeError) as error:
                 raise ConfigError(f"{self.model}: MuJoCo refuses it: {' '.join(str(error).split())}") from error
         return copy.copy(self._compiled[tier])

@@ -285,6 +285,7 @@ class Plant(ModelFields):
         control = np.repeat(self._ctrl[:, None], commands.shape[1], axis=1)
         commands = self.effects.commands(commands, fresh)
         control[..., self._drives] = commands * self._command_scale + self._command_zero
+        self._apply_actions()
         record = self.batch.rollout(commands.shape[1], control, record=["qpos", "sensordata"])
         sensors, scale = record["sensordata"], self.force_scale[:, None, None]
         force = self._channels_of(sensors, self._pads_of(sensors) * scale, scale)
@@ -292,7 +293,7 @@ class Plant(ModelFields):
 
     @property
     def acts_in_steps(self) -> bool:
-        """Whether an effect acts on what happens in a step, and not only on the model or by what is commanded."""
+        """Whether an effect acts by what happens in a step; see :class:`~.attached_effects.AttachedEffects`."""
         return self.effects.act_in_steps
 
     def warnings(self) -> np.ndarray:

@@ -26,6 +26,7 @@ class Contribution(NamedTuple):
 class PlantEffect(Protocol):
     """Acts on some rows of a plant; :class:`forcegrasp.effects.base.Effect` says what each hook takes and returns."""
 
+    acts_alike: ClassVar[bool]
     after_noise: ClassVar[bool]
     follows_motion: ClassVar[bool]
     rows: np.ndarray

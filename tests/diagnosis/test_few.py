@@ -72,7 +72,7 @@ def test_of_few_grasps_all_are_taken(six):
 
 def test_few_grasps_are_ranked_by_with_the_largest_steps(many):
     some, _ = with_few(many.study, many.fit).on_few(many.fit)
-    assert (some.rough.tier, some.simulators.cheap.tier, many.study.rough) == ("fast", "fitting", None)
+    assert (some.rough.tier, some.simulators.cheap.tier, many.study.rough) == ("screening", "fitting", None)
     exactly = dataclasses.replace(many.study, simulators=Simulators(many.fit.problem, exact=True))
     some, _ = with_few(exactly, many.fit).on_few(many.fit)
     assert some.rough is some.simulators.exact

@@ -9,16 +9,17 @@ import mujoco
 import numpy as np
 import pytest
 
-from forcegrasp.physics import GraspParameters, GraspSimulator
-from forcegrasp.physics.fast import compile_fast
+from forcegrasp.identify.fit import cheap_tier
+from forcegrasp.physics import GraspParameters, GraspSimulator, fast
 from forcegrasp.physics.gripper_file import load_gripper
 from forcegrasp.physics.plant import Plant
 
 TIAGO = load_gripper("tiago")
+SECOND = load_gripper(str(Path(__file__).parents[1] / "grippers" / "second.yaml"))
 
 
 def _fast(spec: mujoco.MjSpec) -> mujoco.MjModel:
-    return compile_fast(spec, TIAGO.motors, TIAGO.object_geom, TIAGO.axis)
+    return fast.compile_fast(spec, TIAGO.motors, TIAGO.object_geom, TIAGO.axis)
 
 
 def _spec(stiffness: float = 100.0, time_constant: float = 0.02) -> mujoco.MjSpec:
@@ -38,8 +39,8 @@ def test_free_fingers_move_as_with_small_steps(b2):
     for _ in range(25):
         for simulator in simulators:
             simulator.step(np.full((1, 2), -0.003))
-        slow, fast = (simulator.joint_position for simulator in simulators)
-        assert fast == pytest.approx(slow, abs=0.07e-3)
+        slow, quick = (simulator.joint_position for simulator in simulators)
+        assert quick == pytest.approx(slow, abs=0.07e-3)
 
 
 @pytest.mark.parametrize(
@@ -70,8 +71,38 @@ def test_an_object_that_never_rests_keeps_the_sphere_in_its_middle():
     assert _fast(spec).geom("object_pads").pos == pytest.approx(0)
 
 
+@pytest.mark.parametrize(
+    ("tier", "step"), [("reference", 1e-3), ("fast", 1e-3), ("fitting", 2e-3), ("screening", 4e-3)]
+)
+def test_fits_take_larger_steps_of_a_gripper_without_a_sphere(tier, step):
+    """Slopes that cost half of the time are worth it for any gripper, and the scene stays as it is described."""
+    model = SECOND.compile(tier)
+    assert (model.opt.timestep, model.ngeom) == (step, SECOND.compile().ngeom)
+
+
+@pytest.mark.parametrize("bears", [4, 2, 1])
+def test_steps_are_as_large_as_grasps_go_the_same_way_with_them(bears, monkeypatch):
+    model, places = SECOND.compile(), fast._places_in_a_grasp
+
+    def elsewhere_with_too_large_steps(changed, motors):
+        return places(changed, motors) + (0.0 if changed.opt.timestep < 1.1e-3 * bears else 1e-3)
+
+    monkeypatch.setattr(fast, "_places_in_a_grasp", elsewhere_with_too_large_steps)
+    found = fast.with_larger_steps(model, SECOND.motors, SECOND.object_geom, 4)
+    assert found.opt.timestep == pytest.approx(1e-3 * bears)
+    assert model.opt.timestep == 1e-3
+    assert (found.dof_damping != model.dof_damping).any() == (bears > 1)
+
+
+def test_a_scene_that_steps_as_its_drive_samples_keeps_its_steps():
+    drive = dataclasses.replace(SECOND, period_s=1e-3)
+    assert drive.compile("screening").opt.timestep == 1e-3
+    assert cheap_tier(drive) == "reference"
+    assert cheap_tier(SECOND) == "fitting"
+
+
 def test_a_damping_that_is_written_keeps_what_the_step_needs():
-    gripper = load_gripper(str(Path(__file__).parents[1] / "grippers" / "second.yaml"))
+    gripper = SECOND
     plant = Plant(dataclasses.replace(gripper, fast="sphere"), 2, "fast", threads=1)
     reference = Plant(gripper, 2, threads=1)
     made_up = plant.model.dof_damping - reference.model.dof_damping
@@ -93,6 +124,6 @@ def test_all_that_a_motor_moves_counts_in_its_step(name, step):
             simulator.step(np.full((1, 1), -gripper.max_step / 4))
         ends.append((simulator.joint_position, simulator.force))
     assert simulator.model.opt.timestep == step
-    (slow, slow_force), (fast, fast_force) = ends
-    assert fast == pytest.approx(slow, abs=gripper.training.position_std)
-    assert fast_force == pytest.approx(slow_force, abs=gripper.training.force_std_n)
+    (slow, slow_force), (quick, quick_force) = ends
+    assert quick == pytest.approx(slow, abs=gripper.training.position_std)
+    assert quick_force == pytest.approx(slow_force, abs=gripper.training.force_std_n)

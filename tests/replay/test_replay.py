@@ -152,14 +152,14 @@ def test_a_delay_of_a_part_of_a_step_is_as_exact_as_none_though_motors_are_at_th
 
 
 @pytest.mark.parametrize(("effect", "variant"), CASES)
-def test_what_follows_from_commands_needs_no_stop_at_each_step(effect, variant, monkeypatch):
+def test_what_follows_from_commands_or_is_alike_in_each_step_needs_no_stop_there(effect, variant, monkeypatch):
     def stopped(*_):
         raise AssertionError
 
     monkeypatch.setattr(Plant, "advance", stopped)
     simulator = Replay(TIAGO, [grasp(REGULAR)], "fast")
     one = EffectOn(effect, variant, effect.typical_values()[None], np.array([0]))
-    if variant in effect.known_beforehand:
+    if variant in effect.known_beforehand or effect.acts_alike:
         assert replayed(simulator, np.array([0]), one).any()
     elif effect.hooks() & {"command", "act", "motor_range", "interaction"} and not effect.reads_only(variant):
         with pytest.raises(AssertionError):

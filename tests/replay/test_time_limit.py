@@ -45,7 +45,7 @@ def test_no_limit_and_one_that_was_lifted_never_end_anything(clock):
 def test_a_simulation_ends_even_while_effects_act_in_its_steps(acting, monkeypatch):
     """One of all effects on all grasps takes a minute: it must not be waited for."""
     one, ids = Replay(TIAGO, [grasp(REGULAR)]), np.array([0])
-    rubs = effect_of("coulomb_friction", TIAGO)
+    rubs = effect_of("stiction", TIAGO)
     effects = [EffectOn(rubs, "", rubs.typical_values()[None], ids)] if acting else []
     base = {name: np.array([value]) for name, value in BASE.items()}
     one.simulate(ids, base, effects)
