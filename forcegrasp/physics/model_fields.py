@@ -20,7 +20,7 @@ from forcegrasp.physics.scene_layout import SceneLayout
 
 # Constraint that holds a finger against dry friction: as stiff as the step allows, lest it creeps under load.
 _STIFF_SOLREF = (0.004, 1.0)
-_STIFF_SOLIMP = (0.99, 0.9999, 0.001, 0.5, 2.0)
+_STIFF_SOLIMP = (0.999, 0.9999, 0.001, 0.5, 2.0)
 
 
 class ModelFields(SceneLayout):

@@ -58,7 +58,7 @@ def recorded(gripper: Gripper, hidden: list[str], grasps: int, monkeypatch, obje
 @pytest.mark.parametrize("name", ["franka_hand", "so101_gripper"])
 def test_finds_what_was_hidden(name, monkeypatch, tmp_path):
     """A coupled hand with two force sensors; one jaw whose motor's effort is read. And all that is told of it."""
-    loaded = recorded(load_gripper(name), ["coulomb_friction"], 6, monkeypatch, objects=1)
+    loaded = recorded(load_gripper(name), ["coulomb_friction"], 8, monkeypatch, objects=1)
     loaded = dataclasses.replace(loaded, measured=shortened(loaded.measured, 60))
     diagnosis, _ = diagnose_set(loaded, None, LOOK_ALIKES, 0, lambda text: None)
     assert (diagnosis.verdict, diagnosis.effects) == ("effect", ("coulomb_friction",))
