@@ -25,8 +25,8 @@ _LARGEST_PHASE = 0.1
 # An object has come to rest if it is slower than this after so long. m/s and seconds.
 _AT_REST, _SETTLING_S = 1e-3, 0.5
 # A grasp goes the same way where motors are never apart by this share of the way that they go. It closes within so
-# long, presses for as long and opens, and is looked at so often. Seconds.
-_SAME_WAY, _CLOSES_S, _LOOKS_S = 0.02, 0.5, 0.02
+# many seconds, presses for as long and opens.
+_SAME_WAY, _CLOSES_S = 0.02, 0.5
 
 
 def compile_fast(
@@ -59,29 +59,29 @@ def with_larger_steps(model: mujoco.MjModel, motors: Sequence[Motor], object_geo
       motors, object_geom, largest: as for :func:`compile_fast`.
     """
     larger = _take_larger_steps(copy.copy(model), motors, object_geom, largest)
-    places, same = _places_in_a_grasp(model, motors), _places_in_a_grasp(larger, motors)
+    (times, places), (seen, others) = (_places_in_a_grasp(one, motors) for one in (model, larger))
+    same = np.stack([np.interp(times, seen, others[:, motor]) for motor in range(len(motors))], axis=1)
     if np.abs(same - places).max() < _SAME_WAY * np.ptp(places):
         return larger
     return with_larger_steps(model, motors, object_geom, largest // 2) if largest > 2 else model
 
 
-def _places_in_a_grasp(model: mujoco.MjModel, motors: Sequence[Motor]) -> np.ndarray:
-    """Positions of the motors while they close on the object and let go of it, m or rad, ``(times, motors)``."""
+def _places_in_a_grasp(model: mujoco.MjModel, motors: Sequence[Motor]) -> tuple[np.ndarray, np.ndarray]:
+    """Times ``(steps,)`` and positions of the motors, m or rad, ``(steps, motors)``, of a grasp that lets go again."""
     scale, zero = command_law(motors, model)
     drives = [model.actuator(motor.actuator).id for motor in motors]
     joints = [model.joint(motor.joint).qposadr[0] for motor in motors]
-    stroke = np.array([abs(motor.open - motor.closed) for motor in motors])
+    stroke = np.array([motor.stroke for motor in motors])
     data = mujoco.MjData(model)
     if model.nkey:
         mujoco.mj_resetDataKeyframe(model, data, 0)
-    places: list[np.ndarray] = []
-    for now in np.arange(0, 3 * _CLOSES_S, _LOOKS_S):
-        opened = np.clip(abs(now / _CLOSES_S - 1.5) - 0.5, 0, 1)
+    starts = model.opt.timestep * np.arange(round(3 * _CLOSES_S / model.opt.timestep))
+    places = np.empty((len(starts), len(motors)))
+    for step, opened in enumerate(np.clip(abs(starts / _CLOSES_S - 1.5) - 0.5, 0, 1)):
         data.ctrl[drives] = opened * stroke * scale + zero
-        while data.time < now:
-            mujoco.mj_step(model, data)
-        places.append(data.qpos[joints].copy())
-    return np.array(places)
+        mujoco.mj_step(model, data)
+        places[step] = data.qpos[joints]
+    return starts + model.opt.timestep, places
 
 
 def _take_larger_steps(

@@ -85,7 +85,8 @@ def test_steps_are_as_large_as_grasps_go_the_same_way_with_them(bears, monkeypat
     model, places = SECOND.compile(), fast._places_in_a_grasp
 
     def elsewhere_with_too_large_steps(changed, motors):
-        return places(changed, motors) + (0.0 if changed.opt.timestep < 1.1e-3 * bears else 1e-3)
+        times, found = places(changed, motors)
+        return times, found + (0.0 if changed.opt.timestep < 1.1e-3 * bears else 1e-3)
 
     monkeypatch.setattr(fast, "_places_in_a_grasp", elsewhere_with_too_large_steps)
     found = fast.with_larger_steps(model, SECOND.motors, SECOND.object_geom, 4)
