@@ -80,13 +80,14 @@ def test_fits_take_larger_steps_of_a_gripper_without_a_sphere(tier, step):
     assert (model.opt.timestep, model.ngeom) == (step, SECOND.compile().ngeom)
 
 
+@pytest.mark.parametrize("astray", [1e-3, np.nan])
 @pytest.mark.parametrize("bears", [4, 2, 1])
-def test_steps_are_as_large_as_grasps_go_the_same_way_with_them(bears, monkeypatch):
+def test_steps_are_as_large_as_grasps_go_the_same_way_with_them(bears, astray, monkeypatch):
     model, places = SECOND.compile(), fast._places_in_a_grasp
 
     def elsewhere_with_too_large_steps(changed, motors):
         times, found = places(changed, motors)
-        return times, found + (0.0 if changed.opt.timestep < 1.1e-3 * bears else 1e-3)
+        return times, found + (0.0 if changed.opt.timestep < 1.1e-3 * bears else astray)
 
     monkeypatch.setattr(fast, "_places_in_a_grasp", elsewhere_with_too_large_steps)
     found = fast.with_larger_steps(model, SECOND.motors, SECOND.object_geom, 4)
