@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 
 from forcegrasp.physics.gripper_parts import Motor
-from forcegrasp.physics.opening import command_law
+from forcegrasp.physics.opening import at_the_start, command_law
 
 #: Name of the sphere, after that of the object's geom.
 SPHERE = "{}_pads"
@@ -58,12 +58,15 @@ def with_larger_steps(model: mujoco.MjModel, motors: Sequence[Motor], object_geo
       model: the scene's.
       motors, object_geom, largest: as for :func:`compile_fast`.
     """
-    larger = _take_larger_steps(copy.copy(model), motors, object_geom, largest)
-    (times, places), (seen, others) = (_places_in_a_grasp(one, motors) for one in (model, larger))
-    same = np.stack([np.interp(times, seen, others[:, motor]) for motor in range(len(motors))], axis=1)
-    if np.abs(same - places).max() < _SAME_WAY * np.ptp(places):
-        return larger
-    return with_larger_steps(model, motors, object_geom, largest // 2) if largest > 2 else model
+    times, places = _places_in_a_grasp(model, motors)
+    while largest > 1:
+        larger = _take_larger_steps(copy.copy(model), motors, object_geom, largest)
+        seen, others = _places_in_a_grasp(larger, motors)
+        same = np.stack([np.interp(times, seen, others[:, motor]) for motor in range(len(motors))], axis=1)
+        if np.abs(same - places).max() < _SAME_WAY * np.ptp(places):
+            return larger
+        largest //= 2
+    return model
 
 
 def _places_in_a_grasp(model: mujoco.MjModel, motors: Sequence[Motor]) -> tuple[np.ndarray, np.ndarray]:
@@ -72,9 +75,7 @@ def _places_in_a_grasp(model: mujoco.MjModel, motors: Sequence[Motor]) -> tuple[
     drives = [model.actuator(motor.actuator).id for motor in motors]
     joints = [model.joint(motor.joint).qposadr[0] for motor in motors]
     stroke = np.array([motor.stroke for motor in motors])
-    data = mujoco.MjData(model)
-    if model.nkey:
-        mujoco.mj_resetDataKeyframe(model, data, 0)
+    data = at_the_start(model)
     starts = model.opt.timestep * np.arange(round(3 * _CLOSES_S / model.opt.timestep))
     places = np.empty((len(starts), len(motors)))
     for step, opened in enumerate(np.clip(abs(starts / _CLOSES_S - 1.5) - 0.5, 0, 1)):
@@ -110,9 +111,7 @@ def _moved_inertia(model: mujoco.MjModel, dofs: Sequence[int]) -> np.ndarray:
     bits = mujoco.mjtDisableBit
     for other in bits.mjDSBL_CONTACT, bits.mjDSBL_LIMIT, bits.mjDSBL_FRICTIONLOSS, bits.mjDSBL_ACTUATION:
         model.opt.disableflags |= other
-    data = mujoco.MjData(model)
-    if model.nkey:
-        mujoco.mj_resetDataKeyframe(model, data, 0)
+    data = at_the_start(model)
     mujoco.mj_forward(model, data)
     at_rest = data.qacc.copy()  # springs may act
     inertia = np.empty(len(dofs))
@@ -158,9 +157,7 @@ def _sinks(reference: mujoco.MjModel, object_geom: str) -> np.ndarray:
 
     Along a cylinder that makes no difference to the pads; a sphere has to stay between them.
     """
-    data = mujoco.MjData(reference)
-    if reference.nkey:
-        mujoco.mj_resetDataKeyframe(reference, data, 0)
+    data = at_the_start(reference)
     mujoco.mj_forward(reference, data)
     body = reference.geom(object_geom).bodyid[0]
     before, turned = data.xpos[body].copy(), data.xmat[body].reshape(3, 3).copy()

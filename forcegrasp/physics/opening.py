@@ -77,9 +77,7 @@ def measure_opening(
     for geom in body.geoms:
         geom.contype = geom.conaffinity = 0
     model = spec.compile()
-    data = mujoco.MjData(model)
-    if model.nkey:
-        mujoco.mj_resetDataKeyframe(model, data, 0)
+    data = at_the_start(model)
     pads = [pad_geoms(model, finger.body) for finger in fingers]
     scale, zero = command_law(motors, model)
     actuators = [model.actuator(motor.actuator).id for motor in motors]
@@ -132,6 +130,14 @@ def _is_on(model: mujoco.MjModel, body: int, root: int) -> bool:
     while body not in (0, root):
         body = model.body_parentid[body]
     return body == root
+
+
+def at_the_start(model: mujoco.MjModel) -> mujoco.MjData:
+    """A scene's state at its first keyframe, or at MuJoCo's initial positions where it has none."""
+    data = mujoco.MjData(model)
+    if model.nkey:
+        mujoco.mj_resetDataKeyframe(model, data, 0)
+    return data
 
 
 def command_law(motors: Sequence[Motor], model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray]:
