@@ -69,7 +69,7 @@ def costs_without(index: int, signals: np.ndarray, fit: Fit, target: Target) -> 
       target: the measurements.
     """
     left = np.stack([(fit.weight * target.residual(one)).ravel() for one in signals], axis=1)
-    return np.sum(Background(fit, (), without=index).remove(left) ** 2, axis=0)
+    return np.sum(Background(fit, (), without=[index]).remove(left) ** 2, axis=0)
 
 
 def _other_shapes(fit: Fit, first: int) -> Iterator[np.ndarray]:

@@ -53,7 +53,7 @@ def refine(scores: Sequence[Score], study: Study, fit: Fit, background: Backgrou
     settings = [sized.setting for sized, _ in pairs]
     for setting in settings:
         study.progress(f"refitting with {setting.effect.name} {setting.variant}")
-    fits = side_by_side([partial(_fit_from, part.vector, setting, some, part) for setting in settings])
+    fits = side_by_side([partial(fit_with, [setting], part.vector, some, part) for setting in settings])
     if some is study:
         return [Refined(score, one) for (_, score), one in zip(pairs, fits, strict=True)]
     racing = _in_the_race([part.cost - one.cost for one in fits], LOST_IF_FITTED)
@@ -62,7 +62,8 @@ def refine(scores: Sequence[Score], study: Study, fit: Fit, background: Backgrou
     for few in (fits[i] for i in left):
         setting = few.effects[-1]
         study.progress(f"refitting with {setting.effect.name} {setting.variant} on all grasps")
-        tasks.append(partial(_fit_from, fit.moved(part.problem, few.vector[: len(part.problem)]), setting, study, fit))
+        start = fit.moved(part.problem, few.vector[: len(part.problem)])
+        tasks.append(partial(fit_with, [setting], start, study, fit))
     return [Refined(pairs[i][1], refitted) for i, refitted in zip(left, side_by_side(tasks), strict=True)]
 
 
@@ -102,8 +103,16 @@ def _adds_nothing(fit: Fit, others: Sequence[Fit]) -> bool:
     return any(one.problem.effects[-1].effect.name in contained and NO_BETTER * one.cost < fit.cost for one in others)
 
 
-def _fit_from(start: np.ndarray, setting: EffectSetting, study: Study, fit: Fit) -> Fit:
+def fit_with(settings: Sequence[EffectSetting], start: np.ndarray, study: Study, fit: Fit) -> Fit:
+    """A rough fit with more effects.
+
+    Args:
+      settings: the effects, as they start.
+      start: coordinates of the others, ``(p,)``.
+      study: the measurements.
+      fit: without these effects; its slopes are kept.
+    """
     old = fit.problem
-    problem = Problem(old.gripper, old.grasps, [*old.effects, setting])
+    problem = Problem(old.gripper, old.grasps, [*old.effects, *settings])
     start = np.r_[start, problem.start()[len(old) :]]
     return fit_once(study.target, problem, study.simulators, start, fit.correction, rounds=0, known_slopes=fit.jacobian)

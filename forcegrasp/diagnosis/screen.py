@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from forcegrasp.diagnosis.evidence import ALARM
+from forcegrasp.diagnosis.families import may_join
 from forcegrasp.diagnosis.noise_check import Noise
 from forcegrasp.diagnosis.signatures import Background, Score, Signatures, null_gains, share_together, trials
 from forcegrasp.diagnosis.study import Study
@@ -118,6 +119,35 @@ class Screen:
         new = self._on_few.missing(tried)
         self._on_few.simulate(fit, new)
         return self._on_few.scores(fit, Background(fit, some.numerical), tried), new
+
+    def one_after_the_other(
+        self, study: Study, fit: Fit, effects: Collection[type[Effect]], most: int, least: float
+    ) -> list[Score]:
+        """The signatures that fit best what a fit leaves of few grasps, each beside those before it.
+
+        That is orthogonal matching pursuit (Pati, Rezaiifar, Krishnaprasad 1993).
+
+        Args:
+          study: the measurements.
+          fit: of the model without these effects.
+          effects: those of the catalogue that are tried; one that may not join those before it is left out.
+          most: how many at most.
+          least: the share of the squares beyond the noise that each must gain beside the others.
+        """
+        some, part = study.on_few(fit)
+        self.on_few(study, some, part, effects)
+        background, chosen = Background(part, some.numerical), list[Score]()
+        least *= max(some.target.beyond_noise(part.residual), 0.0)
+        while len(chosen) < most and self._on_few is not None:
+            before = [score.setting.effect for score in chosen]
+            tried = [trial for trial in self._tried if trial.effect in effects and may_join(trial.effect, before)]
+            groups = self._on_few.scores(part, background, tried)
+            best = max((group[0] for group in groups), key=lambda score: score.gain, default=None)
+            if best is None or best.gain <= least:
+                break
+            chosen.append(best)
+            background = background.and_also(best.signature)
+        return chosen
 
 
 def _least_gain(groups: Sequence[Sequence[Score]], null: np.ndarray, beyond: float) -> float:

@@ -21,10 +21,11 @@ from forcegrasp.diagnosis.needless import chained, drop_needless, simplify
 from forcegrasp.diagnosis.odd_grasps import odd_grasps
 from forcegrasp.diagnosis.result import Diagnosis, Step, kept_steps
 from forcegrasp.diagnosis.screen import Screen
+from forcegrasp.diagnosis.several import add_several, none_stands_out
 from forcegrasp.diagnosis.split import split
 from forcegrasp.diagnosis.step import FAR, look_further
 from forcegrasp.diagnosis.study import Study
-from forcegrasp.diagnosis.verdict import explained_share
+from forcegrasp.diagnosis.verdict import EXPLAINED, EXPLAINED_FAR, explained_share
 from forcegrasp.effects import Effect
 from forcegrasp.identify.base_fit import BaseFit
 from forcegrasp.identify.cross_validation import evidence_folds, make_folds
@@ -37,8 +38,11 @@ from forcegrasp.identify.weights import reweigh
 
 #: Whether what a set gives, moved within its tolerance, may explain what a fit leaves.
 MayBeGiven = Callable[[Target, Fit], bool]
-#: Largest number of effects that are looked for.
+#: Largest number of effects that are looked for one by one.
 MOST_EFFECTS = 8
+# Beyond so many times the floor, beside an effect that was found, several others are added at once if none of them
+# stands out; or whether one does or not.
+_MUCH_LEFT, _VERY_MUCH_LEFT = 3.0, 5.0
 
 
 def diagnose(
@@ -115,13 +119,16 @@ def _add_effects(so_far: _SoFar, begun: Begun, rng: np.random.Generator, may_be_
     """Adds one effect after the other."""
     effects = begun.effects
     study, steps, fit = so_far.all
-    screen, screened, tried_anyway = Screen(effects, study), fit, False
+    screen, screened, tried_anyway, several = Screen(effects, study), fit, False, _Several(so_far, begun, rng)
     for _ in range(MOST_EFFECTS):
-        untried = left_to_try(effects, fit, steps)
+        untried = () if several.done else left_to_try(effects, fit, steps)
         richer = list(families.extensions(fit, effects))
         if not untried and not richer:
             break
         study = with_few(study, fit)
+        if several.are_likely(study, fit, screen, untried) and several.found(study, steps, fit, EXPLAINED):
+            _, steps, fit = so_far.all
+            continue
         step = look_further(study, fit, screen, untried, rng, richer)
         # what is on trial has no look-alikes that are worth the time
         much = not step.effects and so_far.believed is None
@@ -130,6 +137,9 @@ def _add_effects(so_far: _SoFar, begun: Begun, rng: np.random.Generator, may_be_
         if much and screened is not fit:  # beside what was found since, others may do something else
             screen, screened = Screen(effects, study), fit
             step = look_further(study, fit, screen, untried, rng, richer)
+        if much and not step.effects and several.found(study, steps, fit, EXPLAINED_FAR):
+            _, steps, fit = so_far.all
+            continue
         if much and not step.effects:
             worth_it = not tried_anyway and step.error_before < FAR
             found = _fitted_anyway(study, fit, screen, untried, rng) if worth_it else None
@@ -154,6 +164,42 @@ def _add_effects(so_far: _SoFar, begun: Begun, rng: np.random.Generator, may_be_
         so_far.all = study, steps, fit
         if not is_worth_looking(study, fit) or leaves_little(study, fit, begun.error, begun.floor):
             break
+
+
+@dataclass(eq=False)
+class _Several:
+    """Adds several effects at once, which is done once."""
+
+    so_far: _SoFar
+    begun: Begun
+    rng: np.random.Generator
+    done: bool = False  #: whether it was: no other effect promises anything beside what it found
+    _asked: Fit | None = None  #: the fit that it was last tried for
+
+    def are_likely(self, study: Study, fit: Fit, screen: Screen, untried: Sequence[type[Effect]]) -> bool:
+        """Whether what is left, beside an effect that was found, is not that of one other."""
+        if len(fit.problem.effects) == self.begun.given:
+            return False
+        left = study.error(study.heldout(fit)) / self.begun.floor
+        return left > _VERY_MUCH_LEFT or (left > _MUCH_LEFT and none_stands_out(study, fit, screen, untried))
+
+    def found(self, study: Study, steps: list[Step], fit: Fit, least_share: float) -> bool:
+        """Whether several were found that together explain this share of what a fit leaves, or leave nothing."""
+        if self.done or self._asked is fit or study.target.gripper.is_servo:
+            return False
+        held, self._asked = study.heldout(fit), fit
+
+        def keep(found: list[Step], further: Fit) -> None:
+            enough = study.explained(held, study.heldout(further)) >= least_share
+            self.so_far.all = (study, found, further) if enough else (study, steps, fit)
+
+        further = add_several(study, fit, steps, self.begun.effects, self.begun.given, self.rng, keep)
+        if further is not None and not left_over(study, further[1])[0]:
+            self.so_far.all = study, *further
+        elif further is not None:
+            keep(*further)
+        self.done = self.so_far.all[2] is not fit
+        return self.done
 
 
 def _tidy_up(so_far: _SoFar, begun: Begun) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -38,11 +39,11 @@ class Background:
     Args:
       fit: whose parameters count.
       numerical: errors of the model, each ``(G, S, C)``.
-      without: index of a parameter that does not count.
+      without: indices of parameters that do not count.
     """
 
-    def __init__(self, fit: Fit, numerical: Sequence[np.ndarray], without: int | None = None) -> None:
-        slopes = fit.slopes if without is None else np.delete(fit.slopes, without, axis=1)
+    def __init__(self, fit: Fit, numerical: Sequence[np.ndarray], without: Sequence[int] = ()) -> None:
+        slopes = np.delete(fit.slopes, without, axis=1)
         columns = [slopes, *((fit.weight * n).reshape(-1, 1) for n in numerical)]
         matrix = np.concatenate(columns, axis=1)
         norms = np.linalg.norm(matrix, axis=0)
@@ -52,6 +53,12 @@ class Background:
     def remove(self, vectors: np.ndarray) -> np.ndarray:
         """Takes the directions out of vectors, ``(N,)`` or ``(N, m)``."""
         return vectors - self._basis @ (self._basis.T @ vectors)
+
+    def and_also(self, signature: np.ndarray) -> Background:
+        """The same with one more direction, that of a signature that has nothing of the others, ``(N,)``."""
+        more = copy.copy(self)
+        more._basis = np.column_stack([self._basis, signature])
+        return more
 
 
 def direction(before: Fit, after: Fit) -> np.ndarray:

@@ -9,14 +9,13 @@ import numpy as np
 
 from forcegrasp.diagnosis import families
 from forcegrasp.diagnosis.evidence import (
-    LEAST_RISE,
     LEAST_SHARE_OF_MANY,
     add_nothing,
     indistinguishable,
-    is_beyond_chance,
     is_significant,
     place,
 )
+from forcegrasp.diagnosis.judge import judged
 from forcegrasp.diagnosis.look_beside import look_beside
 from forcegrasp.diagnosis.noise_check import unexpected_noise
 from forcegrasp.diagnosis.other_starts import other_starts
@@ -28,10 +27,9 @@ from forcegrasp.diagnosis.study import Study
 from forcegrasp.diagnosis.verdict import EXPLAINED_FAR, LEAST_SHARE
 from forcegrasp.effects import Effect
 from forcegrasp.identify.base_fit import rms_error
-from forcegrasp.identify.cross_validation import rms
 from forcegrasp.identify.fit import Fit, fit_exactly, fit_once
 from forcegrasp.identify.led_astray import fit_led_by_others
-from forcegrasp.identify.noise_floor import cells, excess
+from forcegrasp.identify.noise_floor import excess
 from forcegrasp.identify.side_by_side import side_by_side
 from forcegrasp.identify.target import Target
 
@@ -364,12 +362,4 @@ class _Start:
 
     def _judge(self, refit: Fit, p_family: float, signature: np.ndarray, replaces: str = "") -> Candidate:
         """What held-out grasps say of a fit with one more effect, its last one."""
-        target, held, after = self._study.target, self.held, self._study.heldout(refit)
-        gains = self._study.gains(held, after)
-        recordings = self._study.of_recordings(gains)
-        sums = np.array([one.sum() for one in recordings]) if recordings else None
-        harms = any(is_beyond_chance(-one, LEAST_RISE) for one in recordings)
-        fall = max((1 - rms(after, target, w) / rms(held, target, w) for _, w in cells(target)), default=0.0)
-        error, share = self._study.error(after), self._study.explained(held, after)
-        setting = refit.effects[-1]
-        return Candidate(setting, refit, p_family, gains, error, share, fall, signature, replaces, sums, harms)
+        return judged(self._study, self.held, refit, refit.effects[-1], p_family, signature, replaces)

@@ -1,0 +1,187 @@
+"""Adds several effects at once, where none stands out: alone each explains little, and makes up for the others.
+
+The signatures that fit best beside each other are chosen, their effects are fitted together, those that others make
+needless are left out, and what is left then is asked again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
+
+import numpy as np
+
+from forcegrasp.diagnosis.evidence import LEAST_SHARE_OF_MANY
+from forcegrasp.diagnosis.families import may_join, roughly_without
+from forcegrasp.diagnosis.few import with_few
+from forcegrasp.diagnosis.judge import judged
+from forcegrasp.diagnosis.left_over import is_worth_looking
+from forcegrasp.diagnosis.needless import chained, drop_all_needless
+from forcegrasp.diagnosis.refine import fit_with
+from forcegrasp.diagnosis.result import Step
+from forcegrasp.diagnosis.screen import Screen
+from forcegrasp.diagnosis.signatures import Background, Score, direction, null_gains
+from forcegrasp.diagnosis.study import Study
+from forcegrasp.effects import Effect
+from forcegrasp.effects.setting import EffectSetting
+from forcegrasp.identify.fit import Fit, fit_exactly, fit_once
+from forcegrasp.identify.predict import Case, predict
+from forcegrasp.identify.problem import Problem
+from forcegrasp.identify.side_by_side import side_by_side
+
+#: Told the steps that were found so far, and the fit with their effects.
+Keep = Callable[[list[Step], Fit], None]
+# So many effects at a time, in so many rounds; each is to explain this share of the squares beyond the noise.
+_AT_ONCE, _ROUNDS, _LEAST = 5, 6, 0.02
+# One of them stands out, if it promises this share of what they promise together.
+_STANDS_OUT = 0.5
+
+
+def none_stands_out(study: Study, fit: Fit, screen: Screen, effects: Sequence[type[Effect]]) -> bool:
+    """Whether signatures promise that several effects explain together what none explains alone.
+
+    Args:
+      study: the measurements.
+      fit: with the effects that were found so far.
+      screen: of the catalogue.
+      effects: those that are not in the model.
+    """
+    gains = [score.gain for score in _chosen(study, fit, screen, effects)]
+    return len(gains) > 1 and gains[0] < _STANDS_OUT * sum(gains)
+
+
+def add_several(
+    study: Study, fit: Fit, steps: Sequence[Step], effects: Sequence[type[Effect]], given: int,
+    rng: np.random.Generator, keep: Keep,
+) -> tuple[list[Step], Fit] | None:  # fmt: skip
+    """Steps that found effects together, after those that found others, and the fit with all; None if none are found.
+
+    What the error falls by all together is shared out among the steps by what leaving out each effect costs.
+
+    Args:
+      study: the measurements.
+      fit: with the effects that were found so far.
+      steps: that found them.
+      effects: the catalogue.
+      given: number of effects that were in the model before the search; they stay.
+      rng: for the null distribution.
+      keep: told what each round has found, which is all there is if no other one ends.
+    """
+    before, barred = fit, set[str]()
+    for _ in range(_ROUNDS):
+        study = with_few(study, fit)
+        known = [one.effect for one in fit.problem.effects]
+        untried = [e for e in effects if e.name not in barred and may_join(e, known)]
+        chosen = [score.setting for score in _chosen(study, fit, Screen(effects, study), untried)]
+        if not chosen:
+            break
+        study.progress(f"fitting together {', '.join(one.effect.name for one in chosen)}")
+        further, needless = _without_needless(study, _fitted_together(chosen, study, fit), given)
+        barred.update(needless)  # it promises what no fit keeps, and would promise it again
+        if not (names := [name for name in _names(further) if name not in _names(fit)]):
+            continue
+        held, after = study.heldout(fit), study.heldout(further)
+        if study.explained(held, after) < LEAST_SHARE_OF_MANY:
+            break
+        change = f"{study.error(held):.2f} → {study.error(after):.2f} × noise"
+        study.progress(f"found {', '.join(names)}: held-out error {change}")
+        fit = further
+        keep(_steps(study, steps, before, fit, rng, in_a_hurry=True), fit)
+        if not is_worth_looking(study, fit):
+            break
+    if fit is before:
+        return None
+    fit = fit_exactly(study.target, fit.problem, study.simulators, fit.vector, fit.jacobian)
+    _, fit = drop_all_needless(study, (), fit, given)
+    return _steps(study, steps, before, fit, rng), fit
+
+
+def _chosen(study: Study, fit: Fit, screen: Screen, effects: Sequence[type[Effect]]) -> list[Score]:
+    """Signatures that are worth a fit together; no mistakes of the set, which may look like anything."""
+    return screen.one_after_the_other(study, fit, [e for e in effects if not e.of_set], _AT_ONCE, _LEAST)
+
+
+def _names(fit: Fit) -> list[str]:
+    return [one.effect.name for one in fit.problem.effects]
+
+
+def _fitted_together(settings: Sequence[EffectSetting], study: Study, fit: Fit) -> Fit:
+    """A rough fit with all of these effects besides, from where few grasps lead."""
+    some, part = study.on_few(fit)
+    few = fit_with(settings, part.vector, some, part)
+    old, new = np.split(few.vector, [len(part.problem)])
+    problem = Problem(fit.problem.gripper, fit.problem.grasps, [*fit.problem.effects, *few.effects[-len(settings) :]])
+    return fit_once(
+        study.target, problem, study.simulators, np.r_[fit.moved(part.problem, old), new], fit.correction, rounds=0
+    )
+
+
+def _without_needless(study: Study, fit: Fit, given: int) -> tuple[Fit, list[str]]:
+    """The fit without the effects whose absence costs next to nothing, and their names."""
+    needless: list[str] = []
+    while len(fit.problem.effects) > given:
+        some, part = study.on_few(fit)
+        costs = _costs_of_absence(some, part)[given:]
+        least = int(np.argmin(costs))
+        if costs[least] > _LEAST * some.target.beyond_noise(part.residual):
+            break
+        name = _names(fit)[given + least]
+        study.progress(f"{name} is needless beside the others")
+        needless.append(name)
+        fit = roughly_without(name, fit, study)
+    return fit, needless
+
+
+def _costs_of_absence(study: Study, fit: Fit) -> list[float]:
+    """What leaving out each effect adds to the squares, once the others have made up for it as far as slopes tell.
+
+    Slopes say nothing of an effect in steps, or of how far off a limit is: the model is simulated without each.
+    """
+    case, target, costs = fit.problem.case(fit.vector), study.target, []
+    less = [Case(case.base, tuple(e for e in case.effects if e is not one)) for one in case.effects]
+    own, *others = predict(study.rough or study.simulators.cheap, [case, *less])
+    for index, signals in enumerate(others):
+        change = np.where(target.mask[..., None], (signals - own) / target.sigma, 0.0)
+        places = [i for i, entry in enumerate(fit.problem.entries) if entry.effect == index]
+        background = Background(fit, study.numerical, without=places)
+        left = [background.remove((fit.weight * one).ravel()) for one in (fit.residual, fit.residual - change)]
+        costs.append(float(left[1] @ left[1] - left[0] @ left[0]))
+    return costs
+
+
+def _steps(
+    study: Study, steps: Sequence[Step], before: Fit, fit: Fit, rng: np.random.Generator, in_a_hurry: bool = False
+) -> list[Step]:
+    """The steps that found what a fit still has, and one for each effect that it has besides.
+
+    Those come first whose absence costs most. In a hurry their evidence is what they gain all together.
+
+    Args:
+      study: the measurements.
+      steps: that found effects before.
+      before: the fit with those.
+      fit: with all.
+      rng: for the null distribution.
+      in_a_hurry: whether there is no time to fit without each.
+    """
+    names = [name for name in _names(fit) if name not in _names(before)]
+    if in_a_hurry:
+        fits, on_few = [before] * len(names), _costs_of_absence(*study.on_few(fit))
+        costs = np.array([on_few[_names(fit).index(name)] for name in names])
+    else:
+        study.progress("fitting without each of them")
+        fits = side_by_side([partial(roughly_without, name, fit, study) for name in names])
+        costs = np.array([less.cost - fit.cost for less in fits])
+    costs = np.maximum(costs, 1e-9)
+    changes = [Score(fit.effect(n), c, direction(less, fit)) for n, c, less in zip(names, costs, fits, strict=True)]
+    null = null_gains([changes], rng)
+    error, after = (study.error(study.heldout(one)) for one in (before, fit))
+    fall = (error**2 - after**2) / costs.sum()
+    found = [step for step in steps if step.is_counted or step.effects[0] in _names(fit)]
+    for index in np.argsort(-costs):
+        change, held = changes[index], study.heldout(fits[index])
+        p_family = (1 + int(np.sum(null >= change.gain))) / (1 + len(null))
+        candidate = judged(study, held, fit, change.setting, p_family, change.signature)
+        before_it, error = error, float(np.sqrt(max(error**2 - fall * costs[index], 0.0)))
+        found.append(Step((change.setting.effect.name,), (candidate,), (), before_it, error))
+    return chained(found, after)

@@ -1,0 +1,114 @@
+"""Effects of which each hides what others do are found together."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+
+from forcegrasp.diagnosis.judge import judged
+from forcegrasp.diagnosis.refine import fit_with
+from forcegrasp.diagnosis.result import Step
+from forcegrasp.diagnosis.screen import Screen
+from forcegrasp.diagnosis.several import add_several, none_stands_out
+from forcegrasp.diagnosis.study import Study
+from forcegrasp.effects.for_gripper import effect_of
+from forcegrasp.effects.setting import EffectSetting
+from forcegrasp.identify.cross_validation import make_folds
+from forcegrasp.identify.fit_set import fit_model
+from forcegrasp.identify.noise_floor import beyond_fit, numerical_error
+from forcegrasp.identify.progress import silent
+from tests.light_set import light_gripper, light_set
+
+HIDDEN = {
+    "command_delay": "delay_s=0.03",
+    "coulomb_friction": "force_n=0.06",
+    "force_crosstalk": "share=0.12",
+    "force_lag": "time_constant_s=0.06",
+    "force_bias": "left_n=0.06 right_n=-0.05",
+}
+ACTUATOR_LAG = effect_of("actuator_lag", light_gripper())
+CATALOGUE = [
+    effect_of(name, light_gripper())
+    for name in (*HIDDEN, "actuator_lag", "encoder_bias", "force_delay", "force_drift", "force_gain_asymmetry")
+]
+
+
+def study_of(*hidden: str):
+    """A set with these effects hidden, and its base model."""
+    target, simulators, base = fit_model(light_set(*hidden, grasps=9), 0, silent)
+    numerical = beyond_fit(base.fit, numerical_error(base.fit, target))
+    return Study(target, simulators, make_folds(target.grasps), numerical), base
+
+
+@pytest.fixture(scope="module")
+def mixed():
+    """Five effects, hidden in one set."""
+    return study_of(*(f"{name} {sizes}" for name, sizes in HIDDEN.items()))
+
+
+def kept_by_nobody(steps, fit):
+    """What a round found, thrown away."""
+
+
+@pytest.fixture(scope="module")
+def found(mixed):
+    """What is found in that set."""
+    study, base = mixed
+    return add_several(study, base.fit, (), CATALOGUE, 0, np.random.default_rng(0), kept_by_nobody)
+
+
+def test_all_are_found_and_nothing_else(found):
+    steps, fit = found
+    assert {one.effect.name for one in fit.problem.effects} == set(HIDDEN)
+    assert {step.effects for step in steps} == {(name,) for name in HIDDEN}
+    for name, sizes in HIDDEN.items():
+        true = [float(size.partition("=")[2]) for size in sizes.split()]
+        assert fit.effect(name).values == pytest.approx(true, rel=0.15), name
+
+
+def test_steps_lead_from_the_first_error_to_the_last_and_share_out_what_it_falls_by(mixed, found):
+    (study, base), (steps, fit) = mixed, found
+    assert steps[0].error_before == pytest.approx(study.error(study.heldout(base.fit)))
+    assert steps[-1].error_after == pytest.approx(study.error(study.heldout(fit)))
+    assert all(one.error_after == pytest.approx(two.error_before) for one, two in itertools.pairwise(steps))
+    falls = [step.error_before**2 - step.error_after**2 for step in steps]
+    assert falls == sorted(falls, reverse=True)
+    assert falls[-1] > 0
+    for step in steps:
+        (candidate,) = step.candidates
+        assert candidate.p_family < 0.01
+        assert candidate.heldout_gain > 5
+        assert 0 < candidate.share < 1
+        assert candidate.parameters() == fit.effect(step.effects[0]).parameters
+
+
+def test_what_was_found_before_stays_if_it_is_needed_and_goes_if_others_make_it_needless(mixed):
+    study, base = mixed
+    known = [EffectSetting.typical(one) for one in (CATALOGUE[0], ACTUATOR_LAG)]
+    fit = fit_with(known, base.fit.vector, study, base.fit)
+    held = study.heldout(base.fit)
+    candidates = [judged(study, held, fit, one, 0.01, np.ones(1)) for one in known]
+    steps = [Step((one.effect.name,), (one,), (), 12.0, 9.0) for one in candidates]
+    steps, further = add_several(study, fit, steps, CATALOGUE, 0, np.random.default_rng(0), kept_by_nobody)
+    assert {one.effect.name for one in further.problem.effects} == set(HIDDEN)
+    assert steps[0].effects == ("command_delay",)
+    assert len(steps) == len(HIDDEN)
+    _, further = add_several(study, fit, steps, CATALOGUE, 2, np.random.default_rng(0), kept_by_nobody)
+    assert {one.effect.name for one in further.problem.effects} == {*HIDDEN, "actuator_lag"}  # it was given
+
+
+def test_of_one_effect_alone_it_stands_out(mixed):
+    assert none_stands_out(*at_first(*mixed))
+    assert not none_stands_out(*at_first(*study_of("command_delay delay_s=0.03")))
+
+
+def at_first(study, base):
+    """What is asked of a base model."""
+    return study, base.fit, Screen(CATALOGUE, study), CATALOGUE
+
+
+def test_nothing_is_found_where_nothing_is_hidden():
+    study, base = study_of()
+    assert add_several(study, base.fit, (), CATALOGUE, 0, np.random.default_rng(0), kept_by_nobody) is None
