@@ -151,17 +151,17 @@ def _richer_than(name: str, container: type[Effect], fit: Fit) -> list[EffectSet
 
 def refit_without(names: str | Collection[str], fit: Fit, study: Study) -> Fit:
     """Fits a model that lacks one of the effects, or several, from where the model stands."""
-    problem, start, slopes = _problem_without(names, fit)
+    problem, start, slopes = problem_without(names, fit)
     return fit_exactly(study.target, problem, study.simulators, start, slopes)
 
 
 def roughly_without(names: str | Collection[str], fit: Fit, study: Study) -> Fit:
     """The same by the cheap model."""
-    problem, start, slopes = _problem_without(names, fit)
+    problem, start, slopes = problem_without(names, fit)
     return fit_once(study.target, problem, study.simulators, start, fit.correction, rounds=0, slopes=slopes)
 
 
-def _problem_without(names: str | Collection[str], fit: Fit) -> tuple[Problem, np.ndarray, np.ndarray]:
+def problem_without(names: str | Collection[str], fit: Fit) -> tuple[Problem, np.ndarray, np.ndarray]:
     """The problem without these effects, where the fit stands in it, and its slopes there."""
     kept, places = _without(names, fit)
     return Problem(fit.problem.gripper, fit.problem.grasps, kept), fit.vector[places], fit.jacobian[..., places]

@@ -25,7 +25,7 @@ from forcegrasp.diagnosis.several import add_several, none_stands_out
 from forcegrasp.diagnosis.split import split
 from forcegrasp.diagnosis.step import FAR, look_further
 from forcegrasp.diagnosis.study import Study
-from forcegrasp.diagnosis.verdict import EXPLAINED, EXPLAINED_FAR, explained_share
+from forcegrasp.diagnosis.verdict import EXPLAINED, EXPLAINED_FAR, MUCH, explained_share
 from forcegrasp.effects import Effect
 from forcegrasp.identify.base_fit import BaseFit
 from forcegrasp.identify.cross_validation import evidence_folds, make_folds
@@ -123,15 +123,15 @@ def _add_effects(so_far: _SoFar, begun: Begun, rng: np.random.Generator, may_be_
     for _ in range(MOST_EFFECTS):
         untried = () if several.done else left_to_try(effects, fit, steps)
         richer = list(families.extensions(fit, effects))
-        if not untried and not richer:
-            break
+        if not (untried or richer) or (several.done and several.left(study, fit) > MUCH):
+            break  # with a dozen effects and much left, all that could be asked takes long and says little
         study = with_few(study, fit)
         if several.are_likely(study, fit, screen, untried) and several.found(study, steps, fit, EXPLAINED):
             _, steps, fit = so_far.all
             continue
         step = look_further(study, fit, screen, untried, rng, richer)
-        # what is on trial has no look-alikes that are worth the time
-        much = not step.effects and so_far.believed is None
+        # what is on trial has no look-alikes that are worth the time, and what was found together takes too long
+        much = not step.effects and so_far.believed is None and not several.done
         much = much and step.error_before > AS_GOOD_AS_NOTHING * begun.floor
         much = much and not (may_be_given is not None and may_be_given(study.target, fit))
         if much and screened is not fit:  # beside what was found since, others may do something else
@@ -180,8 +180,12 @@ class _Several:
         """Whether what is left, beside an effect that was found, is not that of one other."""
         if len(fit.problem.effects) == self.begun.given:
             return False
-        left = study.error(study.heldout(fit)) / self.begun.floor
+        left = self.left(study, fit)
         return left > _VERY_MUCH_LEFT or (left > _MUCH_LEFT and none_stands_out(study, fit, screen, untried))
+
+    def left(self, study: Study, fit: Fit) -> float:
+        """Error that a fit leaves ÷ the floor."""
+        return study.error(study.heldout(fit)) / self.begun.floor
 
     def found(self, study: Study, steps: list[Step], fit: Fit, least_share: float) -> bool:
         """Whether several were found that together explain this share of what a fit leaves, or leave nothing."""
@@ -205,6 +209,8 @@ class _Several:
 def _tidy_up(so_far: _SoFar, begun: Begun) -> None:
     """Leaves out and puts together what can be, now that all is found, and fits effects that jump once more."""
     study, steps, fit = so_far.all
+    if len(fit.problem.effects) > MOST_EFFECTS and study.error(study.heldout(fit)) > MUCH * begun.floor:
+        return  # a dozen make 66 pairs, and what is left decides between them
     steps, fit = simplify(study, steps, fit, begun.given)
     so_far.all = study, steps, fit
     steps, fit = merge(study, steps, fit, begun.effects, begun.given)

@@ -11,12 +11,12 @@ from functools import partial
 
 import numpy as np
 
-from forcegrasp.diagnosis.evidence import LEAST_SHARE_OF_MANY
-from forcegrasp.diagnosis.families import may_join, roughly_without
+from forcegrasp.diagnosis.evidence import LEAST_RISE, LEAST_SHARE_OF_MANY, is_beyond_chance
+from forcegrasp.diagnosis.families import may_join, problem_without
 from forcegrasp.diagnosis.few import with_few
 from forcegrasp.diagnosis.judge import judged
 from forcegrasp.diagnosis.left_over import is_worth_looking
-from forcegrasp.diagnosis.needless import chained, drop_all_needless
+from forcegrasp.diagnosis.needless import chained
 from forcegrasp.diagnosis.refine import fit_with
 from forcegrasp.diagnosis.result import Step
 from forcegrasp.diagnosis.screen import Screen
@@ -33,6 +33,10 @@ from forcegrasp.identify.side_by_side import side_by_side
 Keep = Callable[[list[Step], Fit], None]
 # So many effects at a time, in so many rounds; each is to explain this share of the squares beyond the noise.
 _AT_ONCE, _ROUNDS, _LEAST = 5, 6, 0.02
+# Slopes are measured anew where a fit by those of its start came to this share of the cost there.
+_WELL_BELOW = 0.8
+# Directions whose slopes are a smaller share of the steepest one's are left alone.
+_FLAT = 1e-2
 # One of them stands out, if it promises this share of what they promise together.
 _STANDS_OUT = 0.5
 
@@ -91,8 +95,7 @@ def add_several(
             break
     if fit is before:
         return None
-    fit = fit_exactly(study.target, fit.problem, study.simulators, fit.vector, fit.jacobian)
-    _, fit = drop_all_needless(study, (), fit, given)
+    fit = _at_the_end(study, _needed(study, fit, given))
     return _steps(study, steps, before, fit, rng), fit
 
 
@@ -106,14 +109,21 @@ def _names(fit: Fit) -> list[str]:
 
 
 def _fitted_together(settings: Sequence[EffectSetting], study: Study, fit: Fit) -> Fit:
-    """A rough fit with all of these effects besides, from where few grasps lead."""
+    """A rough fit with all of these effects besides, from where few grasps lead.
+
+    Slopes are measured once or twice, and kept in between: with a dozen effects they take most of the time.
+    """
     some, part = study.on_few(fit)
     few = fit_with(settings, part.vector, some, part)
     old, new = np.split(few.vector, [len(part.problem)])
     problem = Problem(fit.problem.gripper, fit.problem.grasps, [*fit.problem.effects, *few.effects[-len(settings) :]])
-    return fit_once(
-        study.target, problem, study.simulators, np.r_[fit.moved(part.problem, old), new], fit.correction, rounds=0
-    )
+    roughly = partial(fit_once, study.target, problem, study.simulators, correction=fit.correction, rounds=0)
+    start = roughly(np.r_[fit.moved(part.problem, old), new], free=np.zeros(len(problem), bool))
+    further = roughly(start.vector, known_slopes=start.jacobian)
+    if further.cost < _WELL_BELOW * start.cost:
+        start = roughly(further.vector, free=np.zeros(len(problem), bool))
+        further = roughly(start.vector, known_slopes=start.jacobian)
+    return further
 
 
 def _without_needless(study: Study, fit: Fit, given: int) -> tuple[Fit, list[str]]:
@@ -128,8 +138,45 @@ def _without_needless(study: Study, fit: Fit, given: int) -> tuple[Fit, list[str
         name = _names(fit)[given + least]
         study.progress(f"{name} is needless beside the others")
         needless.append(name)
-        fit = roughly_without(name, fit, study)
+        fit = _without(name, study, fit)
     return fit, needless
+
+
+def _without(name: str, study: Study, fit: Fit) -> Fit:
+    """A rough fit that lacks an effect, by the slopes that there are: to measure those of all others takes long."""
+    problem, start, slopes = problem_without(name, fit)
+    return fit_once(study.target, problem, study.simulators, start, fit.correction, rounds=0, known_slopes=slopes)
+
+
+def _without_each(names: Sequence[str], study: Study, fit: Fit) -> list[Fit]:
+    """Models that lack one of these effects, once the others have made up for it as far as slopes tell."""
+
+    def one(name: str) -> Fit:
+        problem, start, slopes = problem_without(name, fit)
+        still = partial(
+            fit_once, study.target, problem, study.simulators, correction=fit.correction, rounds=0,
+            free=np.zeros(len(problem), bool), known_slopes=slopes,
+        )  # fmt: skip
+        at_first = still(start)
+        lengths = np.maximum(np.linalg.norm(at_first.slopes, axis=0), 1e-9)
+        left = (at_first.weight * at_first.residual).ravel()
+        step = np.linalg.lstsq(at_first.slopes / lengths, left, rcond=_FLAT)[0] / lengths
+        return min([at_first, still(at_first.vector + step)], key=lambda less: less.cost)
+
+    return side_by_side([partial(one, name) for name in names])
+
+
+def _needed(study: Study, fit: Fit, given: int) -> Fit:
+    """The fit without the effects that held-out grasps do not ask for."""
+    while names := _names(fit)[given:]:
+        study.progress("fitting without each of them")
+        held = study.heldout(fit)
+        fits = _without_each(names, study, fit)
+        needless = [less for less in fits if not is_beyond_chance(study.gains(study.heldout(less), held), LEAST_RISE)]
+        if not needless:
+            break
+        fit = min(needless, key=lambda less: less.cost)
+    return fit
 
 
 def _costs_of_absence(study: Study, fit: Fit) -> list[float]:
@@ -147,6 +194,16 @@ def _costs_of_absence(study: Study, fit: Fit) -> list[float]:
         left = [background.remove((fit.weight * one).ravel()) for one in (fit.residual, fit.residual - change)]
         costs.append(float(left[1] @ left[1] - left[0] @ left[0]))
     return costs
+
+
+def _at_the_end(study: Study, fit: Fit) -> Fit:
+    """The model itself, fitted; by the slopes that there are, where it leaves more than noise at any place near."""
+    target, problem, simulators = study.target, fit.problem, study.simulators
+    if not is_worth_looking(study, fit):
+        return fit_exactly(target, problem, simulators, fit.vector, fit.jacobian)
+    near = fit_once(target, problem, simulators, fit.vector, known_slopes=fit.jacobian)
+    held_still = np.zeros(len(problem), bool)  # for the slopes there
+    return fit_once(target, problem, simulators, near.vector, near.correction, free=held_still)
 
 
 def _steps(
@@ -169,8 +226,7 @@ def _steps(
         fits, on_few = [before] * len(names), _costs_of_absence(*study.on_few(fit))
         costs = np.array([on_few[_names(fit).index(name)] for name in names])
     else:
-        study.progress("fitting without each of them")
-        fits = side_by_side([partial(roughly_without, name, fit, study) for name in names])
+        fits = _without_each(names, study, fit)
         costs = np.array([less.cost - fit.cost for less in fits])
     costs = np.maximum(costs, 1e-9)
     changes = [Score(fit.effect(n), c, direction(less, fit)) for n, c, less in zip(names, costs, fits, strict=True)]
