@@ -137,9 +137,6 @@ def _add_effects(so_far: _SoFar, begun: Begun, rng: np.random.Generator, may_be_
         if much and screened is not fit:  # beside what was found since, others may do something else
             screen, screened = Screen(effects, study), fit
             step = look_further(study, fit, screen, untried, rng, richer)
-        if much and not step.effects and several.found(study, steps, fit, EXPLAINED_FAR):
-            _, steps, fit = so_far.all
-            continue
         if much and not step.effects:
             worth_it = not tried_anyway and step.error_before < FAR
             found = _fitted_anyway(study, fit, screen, untried, rng) if worth_it else None
@@ -147,6 +144,9 @@ def _add_effects(so_far: _SoFar, begun: Begun, rng: np.random.Generator, may_be_
             two = None if found else split(study, fit, screen, untried, steps, rng)
             steps, step = two or (steps, found or step)
             tried_anyway = True  # it takes long, and where it has helped signatures lead on
+        if much and not step.effects and several.found(study, steps, fit, EXPLAINED_FAR):
+            _, steps, fit = so_far.all
+            continue
         if not step.effects:
             so_far.all = study, [*steps, step], fit
             break

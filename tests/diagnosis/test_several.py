@@ -7,6 +7,8 @@ import itertools
 import numpy as np
 import pytest
 
+from forcegrasp.diagnosis import search
+from forcegrasp.diagnosis.families import roughly_without
 from forcegrasp.diagnosis.judge import judged
 from forcegrasp.diagnosis.refine import fit_with
 from forcegrasp.diagnosis.result import Step
@@ -112,3 +114,26 @@ def at_first(study, base):
 def test_nothing_is_found_where_nothing_is_hidden():
     study, base = study_of()
     assert add_several(study, base.fit, (), CATALOGUE, 0, np.random.default_rng(0), kept_by_nobody) is None
+
+
+@pytest.mark.parametrize("enough", [True, False])
+def test_a_search_that_is_stopped_keeps_what_rounds_found_if_it_explains_enough(mixed, found, monkeypatch, enough):
+    (study, base), (steps, fit) = mixed, found
+    left_out = [step.effects[0] for step in steps[:3]]
+    some = steps if enough else steps[3:]
+    less = fit if enough else roughly_without(left_out, fit, study)
+
+    def one_round(*given):
+        keep = given[-1]
+        keep(some, less)
+        raise KeyboardInterrupt
+
+    error = study.error(study.heldout(base.fit))
+    monkeypatch.setattr(search, "look_further", lambda *_, **__: Step((), (), (), error, error))
+    monkeypatch.setattr(search, "add_several", one_round)
+    for name in ("exchange", "split"):
+        monkeypatch.setattr(search, name, lambda *_: None)
+    rng = np.random.default_rng(0)
+    diagnosis = search.diagnose(study.target, base, study.simulators, CATALOGUE, rng)
+    assert diagnosis.stopped
+    assert set(diagnosis.preferred) == (set(HIDDEN) if enough else set())

@@ -170,7 +170,7 @@ def test_a_search_fits_anyway_once_and_judges_odd_grasps_again(creeping, monkeyp
         monkeypatch.setattr(module, "odd_grasps", odd)
     monkeypatch.setattr("forcegrasp.diagnosis.left_over.left_over", lambda *_: ("somewhere", None))
     monkeypatch.setattr(search, "leaves_little", lambda *_: False)
-    for name in ("exchange", "split"):
+    for name in ("exchange", "split", "add_several"):
         monkeypatch.setattr(search, name, lambda *_: None)
     diagnosis = search.diagnose(study.target, base, study.simulators, [SMOOTH, DELAY], np.random.default_rng(0))
     # beside what was found, signatures are others
