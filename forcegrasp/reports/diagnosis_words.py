@@ -8,7 +8,7 @@ from forcegrasp.diagnosis.evidence import may_be_besides
 from forcegrasp.diagnosis.faults import Fault
 from forcegrasp.diagnosis.late_rows import row_s
 from forcegrasp.diagnosis.result import Candidate, Diagnosis, Step, kept_steps
-from forcegrasp.diagnosis.verdict import EXPLAINED_FAR
+from forcegrasp.diagnosis.verdict import EXPLAINED_FAR, MUCH
 from forcegrasp.effects.for_gripper import effect_of
 from forcegrasp.identify.cross_validation import heldout_residual, rms_of_recordings
 from forcegrasp.identify.intervals import listed
@@ -19,6 +19,9 @@ from forcegrasp.short_repr import counted
 
 # An answer that leaves more than so many times the floor says so first.
 _MORE = 1.2
+
+# So many effects can make up for one that was not found.
+_MANY = 5
 
 # A delay is one of whole rows if it is that close to it.
 _WHOLE = 0.1
@@ -47,7 +50,9 @@ def lacks(diagnosis: Diagnosis) -> str:
         names = f"{listed(steps[0].effects, 'or')}: {_undecided(steps[0])}"
     else:
         names = listed([_with_rivals(step) for step in steps])
-    return f"{_but(diagnosis)}The model lacks {names}."
+    much_left = diagnosis.left and diagnosis.error_after > MUCH * diagnosis.floor
+    doubt = " With so much left, some of them may stand for others that they look like." if much_left else ""
+    return f"{_but(diagnosis)}The model lacks {names}.{doubt if len(steps) >= _MANY else ''}"
 
 
 def stopped_words(diagnosis: Diagnosis) -> str:

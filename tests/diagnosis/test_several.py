@@ -83,6 +83,7 @@ def test_steps_lead_from_the_first_error_to_the_last_and_share_out_what_it_falls
         assert candidate.p_family < 0.01
         assert candidate.heldout_gain > 5
         assert 0 < candidate.share < 1
+        assert candidate.error_after == pytest.approx(step.error_after)
         assert candidate.parameters() == fit.effect(step.effects[0]).parameters
 
 

@@ -57,6 +57,16 @@ def test_the_headline_says_how_much_each_effect_explains(made_up):
     assert [name for name, _ in box(diagnosis).shares] == ["force_bias 84%", "force_drift 14%", "left 2%"]
 
 
+@pytest.mark.parametrize(("error", "count", "doubtful"), [(2.4, 5, True), (1.4, 5, False), (2.4, 4, False)])
+def test_many_effects_that_leave_much_may_be_others(made_up, error, count, doubtful):
+    """Of a dozen effects at once, lags and delays were named in place of each other, with 2.4 × the noise left."""
+    diagnosis = two_effects(made_up, left="in all")
+    last = dataclasses.replace(diagnosis.steps[-1], error_after=error)
+    steps = (*diagnosis.steps[:1] * (count - 1), last)
+    told = diagnosis_report.answer(dataclasses.replace(diagnosis, steps=steps, error_after=error))
+    assert ("some of them may stand for others" in told) == doubtful
+
+
 @pytest.mark.parametrize("sought", [False, True])
 def test_a_law_that_was_sought_is_not_proposed_again(made_up, sought):
     diagnosis = dataclasses.replace(made_up.diagnosis("unknown"), left="in all", law_sought=sought)
