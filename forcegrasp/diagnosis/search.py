@@ -198,9 +198,11 @@ class _Several:
             self.so_far.all = (study, found, further) if enough else (study, steps, fit)
 
         further = add_several(study, fit, steps, self.begun.effects, self.begun.given, self.rng, keep)
-        if further is not None and not left_over(study, further[1])[0]:
+        if further is None:
+            self.so_far.all = study, steps, fit
+        elif not left_over(study, further[1])[0]:
             self.so_far.all = study, *further
-        elif further is not None:
+        else:
             keep(*further)
         self.done = self.so_far.all[2] is not fit
         return self.done

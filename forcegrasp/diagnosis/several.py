@@ -96,9 +96,11 @@ def add_several(
         keep(_steps(study, steps, before, fit, rng, in_a_hurry=True), fit)
         if not is_worth_looking(study, fit):
             break
-    if fit is before:
+    if fit is not before:
+        fit = _needed(study, fit, given)
+    if set(_names(fit)) <= set(_names(before)):
         return None
-    fit = _at_the_end(study, _needed(study, fit, given))
+    fit = _at_the_end(study, fit)
     return _steps(study, steps, before, fit, rng), fit
 
 
@@ -200,7 +202,7 @@ def _costs_of_absence(study: Study, fit: Fit) -> list[float]:
 
 
 def _at_the_end(study: Study, fit: Fit) -> Fit:
-    """The model itself, fitted; by the slopes that there are, where it leaves more than noise at any place near."""
+    """The model itself, fitted to the end; by the slopes that there are, if it leaves more than noise anyway."""
     target, problem, simulators = study.target, fit.problem, study.simulators
     if not is_worth_looking(study, fit):
         return fit_exactly(target, problem, simulators, fit.vector, fit.jacobian)
@@ -236,7 +238,7 @@ def _steps(
     null = null_gains([changes], rng)
     error, after = (study.error(study.heldout(one)) for one in (before, fit))
     fall = (error**2 - after**2) / costs.sum()
-    found = [step for step in steps if step.is_counted or step.effects[0] in _names(fit)]
+    found = [step for step in steps if step.is_counted or set(step.effects[:1]) & set(_names(fit))]
     for index in np.argsort(-costs):
         change, held = changes[index], study.heldout(fits[index])
         p_family = (1 + int(np.sum(null >= change.gain))) / (1 + len(null))
