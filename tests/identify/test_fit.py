@@ -356,7 +356,7 @@ def test_what_few_grasps_promise_is_fitted_though_one_grasp_of_all_is_far_off(fi
     gains = [(-1000.0, 45.0), (100.0, np.nan), (20.0, 10.0)]
     sized = [(dataclasses.replace(s, gain=all_), few) for s, (all_, few) in zip(scores, gains, strict=True)]
     monkeypatch.setattr(refine_module, "best_sizes", lambda *_: sized)
-    monkeypatch.setattr(refine_module, "_fit_from", lambda *_: threshold.fit)
+    monkeypatch.setattr(refine_module, "fit_with", lambda *_: threshold.fit)
     refined = refine(scores, threshold.study, threshold.fit, threshold.background)
     assert [r.score.gain for r in refined] == [40.0, 50.0]
 
