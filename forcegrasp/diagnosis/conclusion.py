@@ -9,6 +9,7 @@ import numpy as np
 
 from forcegrasp.diagnosis.ask_again import ask_again
 from forcegrasp.diagnosis.evidence import with_close_rivals
+from forcegrasp.diagnosis.forms import may_be_forms
 from forcegrasp.diagnosis.left_over import AS_GOOD_AS_NOTHING, left_by_many
 from forcegrasp.diagnosis.odd_grasps import OddGrasp, odd_grasps
 from forcegrasp.diagnosis.result import Diagnosis, Step, kept_steps, settle_ties
@@ -38,6 +39,14 @@ class Begun:
     def given(self) -> int:
         """Number of effects that were in the model before the search; they stay."""
         return len(self.base.fit.problem.effects)
+
+    def left(self, study: Study, fit: Fit) -> float:
+        """Error that a fit leaves of held-out grasps ÷ the floor."""
+        return study.error(study.heldout(fit)) / self.floor
+
+    def may_be_forms(self, study: Study, fit: Fit) -> bool:
+        """Whether no more is left than effects in the model may be off by that act in another form."""
+        return self.left(study, fit) < MUCH and may_be_forms(study, fit)
 
 
 def concluded(begun: Begun, study: Study, steps: Sequence[Step], fit: Fit, in_a_hurry: bool = False) -> Diagnosis:
@@ -77,5 +86,5 @@ def concluded(begun: Begun, study: Study, steps: Sequence[Step], fit: Fit, in_a_
         numerical, odd = numerical_error(fit, target), odd_grasps(target, fit)
     return Diagnosis(
         verdict, tuple(dict.fromkeys(names)), tuple(steps), base, fit, target, begun.folds, error_before, error_after,
-        numerical, floor, left, odd, noise, alone=alone,
+        numerical, floor, left, odd, noise, alone=alone, may_be_forms=bool(left) and begun.may_be_forms(study, fit),
     )  # fmt: skip

@@ -47,7 +47,7 @@ def are_even_in_truth(target: Target, fit: Fit) -> bool:
         predict(Replay(gripper, grasps, cheap_tier(gripper)), [case])[0]
         for grasps in (target.grasps, [evenly(g) for g in target.grasps])
     )
-    change = np.where(target.mask[..., None], (even - said) / target.sigma, 0.0)
+    change = target.change(even, said)
     background = Background(fit, ())
     before, after = (left_beyond_noise(r, background, target) for r in (fit.residual, fit.residual - change))
     return after < (1 - WORTH_A_FIT) * before

@@ -160,6 +160,7 @@ class Diagnosis(ShortRepr):
     stopped: str = ""  #: why the search was cut short, in words; empty if it was not
     left_out: tuple[OddGrasp, ...] = ()  #: grasps of which the rest does not speak, with what the final model leaves
     alone: str = ""  #: the one grasp that shows more than noise, in words, where all others show none; empty if none
+    may_be_forms: bool = False  #: whether what is left is no more than the forms of what was found may be off by
 
     @property
     def preferred(self) -> tuple[str, ...]:

@@ -121,9 +121,10 @@ def _add_effects(so_far: _SoFar, begun: Begun, rng: np.random.Generator, may_be_
     study, steps, fit = so_far.all
     screen, screened, tried_anyway, several = Screen(effects, study), fit, False, _Several(so_far, begun, rng)
     for _ in range(MOST_EFFECTS):
-        untried = () if several.done else left_to_try(effects, fit, steps)
-        richer = list(families.extensions(fit, effects))
-        if not (untried or richer) or (several.done and several.left(study, fit) > MUCH):
+        others, richer = left_to_try(effects, fit, steps), list(families.extensions(fit, effects))
+        forms = begun.may_be_forms(study, fit)
+        untried = () if several.done or forms else others
+        if not (untried or richer or forms) or (several.done and begun.left(study, fit) > MUCH):
             break  # with a dozen effects and much left, all that could be asked takes long and says little
         study = with_few(study, fit)
         if several.are_likely(study, fit, screen, untried) and several.found(study, steps, fit, EXPLAINED):
@@ -134,17 +135,17 @@ def _add_effects(so_far: _SoFar, begun: Begun, rng: np.random.Generator, may_be_
         much = not step.effects and so_far.believed is None and not several.done
         much = much and step.error_before > AS_GOOD_AS_NOTHING * begun.floor
         much = much and not (may_be_given is not None and may_be_given(study.target, fit))
-        if much and screened is not fit:  # beside what was found since, others may do something else
+        if much and untried and screened is not fit:  # beside what was found since, others may do something else
             screen, screened = Screen(effects, study), fit
             step = look_further(study, fit, screen, untried, rng, richer)
         if much and not step.effects:
-            worth_it = not tried_anyway and step.error_before < FAR
+            worth_it = untried and not tried_anyway and step.error_before < FAR
             found = _fitted_anyway(study, fit, screen, untried, rng) if worth_it else None
-            found = found or exchange(study, fit, screen, untried, steps, rng)
-            two = None if found else split(study, fit, screen, untried, steps, rng)
+            found = found or exchange(study, fit, screen, others, steps, rng)
+            two = None if found or forms else split(study, fit, screen, untried, steps, rng)
             steps, step = two or (steps, found or step)
             tried_anyway = True  # it takes long, and where it has helped signatures lead on
-        if much and not step.effects and several.found(study, steps, fit, EXPLAINED_FAR):
+        if much and untried and not step.effects and several.found(study, steps, fit, EXPLAINED_FAR):
             _, steps, fit = so_far.all
             continue
         if not step.effects:
@@ -180,12 +181,8 @@ class _Several:
         """Whether what is left, beside an effect that was found, is not that of one other."""
         if len(fit.problem.effects) == self.begun.given:
             return False
-        left = self.left(study, fit)
+        left = self.begun.left(study, fit)
         return left > _VERY_MUCH_LEFT or (left > _MUCH_LEFT and none_stands_out(study, fit, screen, untried))
-
-    def left(self, study: Study, fit: Fit) -> float:
-        """Error that a fit leaves ÷ the floor."""
-        return study.error(study.heldout(fit)) / self.begun.floor
 
     def found(self, study: Study, steps: list[Step], fit: Fit, least_share: float) -> bool:
         """Whether several were found that together explain this share of what a fit leaves, or leave nothing."""
@@ -211,7 +208,7 @@ class _Several:
 def _tidy_up(so_far: _SoFar, begun: Begun) -> None:
     """Leaves out and puts together what can be, now that all is found, and fits effects that jump once more."""
     study, steps, fit = so_far.all
-    if len(fit.problem.effects) > MOST_EFFECTS and study.error(study.heldout(fit)) > MUCH * begun.floor:
+    if len(fit.problem.effects) > MOST_EFFECTS and begun.left(study, fit) > MUCH:
         return  # a dozen make 66 pairs, and what is left decides between them
     steps, fit = simplify(study, steps, fit, begun.given)
     so_far.all = study, steps, fit

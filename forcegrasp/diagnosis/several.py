@@ -15,6 +15,7 @@ import numpy as np
 from forcegrasp.diagnosis.evidence import LEAST_RISE, LEAST_SHARE_OF_MANY, is_beyond_chance
 from forcegrasp.diagnosis.families import may_join, problem_without
 from forcegrasp.diagnosis.few import with_few
+from forcegrasp.diagnosis.forms import done_by_each
 from forcegrasp.diagnosis.judge import judged
 from forcegrasp.diagnosis.left_over import is_worth_looking
 from forcegrasp.diagnosis.needless import chained
@@ -27,7 +28,6 @@ from forcegrasp.diagnosis.verdict import EXPLAINED
 from forcegrasp.effects import Effect
 from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.identify.fit import Fit, fit_exactly, fit_once
-from forcegrasp.identify.predict import Case, predict
 from forcegrasp.identify.problem import Problem
 from forcegrasp.identify.side_by_side import side_by_side
 
@@ -189,14 +189,11 @@ def _costs_of_absence(study: Study, fit: Fit) -> list[float]:
 
     Slopes say nothing of an effect in steps, or of how far off a limit is: the model is simulated without each.
     """
-    case, target, costs = fit.problem.case(fit.vector), study.target, []
-    less = [Case(case.base, tuple(e for e in case.effects if e is not one)) for one in case.effects]
-    own, *others = predict(study.rough or study.simulators.cheap, [case, *less])
-    for index, signals in enumerate(others):
-        change = np.where(target.mask[..., None], (signals - own) / target.sigma, 0.0)
+    costs = []
+    for index, done in enumerate(done_by_each(study, fit)):
         places = [i for i, entry in enumerate(fit.problem.entries) if entry.effect == index]
         background = Background(fit, study.numerical, without=places)
-        left = [background.remove((fit.weight * one).ravel()) for one in (fit.residual, fit.residual - change)]
+        left = [background.remove((fit.weight * one).ravel()) for one in (fit.residual, fit.residual + done)]
         costs.append(float(left[1] @ left[1] - left[0] @ left[0]))
     return costs
 

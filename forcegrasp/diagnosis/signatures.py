@@ -191,8 +191,7 @@ def _changes(tried: Sequence[EffectSetting], study: Study, fit: Fit) -> np.ndarr
     start = fit.problem.case(fit.vector)
     cases = [start, *(Case(start.base, (*start.effects, one)) for one in tried)]
     signals = predict(study.rough or study.simulators.cheap, cases)
-    target = study.target
-    return np.where(target.mask[..., None], (signals[1:] - signals[0]) / target.sigma, 0.0).reshape(len(tried), -1).T
+    return study.target.change(signals[1:], signals[0]).reshape(len(tried), -1).T
 
 
 def _weighted(changes: np.ndarray, fit: Fit) -> np.ndarray:

@@ -256,7 +256,7 @@ def _columns(target: Target, fit: Fit, numbers: Sequence[_Number]) -> np.ndarray
         trials.append((_PERIOD, 1))
     columns: dict[str, tuple[float, np.ndarray]] = {}
     for (kind, way), one in zip(trials, signals, strict=True):
-        change = np.where(target.mask[..., None], (one - as_said) / target.sigma, 0.0)
+        change = target.change(one, as_said)
         asked = float(np.sum(change * fit.residual)) / max(float(np.linalg.norm(change)), 1e-9)
         if kind not in columns or asked > columns[kind][0]:
             columns[kind] = asked, way * change

@@ -380,7 +380,7 @@ class _Local:
             self._age += 1
             before, signals, slopes = self._slope
             step = x - before
-            surprise = np.where(self.target.mask[..., None], (value - signals) / self.target.sigma, 0) - slopes @ step
+            surprise = self.target.change(value, signals) - slopes @ step
             slopes = slopes + surprise[..., None] * (step / (step @ step))
         self._slope = (x.copy(), value, slopes)
         return slopes

@@ -33,9 +33,7 @@ def numerical_error(fit: Fit, target: Target) -> tuple[np.ndarray, ...]:
         Replay(gripper, grasps, step_factor=1.0 if gripper.steps_as_its_drive else 0.5, strict=True),
         Replay(gripper, grasps, other_collisions=True, strict=True),
     )
-    return tuple(
-        np.where(target.mask[..., None], (predict(o, case)[0] - fit.predicted) / target.sigma, 0.0) for o in others
-    )
+    return tuple(target.change(predict(o, case)[0], fit.predicted) for o in others)
 
 
 def beyond_fit(fit: Fit, numerical: Sequence[np.ndarray]) -> tuple[np.ndarray, ...]:
@@ -47,35 +45,44 @@ def beyond_fit(fit: Fit, numerical: Sequence[np.ndarray]) -> tuple[np.ndarray, .
     return tuple(left)
 
 
-def numerical_floor(numerical: Sequence[np.ndarray], target: Target, where: np.ndarray | None = None) -> float:
+def numerical_floor(
+    numerical: Sequence[np.ndarray],
+    target: Target,
+    where: np.ndarray | None = None,
+    tolerated: np.ndarray | None = None,
+) -> float:
     """rms residual ÷ noise that sensor noise and the model's own numerical error leave.
 
     Args:
       numerical: from :func:`beyond_fit`, each ``(G, S, C)``.
       target: the measurements.
       where: choice of samples and signals, ``(G, S, C)``.
+      tolerated: what the model may be off by besides, ÷ noise, ``(G, S, C)``.
     """
     half, other = (rms(n, target, where) for n in numerical)
+    besides = 0.0 if tolerated is None else rms(tolerated, target, where)
     # Halving the step shows about half of what the step costs in all.
-    return float(np.sqrt(1 + 4 * half**2 + other**2))
+    return float(np.sqrt(1 + 4 * half**2 + other**2 + besides**2))
 
 
-def excess(residual: np.ndarray, numerical: Sequence[np.ndarray], target: Target) -> str:
+def excess(
+    residual: np.ndarray, numerical: Sequence[np.ndarray], target: Target, tolerated: np.ndarray | None = None
+) -> str:
     """Where residuals show more than sensor noise and numerical error; empty if nowhere.
 
     Args:
       residual: in units of the noise, ``(G, S, C)``.
-      numerical: as for :func:`numerical_floor`.
-      target: the measurements.
+      numerical, target, tolerated: as for :func:`numerical_floor`.
     """
-    error, floor = rms(residual, target), numerical_floor(numerical, target)
+    error, floor = rms(residual, target), numerical_floor(numerical, target, tolerated=tolerated)
     if error > floor * max(_ROOM, _by_chance(residual, target)):
         return f"{error:.2f} × noise in all, {floor:.2f} is the floor"
     for name, where in cells(target):
-        error, floor = rms(residual, target, where), numerical_floor(numerical, target, where)
+        error, floor = rms(residual, target, where), numerical_floor(numerical, target, where, tolerated)
         if error > floor * max(_ROOM_IN_CELL, _by_chance(residual, target, where)):
             return f"{name}: {error:.2f} × noise, {floor:.2f} is the floor"
-    far = np.abs(residual) > _OUTLIER + 3 * (2 * np.abs(numerical[0]) + np.abs(numerical[1]))
+    off = 2 * np.abs(numerical[0]) + np.abs(numerical[1]) + (0.0 if tolerated is None else tolerated)
+    far = np.abs(residual) > _OUTLIER + 3 * off
     if far.sum() > max(_MAX_OUTLIERS, 2e-4 * target.readings):
         return f"{far.sum()} readings are more than {_OUTLIER:g} σ off"
     return ""

@@ -86,6 +86,7 @@ def diagnosis_json(diagnosis: Diagnosis, advice: Advice | None, tried: Sequence[
         "odd_grasps": [dataclasses.asdict(grasp) for grasp in diagnosis.odd],
         "left_out": [dataclasses.asdict(grasp) for grasp in diagnosis.left_out],
         "alone": diagnosis.alone,
+        "may_be_forms": diagnosis.may_be_forms,
         "uneven_noise": diagnosis.is_uneven_noise,
         "steps": [_step_json(step, diagnosis) for step in diagnosis.steps],
         "ranking": ranking(diagnosis),

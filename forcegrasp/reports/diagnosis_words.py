@@ -6,6 +6,7 @@ import numpy as np
 
 from forcegrasp.diagnosis.evidence import may_be_besides
 from forcegrasp.diagnosis.faults import Fault
+from forcegrasp.diagnosis.forms import FORM_TOLERANCE
 from forcegrasp.diagnosis.late_rows import row_s
 from forcegrasp.diagnosis.result import Candidate, Diagnosis, Step, kept_steps
 from forcegrasp.diagnosis.verdict import EXPLAINED_FAR, MUCH
@@ -251,9 +252,19 @@ def left_sentence(diagnosis: Diagnosis) -> str:
         f"; {diagnosis.floor_of_model:.2f} × is the floor of the model with what was found: half its physics step"
         " changes what it foretells by so much, as where a finger slips, or a drive switches, a moment early or late"
     )
-    return (
+    sentence = (
         f"what is left is largest in {place}{goes}; a better model could explain {rest['explainable']:.0%} of the"
         f" remaining mean square error at most{no_better if foretells_no_better(diagnosis) else ''}"
+    )
+    return f"{sentence}{_forms_words(diagnosis)}" if diagnosis.may_be_forms else sentence
+
+
+def _forms_words(diagnosis: Diagnosis) -> str:
+    """Why no other effect was looked for: what is left may be the forms of those that were found."""
+    what, act = ("this effect does", "it acts") if len(diagnosis.preferred) == 1 else ("these effects do", "they act")
+    return (
+        f". That is within {FORM_TOLERANCE:.0%} of what {what}, and may be that {act} in another form than the"
+        " catalogue's; another effect could not be told from that, and none was looked for"
     )
 
 

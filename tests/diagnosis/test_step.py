@@ -172,6 +172,7 @@ def test_a_search_fits_anyway_once_and_judges_odd_grasps_again(creeping, monkeyp
     monkeypatch.setattr(search, "leaves_little", lambda *_: False)
     for name in ("exchange", "split", "add_several"):
         monkeypatch.setattr(search, name, lambda *_: None)
+    monkeypatch.setattr(conclusion, "may_be_forms", lambda *_: False)
     diagnosis = search.diagnose(study.target, base, study.simulators, [SMOOTH, DELAY], np.random.default_rng(0))
     # beside what was found, signatures are others
     assert asked == ([False, True, False, False] if error < 10 else [False])
