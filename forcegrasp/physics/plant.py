@@ -264,7 +264,16 @@ class Plant(ModelFields):
         self._enabled = np.array(enabled, bool)
         self._write_force_range()
 
-    def play(self, commands: np.ndarray, fresh: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def stretch_steps(self, times: np.ndarray) -> None:
+        """Makes physics steps so many times as long as :attr:`dt`, ``(n,)``, until the next call.
+
+        For samples that are unevenly apart. Effects take steps for as long as they always are.
+        """
+        self.field("opt.timestep")[:] = self.dt * times
+
+    def play(
+        self, commands: np.ndarray, fresh: np.ndarray, stretch: np.ndarray | None = None, at_once: int = 1
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Holds each command for one physics step, as :meth:`advance` does, in one call of the engine.
 
         Afterwards only a reset makes sense: what is read is not brought up to date.
@@ -272,6 +281,8 @@ class Plant(ModelFields):
         Args:
           commands: commanded positions, m or rad, ``(n, steps, motors)``.
           fresh: which of them are new ones, ``(n, steps)``.
+          stretch: how many times as long as :attr:`dt` steps are, ``(steps ÷ at_once, n)``; as long by default.
+          at_once: number of steps that are equally long.
 
         Returns:
           Positions ``(n, steps, motors)``, force readings ``(n, steps, channels)`` and object positions ``(n, steps)``
@@ -286,10 +297,17 @@ class Plant(ModelFields):
         commands = self.effects.commands(commands, fresh)
         control[..., self._drives] = commands * self._command_scale + self._command_zero
         self._apply_actions()
-        record = self.batch.rollout(commands.shape[1], control, record=["qpos", "sensordata"])
-        sensors, scale = record["sensordata"], self.force_scale[:, None, None]
+        parts: list[dict[str, np.ndarray]] = []
+        length = commands.shape[1] if stretch is None else at_once
+        for low in range(0, commands.shape[1], length):
+            part = control[:, low : low + length]
+            if stretch is not None:
+                self.stretch_steps(stretch[low // length])
+            parts.append(self.batch.rollout(part.shape[1], part, record=["qpos", "sensordata"]))
+        positions, sensors = (np.concatenate([one[name] for one in parts], axis=1) for name in ("qpos", "sensordata"))
+        scale = self.force_scale[:, None, None]
         force = self._channels_of(sensors, self._pads_of(sensors) * scale, scale)
-        return self._motors_of(record["qpos"]), force, self._object_of(record["qpos"])
+        return self._motors_of(positions), force, self._object_of(positions)
 
     @property
     def acts_in_steps(self) -> bool:

@@ -15,6 +15,7 @@ from forcegrasp.measure.schema import MeasuredGrasp
 from forcegrasp.physics.gripper import START_VELOCITY, Gripper
 from forcegrasp.physics.plant import Plant, write_base
 from forcegrasp.physics.sensors import ReadingEffects
+from forcegrasp.replay.sample_steps import SampleSteps, fitting_factor, place_samples
 from forcegrasp.replay.time_limit import check_time
 from forcegrasp.short_repr import ShortRepr
 
@@ -26,9 +27,6 @@ _AT_REST = 1 / 45
 _CHUNK = 8_000_000
 #: Where a row is that diverged, m or rad, N or N·m: so far off that no search for parameters goes there.
 NOWHERE = 1e6
-# A physics step that is off by less than this share is what it should be; by more than the other, it is no longer that
-# of the gripper. Samples that scatter by this share of it have no period.
-_SAME_STEP, _OTHER_STEP, _JITTER = 1e-5, 0.1, 0.25
 # Motions that are kept; those of 24 grasps of 6 s take 3 MB.
 _REMEMBERED = 16
 #: What a driver reads of positions, m or rad, ``(n, motors)``, in these grasps, ``(n,)``, at these samples, ``(n,)``.
@@ -66,10 +64,11 @@ class Replay:
     """Replays grasps of one gripper.
 
     A command acts from the physics step at its time stamp until the next command's; a reading is the state at its time
-    stamp, before that command acts. Of grasps it is that of the nearest physics step, and the step is made to divide
-    the time between two samples; of a servo, which may be sampled faster than that, it lies between two. So do readings
-    that are taken later than their time stamps, or earlier. Of grasps, a command that is delayed acts at the next whole
-    step, and all is read so much later: a motor at its limit gives for a part of a command as much as for the whole.
+    stamp, before that command acts. Of grasps physics steps are made to divide the time between two samples, that
+    between any two anew if need be; of a servo, which may be sampled faster than that, a reading lies between two. So
+    do readings that are taken later than their time stamps, or earlier. Of grasps, a command that is delayed acts at
+    the next whole step, and all is read so much later: a motor at its limit gives for a part of a command as much as
+    for the whole.
 
     Args:
       gripper: what is simulated.
@@ -95,9 +94,11 @@ class Replay:
         self._strict, self.diverged = strict, ""
         self.gripper, self.grasps, self.tier = gripper, tuple(grasps), tier
         timestep = float(gripper.compile(tier).opt.timestep)
-        self._step_factor = step_factor * (1.0 if gripper.is_servo else _fitting_factor(self.grasps, timestep))
+        self._step_factor = step_factor * (1.0 if gripper.is_servo else fitting_factor(self.grasps, timestep))
         self.dt, self._other_collisions = timestep * self._step_factor, other_collisions
-        starts = [np.rint((g.time_s - g.time_s[0]) / self.dt).astype(int) for g in self.grasps]
+        nearest = [np.rint((g.time_s - g.time_s[0]) / self.dt).astype(int) for g in self.grasps]
+        placed = SampleSteps(nearest) if gripper.is_servo else place_samples(self.grasps, self.dt)
+        starts, self._steps_at_once = placed.starts, placed.at_once
         self._steps = 1 + max(start[-1] for start in starts)
         samples = max(len(start) for start in starts)
         #: physics step at which each sample is taken, ``(grasps, samples)``
@@ -105,6 +106,8 @@ class Replay:
         self._instants = self.sample_steps  # when each sample is taken, in steps
         latest_s = max(gripper.latest_reading_s, *(max(g.late_s) for g in self.grasps))
         self._steps += math.ceil(latest_s / self.dt) + 1
+        #: how many times as long as usual steps are, a row for so many at once, ``(…, grasps)``
+        self._stretch = placed.lengths(self._steps)
         if gripper.is_servo:
             real = [(g.time_s - g.time_s[0]) / self.dt for g in self.grasps]
             self._instants = np.stack([np.pad(r, (0, samples - len(r)), "edge") for r in real])
@@ -202,7 +205,9 @@ class Replay:
         if not plant.acts_in_steps and not self._disturbed:
             commands = self._command[:-1, grasp].swapaxes(0, 1)
             fresh = self._fresh[:-1, grasp].T
-            position[:, 1:], force[:, 1:], objects[:, 1:] = plant.play(commands, fresh)
+            stretch = None if self._stretch is None else self._stretch[:, grasp]
+            played = plant.play(commands, fresh, stretch, self._steps_at_once)
+            position[:, 1:], force[:, 1:], objects[:, 1:] = played
         else:
             for step in range(self._steps - 1):
                 check_time()
@@ -216,6 +221,8 @@ class Replay:
                     plant.recorded_position = np.where(new[:, None], reads, before)
                 if self._disturbed:
                     plant.disturb(self._load[step, grasp], self._enabled[step, grasp] > 0)
+                if self._stretch is not None and step % self._steps_at_once == 0:
+                    plant.stretch_steps(self._stretch[step // self._steps_at_once, grasp])
                 plant.advance(self._command[step, grasp], 1, new)
                 position[:, step + 1], force[:, step + 1] = plant.position, plant.transduced_force
                 objects[:, step + 1] = plant.object_position
@@ -339,15 +346,6 @@ def _earlier(
             latest = np.searchsorted(first, np.arange(steps), side="right") - 1
             commands[index, latest >= 0] = command[latest[latest >= 0]]
     return commands, fresh, moved
-
-
-def _fitting_factor(grasps: Sequence[MeasuredGrasp], timestep: float) -> float:
-    """What a physics step is multiplied with for samples to be whole steps apart; 1 if they are, or never will be."""
-    apart = np.concatenate([np.diff(g.time_s) for g in grasps])
-    period = float(np.median(apart))
-    factor = period / (timestep * max(1.0, np.rint(period / timestep)))
-    regular = np.median(np.abs(apart - period)) < _JITTER * timestep
-    return factor if regular and _SAME_STEP < abs(factor - 1) < _OTHER_STEP else 1.0
 
 
 def join(motions: Sequence[Motion]) -> Motion:
