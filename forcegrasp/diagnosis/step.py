@@ -96,13 +96,15 @@ def look_further(
     of_many = bool(ordered) and not is_significant(ordered[0], start.least_gain)
     if not ordered or (of_many and not start.may_be_of_many(ordered[0], look.share_together, least_promise)):
         return Step((), ordered, look.scores, start.error, start.error)
-    winner = ordered[0]
+    winner, later = start.simpler_first(ordered)
+    others = [c for c in ordered if (c.effect, c.replaces) != (winner.effect, winner.replaces)]
+    rivals = [c for c in others if c.effect.name not in redundant | later]
     # of those that can't be told apart the simplest comes first
     equal = sorted(
-        [winner, *(c for c in ordered[1:] if c.effect.name not in redundant and indistinguishable(winner, c))],
+        [winner, *(c for c in rivals if indistinguishable(winner, c))],
         key=lambda c: len(c.effect.parameters),
     )
-    ordered = (*equal, *(c for c in ordered if c not in equal))
+    ordered = (*equal, *(c for c in others if c not in equal))
     names = tuple(c.effect.name for c in equal)
     return Step(names, ordered, look.scores, start.error, equal[0].error_after, of_many)
 
@@ -179,6 +181,30 @@ class _Start:
         """Whether an effect that was found leaves more than noise."""
         leaves_more = rms_error(best.fit, self._study.target) > _ALL_FITTED
         return leaves_more and not (self.place(best)[0] or best.replaces or best.effect.of_set)
+
+    def simpler_first(self, ordered: Sequence[Candidate]) -> tuple[Candidate, set[str]]:
+        """The best candidate, or what it contains, if that can't be told from a mistake of the set.
+
+        What the best one has besides may then be of another effect beside either: of an encoder that is off, where
+        objects are smaller than the set says, which is backlash that differs by finger. So that is for the next step.
+        Only where it leaves more than noise, and no mistake of the set leaves less.
+
+        Args:
+          ordered: candidates, the best first.
+
+        Returns:
+          The candidate, and the names of those that it was preferred to.
+        """
+        best, *others = ordered
+        contained = {nested.effect for nested in best.effect.contains}
+        of_set = [c for c in others if c.effect.of_set]
+        if best.replaces or not of_set or rms_error(best.fit, self._study.target) <= _ALL_FITTED:
+            return best, set()
+        for simpler in others:
+            if simpler.effect.name in contained and any(indistinguishable(simpler, c) for c in of_set):
+                (first,) = self._at_the_end([simpler], {simpler.effect.name: []})
+                return first, {best.effect.name}
+        return best, set()
 
     def _rivals(self, best: Candidate, candidates: Sequence[Candidate], at_the_end: Collection[str]) -> list[Candidate]:
         """Rough fits that gained nearly as much as one that leaves more than noise at the end.

@@ -222,3 +222,28 @@ def test_an_effect_that_comes_back_after_it_gave_way_is_kept(made_up):
     assert first.effects == ("force_bias",)
     assert [step.effects[0] for step in kept_steps([first, second])] == ["force_drift"]
     assert [step.effects[0] for step in kept_steps([first, second, again])] == ["force_drift", "force_bias"]
+
+
+@pytest.mark.parametrize(
+    ("left", "alike", "of_set", "first"),
+    [
+        (1.6, True, True, "backlash"),
+        (1.6, False, True, "backlash_asymmetry"),
+        (1.6, True, False, "backlash_asymmetry"),
+        (1.0, True, True, "backlash_asymmetry"),  # nothing is left that another effect could explain
+    ],
+)
+def test_what_an_effect_contains_comes_first_where_the_set_may_be_wrong_instead(
+    monkeypatch, left, alike, of_set, first
+):
+    """Encoders that are off, and objects that are smaller than the set says, are backlash that differs by finger."""
+    monkeypatch.setattr(step_module, "rms_error", lambda *_: left)
+    monkeypatch.setattr(step_module, "indistinguishable", lambda *_: alike)
+    monkeypatch.setattr(_Start, "_at_the_end", lambda _, some, __: some)
+    start = object.__new__(_Start)
+    start._study = SimpleNamespace(target=None)
+    names = ("backlash_asymmetry", "backlash", "object_size" if of_set else "encoder_bias")
+    ordered = [SimpleNamespace(effect=effect_of(n, light_gripper()), replaces="", fit=None) for n in names]
+    winner, later = start.simpler_first(ordered)
+    assert winner.effect.name == first
+    assert later == {"backlash_asymmetry"} - {first}
