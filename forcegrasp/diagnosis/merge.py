@@ -11,15 +11,25 @@ import numpy as np
 
 from forcegrasp.diagnosis.evidence import LEAST_RISE, is_beyond_chance, nearly_as_much
 from forcegrasp.diagnosis.exchange import are_alike
-from forcegrasp.diagnosis.families import may_join, refit_as, refit_without, roughly_as, roughly_without
+from forcegrasp.diagnosis.families import (
+    may_join,
+    problem_without,
+    refit_as,
+    refit_without,
+    roughly_as,
+    roughly_without,
+)
 from forcegrasp.diagnosis.needless import SURELY, chained, is_enough
 from forcegrasp.diagnosis.result import Step, kept_steps
-from forcegrasp.diagnosis.signatures import trials
+from forcegrasp.diagnosis.signatures import Background, Signatures, trials
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.effects import Effect
 from forcegrasp.effects.setting import EffectSetting
-from forcegrasp.identify.fit import Fit
+from forcegrasp.identify.fit import Fit, fit_once
 from forcegrasp.identify.side_by_side import side_by_side
+
+# Signatures are straight: an effect that does for two promises at least this share of what they explain.
+_PROMISE = 0.5
 
 
 def merge(
@@ -51,7 +61,9 @@ def _one_for_two(
     held, few = study.heldout(fit), study.on_few(fit)
     searched = {one.effect.name for one in fit.problem.effects[given:]}
     found = [step.effects[0] for step in kept_steps(steps) if step.candidates and step.effects[0] in searched]
-    tried = [(pair, effect) for pair in combinations(found, 2) for effect in _like_both(pair, fit, effects)]
+    pairs = [(pair, alike) for pair in combinations(found, 2) if (alike := list(_like_both(pair, fit, effects)))]
+    promising = side_by_side([partial(_promising, *few, pair, alike) for pair, alike in pairs])
+    tried = [(pair, effect) for (pair, _), some in zip(pairs, promising, strict=True) for effect in some]
     for pair, effect in tried:
         study.progress(f"fitting with {effect.name} in place of {pair[0]} and {pair[1]}")
     settings = side_by_side([partial(_roughly_as_good, *few, pair, effect) for pair, effect in tried])
@@ -77,6 +89,17 @@ def _like_both(pair: Collection[str], fit: Fit, effects: Sequence[type[Effect]])
             and all(are_alike(effect, one) for one in two)
         ):
             yield effect
+
+
+def _promising(study: Study, fit: Fit, pair: Collection[str], effects: Sequence[type[Effect]]) -> list[type[Effect]]:
+    """Those of the effects whose signatures, without the pair, come near enough to what the pair explains."""
+    problem, start, slopes = problem_without(pair, fit)
+    without = fit_once(study.target, problem, study.simulators, start, fit.correction, rounds=0, known_slopes=slopes)
+    signatures, tried = Signatures(study), trials(effects)
+    signatures.simulate(without, tried)
+    scores = signatures.scores(without, Background(without, study.numerical), tried)
+    least = _PROMISE * (without.cost - fit.cost)
+    return list(dict.fromkeys(of_kind[0].setting.effect for of_kind in scores if of_kind[0].gain > least))
 
 
 def _roughly_as_good(study: Study, fit: Fit, pair: Collection[str], effect: type[Effect]) -> EffectSetting | None:

@@ -208,12 +208,11 @@ class _Several:
 def _tidy_up(so_far: _SoFar, begun: Begun) -> None:
     """Leaves out and puts together what can be, now that all is found, and fits effects that jump once more."""
     study, steps, fit = so_far.all
-    if len(fit.problem.effects) > MOST_EFFECTS and begun.left(study, fit) > MUCH:
-        return  # a dozen make 66 pairs, and what is left decides between them
-    steps, fit = simplify(study, steps, fit, begun.given)
-    so_far.all = study, steps, fit
-    steps, fit = merge(study, steps, fit, begun.effects, begun.given)
-    so_far.all = study, steps, fit
+    if len(fit.problem.effects) <= MOST_EFFECTS:  # a dozen make 66 pairs; what they do not need was left out already
+        steps, fit = simplify(study, steps, fit, begun.given)
+        so_far.all = study, steps, fit
+        steps, fit = merge(study, steps, fit, begun.effects, begun.given)
+        so_far.all = study, steps, fit
     so_far.all = study, *_look_beside_all(study, steps, fit)
 
 

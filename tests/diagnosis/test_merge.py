@@ -7,11 +7,11 @@ import dataclasses
 import numpy as np
 import pytest
 
-from forcegrasp.diagnosis.merge import merge
+from forcegrasp.diagnosis.merge import _promising, merge
 from forcegrasp.diagnosis.result import Candidate, Step
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.effects import get_effect
-from forcegrasp.effects.for_gripper import effects_of
+from forcegrasp.effects.for_gripper import effect_of, effects_of
 from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.identify.cross_validation import make_folds
 from forcegrasp.identify.fit import Simulators, fit_exactly
@@ -61,6 +61,14 @@ def test_a_late_command_stands_for_late_positions_and_late_forces(late):
     error = study.error(study.heldout(less))
     assert (left[0].error_before, left[0].error_after, left[1].error_before) == (9.0, error, error)
     assert error < 1.02 * steps[1].error_after
+
+
+def test_what_promises_less_than_half_of_what_both_explain_is_not_fitted(late, monkeypatch):
+    study, _, fit = late
+    delay, *others = (effect_of(name, light_gripper()) for name in ("command_delay", "force_bias", "force_drift"))
+    assert _promising(study, fit, LATE, [delay, *others]) == [delay]
+    monkeypatch.setattr("forcegrasp.diagnosis.merge._PROMISE", -1.0)
+    assert set(_promising(study, fit, LATE, [delay, *others])) > {delay}
 
 
 def test_what_was_given_stays(late):
