@@ -127,6 +127,7 @@ def _with_one(study: Study, steps: Sequence[Step], fit: Fit, pair: Collection[st
         of_recordings=_added([c.of_recordings for c in both]),
         error_after=error,
         replaces="",
+        without=None,
     )
     others = [c for c in second.candidates[1:] if c.effect is not one.effect]
     merged = dataclasses.replace(

@@ -45,6 +45,7 @@ class Candidate(ShortRepr):
     #: the gains of each of a servo's recordings, ``(R,)``, for their windows err alike; None of grasps
     of_recordings: np.ndarray | None = None
     harms: bool = False  #: whether some recording is surely worse with it
+    without: Fit | None = None  #: the final model without it, if it was found together with others
 
     def summary(self) -> str:
         sizes = some(f"{name} {value:.3g}" for name, value in self.parameters().items())

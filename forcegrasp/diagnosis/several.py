@@ -241,6 +241,6 @@ def _steps(
         p_family = (1 + int(np.sum(null >= change.gain))) / (1 + len(null))
         candidate = judged(study, held, fit, change.setting, p_family, change.signature)
         before_it, error = error, float(np.sqrt(max(error**2 - fall * costs[index], 0.0)))
-        candidate = dataclasses.replace(candidate, error_after=error)
+        candidate = dataclasses.replace(candidate, error_after=error, without=fits[index])
         found.append(Step((change.setting.effect.name,), (candidate,), (), before_it, error))
     return chained(found, after)

@@ -37,12 +37,13 @@ def where(diagnosis: Diagnosis) -> dict[str, Any]:
 
 
 def found_steps(diagnosis: Diagnosis) -> list[tuple[Step, Fit]]:
-    """The steps that found something, each with the fit that it started from."""
+    """The steps that found something, each with the fit that it started from, or of all others found with it."""
     found, fit = [], diagnosis.base.fit
     for step in diagnosis.steps:
         if step.effects:
-            found.append((step, fit))
-            fit = step.candidates[0].fit if step.candidates else fit
+            best = step.candidates[0] if step.candidates else None
+            found.append((step, best.without if best and best.without else fit))
+            fit = best.fit if best else fit
     return found
 
 

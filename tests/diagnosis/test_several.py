@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -21,6 +23,7 @@ from forcegrasp.identify.cross_validation import make_folds
 from forcegrasp.identify.fit_set import fit_model
 from forcegrasp.identify.noise_floor import beyond_fit, numerical_error
 from forcegrasp.identify.progress import silent
+from forcegrasp.reports.findings import found_steps
 from tests.light_set import light_gripper, light_set
 
 HIDDEN = {
@@ -85,6 +88,17 @@ def test_steps_lead_from_the_first_error_to_the_last_and_share_out_what_it_falls
         assert 0 < candidate.share < 1
         assert candidate.error_after == pytest.approx(step.error_after)
         assert candidate.parameters() == fit.effect(step.effects[0]).parameters
+
+
+def test_each_is_shown_beside_all_others(mixed, found):
+    """What it changes is told of the final model without it: all came at once, and no step was before it."""
+    (_, base), (steps, fit) = mixed, found
+    shown = found_steps(SimpleNamespace(base=base, steps=steps))
+    for step, before in shown:
+        assert {one.effect.name for one in before.problem.effects} == set(HIDDEN) - set(step.effects)
+        assert before.cost > 1.02 * fit.cost
+    single = [dataclasses.replace(s, candidates=(dataclasses.replace(s.candidates[0], without=None),)) for s in steps]
+    assert found_steps(SimpleNamespace(base=base, steps=single))[0][1] is base.fit
 
 
 def test_what_was_found_before_stays_if_it_is_needed_and_goes_if_others_make_it_needless(mixed):
