@@ -123,6 +123,8 @@ def _add_effects(so_far: _SoFar, begun: Begun, rng: np.random.Generator, may_be_
     for _ in range(MOST_EFFECTS):
         others, richer = left_to_try(effects, fit, steps), list(families.extensions(fit, effects))
         forms = begun.may_be_forms(study, fit)  # another effect could not be told from those of what was found
+        if forms:
+            study.progress("what is left may be the form of what was found: no other effect is looked for beside it")
         untried = () if several.done or forms else others
         if not (untried or richer or forms) or (several.done and begun.left(study, fit) > MUCH):
             break  # with a dozen effects and much left, all that could be asked takes long and says little

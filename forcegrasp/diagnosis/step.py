@@ -79,7 +79,8 @@ def look_further(
       least_promise: share that all signatures together must promise for an effect that explains little to be tried.
     """
     start = _Start(study, fit)
-    study.progress(f"trying {len(effects)} effects")
+    if effects:
+        study.progress(f"trying {len(effects)} effects")
     look = screen.look(study, fit, start.background, effects, start.noise, rng)
     if anyway:
         candidates = start.fit_anyway(look.scores, look.null)
