@@ -45,8 +45,12 @@ class Begun:
         return study.error(study.heldout(fit)) / self.floor
 
     def may_be_forms(self, study: Study, fit: Fit) -> bool:
-        """Whether no more is left than effects in the model may be off by that act in another form."""
-        return self.left(study, fit) < MUCH and may_be_forms(study, fit)
+        """Whether no more is left than effects in the model may be off by that act in another form.
+
+        With those of a given model alone that is not asked: what it leaves is what is to be looked at.
+        """
+        found_some = len(fit.problem.effects) > self.given
+        return found_some and self.left(study, fit) < MUCH and may_be_forms(study, fit)
 
 
 def concluded(begun: Begun, study: Study, steps: Sequence[Step], fit: Fit, in_a_hurry: bool = False) -> Diagnosis:

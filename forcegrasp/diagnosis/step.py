@@ -188,7 +188,7 @@ class _Start:
 
         What the best one has besides may then be of another effect beside either: of an encoder that is off, where
         objects are smaller than the set says, which is backlash that differs by finger. So that is for the next step.
-        Only where it leaves more than noise, and no mistake of the set leaves less.
+        Only where it leaves more than noise, and the simpler one explains enough.
 
         Args:
           ordered: candidates, the best first.
@@ -202,7 +202,8 @@ class _Start:
         if best.replaces or not of_set or rms_error(best.fit, self._study.target) <= _ALL_FITTED:
             return best, set()
         for simpler in others:
-            if simpler.effect.name in contained and any(indistinguishable(simpler, c) for c in of_set):
+            enough = simpler.effect.name in contained and is_significant(simpler, self.least_gain)
+            if enough and any(indistinguishable(simpler, c) for c in of_set):
                 (first,) = self._at_the_end([simpler], {simpler.effect.name: []})
                 return first, {best.effect.name}
         return best, set()

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from forcegrasp.diagnosis import forms, search
+from forcegrasp.diagnosis.conclusion import Begun
 from forcegrasp.diagnosis.forms import done_by_each, may_be_forms
 from forcegrasp.diagnosis.left_over import is_worth_looking
 from forcegrasp.diagnosis.refine import fit_with
@@ -61,6 +62,15 @@ def test_what_another_effect_does_is_not():
 def test_a_servo_is_asked_for_more():
     servo = SimpleNamespace(target=SimpleNamespace(gripper=SimpleNamespace(is_servo=True)))
     assert not may_be_forms(servo, SimpleNamespace(problem=SimpleNamespace(effects=(FRICTION,))))
+
+
+def test_what_a_given_model_leaves_is_looked_at(other_form):
+    study, base, fit = other_form
+    begun = Begun(base, fit, (), (), (), 2.0, 1.1, ())
+    assert begun.may_be_forms(study, fit)
+    given = dataclasses.replace(begun, base=SimpleNamespace(fit=fit))
+    assert not given.may_be_forms(study, fit)
+    assert not dataclasses.replace(begun, floor=0.9).may_be_forms(study, fit)  # too much is left
 
 
 def test_what_an_effect_does_is_what_leaving_it_out_undoes(other_form):

@@ -239,11 +239,14 @@ def test_what_an_effect_contains_comes_first_where_the_set_may_be_wrong_instead(
     """Encoders that are off, and objects that are smaller than the set says, are backlash that differs by finger."""
     monkeypatch.setattr(step_module, "rms_error", lambda *_: left)
     monkeypatch.setattr(step_module, "indistinguishable", lambda *_: alike)
+    monkeypatch.setattr(step_module, "is_significant", lambda one, least: least < 0.1)
     monkeypatch.setattr(_Start, "_at_the_end", lambda _, some, __: some)
     start = object.__new__(_Start)
-    start._study = SimpleNamespace(target=None)
+    start._study, start.least_gain = SimpleNamespace(target=None), 0.02
     names = ("backlash_asymmetry", "backlash", "object_size" if of_set else "encoder_bias")
     ordered = [SimpleNamespace(effect=effect_of(n, light_gripper()), replaces="", fit=None) for n in names]
     winner, later = start.simpler_first(ordered)
     assert winner.effect.name == first
     assert later == {"backlash_asymmetry"} - {first}
+    start.least_gain = 0.1  # the simpler one explains too little
+    assert start.simpler_first(ordered)[0].effect.name == "backlash_asymmetry"
