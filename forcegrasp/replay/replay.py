@@ -15,7 +15,7 @@ from forcegrasp.measure.schema import MeasuredGrasp
 from forcegrasp.physics.gripper import START_VELOCITY, Gripper
 from forcegrasp.physics.plant import Plant, write_base
 from forcegrasp.physics.sensors import ReadingEffects
-from forcegrasp.replay.sample_steps import SampleSteps, fitting_factor, place_samples
+from forcegrasp.replay.sample_steps import at_nearest_steps, fitting_factor, place_samples, steps_passed
 from forcegrasp.replay.time_limit import check_time
 from forcegrasp.short_repr import ShortRepr
 
@@ -96,8 +96,7 @@ class Replay:
         timestep = float(gripper.compile(tier).opt.timestep)
         self._step_factor = step_factor * (1.0 if gripper.is_servo else fitting_factor(self.grasps, timestep))
         self.dt, self._other_collisions = timestep * self._step_factor, other_collisions
-        nearest = [np.rint((g.time_s - g.time_s[0]) / self.dt).astype(int) for g in self.grasps]
-        placed = SampleSteps(nearest) if gripper.is_servo else place_samples(self.grasps, self.dt)
+        placed = (at_nearest_steps if gripper.is_servo else place_samples)(self.grasps, self.dt)
         starts, self._steps_at_once = placed.starts, placed.at_once
         self._steps = 1 + max(start[-1] for start in starts)
         samples = max(len(start) for start in starts)
@@ -109,7 +108,7 @@ class Replay:
         #: how many times as long as usual steps are, a row for so many at once, ``(…, grasps)``
         self._stretch = placed.lengths(self._steps)
         if gripper.is_servo:
-            real = [(g.time_s - g.time_s[0]) / self.dt for g in self.grasps]
+            real = steps_passed(self.grasps, self.dt)
             self._instants = np.stack([np.pad(r, (0, samples - len(r)), "edge") for r in real])
         #: which samples there are, ``(grasps, samples)``
         self.mask = np.stack([np.arange(samples) < len(start) for start in starts])

@@ -34,6 +34,16 @@ class SampleSteps:
         return np.pad(self.stretch, ((0, more), (0, 0)), constant_values=1.0)
 
 
+def steps_passed(grasps: Sequence[MeasuredGrasp], dt: float) -> list[np.ndarray]:
+    """Steps of ``dt`` seconds, and parts of one, that have passed at each sample, per grasp ``(samples,)``."""
+    return [(g.time_s - g.time_s[0]) / dt for g in grasps]
+
+
+def at_nearest_steps(grasps: Sequence[MeasuredGrasp], dt: float) -> SampleSteps:
+    """The steps that are nearest to the samples, all of the usual length."""
+    return SampleSteps([np.rint(one).astype(int) for one in steps_passed(grasps, dt)])
+
+
 def place_samples(grasps: Sequence[MeasuredGrasp], dt: float) -> SampleSteps:
     """The steps at which samples are taken: whole ones between two of them, which share the time that passes.
 
@@ -43,8 +53,7 @@ def place_samples(grasps: Sequence[MeasuredGrasp], dt: float) -> SampleSteps:
       grasps: with time stamps.
       dt: physics step, seconds.
     """
-    real = [(g.time_s - g.time_s[0]) / dt for g in grasps]
-    nearest = SampleSteps([np.rint(one).astype(int) for one in real])
+    real, nearest = steps_passed(grasps, dt), at_nearest_steps(grasps, dt)
     if all(np.abs(one - start).max() < _ON_A_STEP for one, start in zip(real, nearest.starts, strict=True)):
         return nearest
     apart = [np.diff(one) for one in real]

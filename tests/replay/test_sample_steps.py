@@ -53,9 +53,9 @@ def test_samples_without_a_period_are_at_the_nearest_steps():
     assert placed.starts[0].tolist() == np.rint((REGULAR + 5 * JITTER) / DT).tolist()
 
 
-def moved(time: np.ndarray, *effects: EffectOn, gripper=None, factor: float = 1.0) -> np.ndarray:
+def moved(time: np.ndarray, *effects: EffectOn, factor: float = 1.0) -> np.ndarray:
     """Readings of positions, metres, ``(samples, 2)``."""
-    replay = Replay(gripper or load_gripper("tiago"), [grasp(time)], step_factor=factor)
+    replay = Replay(load_gripper("tiago"), [grasp(time)], step_factor=factor)
     base = {name: np.full(1, p.nominal) for name, p in replay.gripper.parameters.items()}
     base |= {"radius_m": np.full(1, 0.01), "offset_m": np.zeros(1)}
     motion = replay.simulate(np.array([0]), base, effects)
