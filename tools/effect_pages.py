@@ -148,6 +148,7 @@ _PLANS = {
     "object_friction": _OFF_CENTRE,
     "smooth_object_friction": _OFF_CENTRE,
     "contact_friction": _OFF_CENTRE,
+    "table_friction": _OFF_CENTRE,
     "object_mass": _OFF_CENTRE,
     "force_crosstalk": _OFF_CENTRE,
     "swapped_forces": _OFF_CENTRE,

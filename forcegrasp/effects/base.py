@@ -93,6 +93,7 @@ class Effect:
     after_noise: ClassVar[bool] = False  #: acts on readings with their noise, as rounding does
     of_set: ClassVar[bool] = False  #: not of the gripper: what the measurement set says is wrong
     needs_object: ClassVar[bool] = False  #: shows only where fingers press on something
+    needs_ground: ClassVar[bool] = False  #: has no meaning where the object stands on nothing
     needs_parallel_pads: ClassVar[bool] = False  #: would let objects slip out of pads that turn
     instead_of: ClassVar[tuple[str, ...]] = ()  #: effects that mean nothing beside it
     servo_only: ClassVar[bool] = False  #: of drives alone; where fingers grasp, another effect has its part

@@ -23,7 +23,7 @@ class ContactFriction(Effect):
     symptom = "a finger that touches first pushes the object further, or less far; the forces of both differ meanwhile"
     formula = "μ = c μ₀"
     source = "Coulomb's law; the scene's μ₀ is a guess for most objects"
-    look_alikes = ("object_friction", "smooth_object_friction", "coulomb_friction", "object_mass")
+    look_alikes = ("table_friction", "object_friction", "smooth_object_friction", "coulomb_friction", "object_mass")
     separates = "off-centre objects: what resists is felt by the finger that pushes, and not where nothing is touched"
     parameters = (
         Parameter(

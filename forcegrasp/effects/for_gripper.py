@@ -49,6 +49,8 @@ def why_left_out(effect: type[Effect], gripper: Gripper) -> str:
     """Why an effect can't show on a gripper; empty if it can."""
     if effect.needs_object and gripper.is_servo:
         return f"is one of grasped objects; {gripper.name} grasps nothing"
+    if effect.needs_ground and not gripper.has_ground:
+        return f"needs ground that an object can rub on; that of {gripper.name} has none"
     if effect.needs_parallel_pads and not gripper.pads_stay_parallel:
         return f"needs pads that stay parallel; those of {gripper.name} turn"
     if effect.servo_only and not gripper.is_servo:

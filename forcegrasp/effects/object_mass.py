@@ -22,7 +22,7 @@ class ObjectMass(Effect):
     symptom = "a finger that touches first pushes the object further, or less far, and touches are harder or softer"
     formula = "m = c m₀, I = c I₀"
     source = "Newton's second law; the scene's m₀ is a guess for most objects"
-    look_alikes = ("contact_friction", "contact_damping", "object_friction", "actuator_lag")
+    look_alikes = ("contact_friction", "table_friction", "contact_damping", "object_friction", "actuator_lag")
     separates = "a balance; else off-centre objects, and touches at several speeds"
     parameters = (
         Parameter(

@@ -66,6 +66,7 @@ _SHIPPED = (
     "stiction",
     "stiffening_contact",
     "swapped_forces",
+    "table_friction",
     "velocity_lag",
     "viscoelastic_contact",
 )

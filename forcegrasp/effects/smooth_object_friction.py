@@ -22,7 +22,7 @@ class SmoothObjectFriction(Effect):
     symptom = "an object that one finger pushes gives way slowly; the forces of both fingers differ, and then even out"
     formula = "F = −F_t clip(v / v_c, −1, 1)"
     source = "MuJoCo's `frictionloss` on the object, with a constraint that is damped as much; Andersson et al. (2007)"
-    look_alikes = ("object_friction", "contact_friction")
+    look_alikes = ("object_friction", "table_friction", "contact_friction")
     separates = "off-centre objects that are held for long: where friction holds at rest, the forces go on to differ"
     parameters = (
         Parameter("force_n", "friction F_t", "N", 0.0, 5.0, 0.1, trials=(0.02, 0.06, 0.2), follows="force"),

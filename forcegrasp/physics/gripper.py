@@ -17,7 +17,7 @@ from forcegrasp.errors import ConfigError
 from forcegrasp.physics.fast import compile_fast, with_larger_steps
 from forcegrasp.physics.gripper_parts import BaseParameter, Channel, FieldWrite, Finger, Motor, Training
 from forcegrasp.physics.guard import silence_log
-from forcegrasp.physics.opening import OpeningLaw, measure_opening, straight_law
+from forcegrasp.physics.opening import OpeningLaw, ground_geoms, measure_opening, straight_law
 from forcegrasp.physics.scene_file import check_scene
 from forcegrasp.short_repr import ShortRepr, counted, cut
 
@@ -225,6 +225,15 @@ class Gripper(ShortRepr):
         model = self.compile()
         gains = [model.actuator(motor.actuator).biasprm[2] for motor in self.motors]
         return ("actuator_biasprm", 2) in written or any(gains)
+
+    @functools.cached_property
+    def has_ground(self) -> bool:
+        """Whether the object stands on something; not where it slides on a rail."""
+        model = self.compile()
+        if model.joint(self.object_joint).type[0] != mujoco.mjtJoint.mjJNT_FREE:
+            return False
+        of_object = model.geom(self.object_geom).bodyid[0]
+        return bool(ground_geoms(model, np.flatnonzero(model.geom_bodyid == of_object)))
 
     @functools.cached_property
     def steps_as_its_drive(self) -> bool:

@@ -119,6 +119,14 @@ def object_half_width(model: mujoco.MjModel, object_geom: str, axis: int) -> flo
     return float(geom.size[axis if geom.type[0] == mujoco.mjtGeom.mjGEOM_BOX else 0])
 
 
+def ground_geoms(model: mujoco.MjModel, object_geoms: np.ndarray) -> list[int]:
+    """Geoms that never move and may touch an object."""
+    fixed = np.flatnonzero(model.body_weldid[model.geom_bodyid] == 0)
+    kind, meets = model.geom_contype, model.geom_conaffinity
+    touching = ((kind[:, None] & meets[object_geoms]) | (meets[:, None] & kind[object_geoms])).any(axis=1)
+    return [int(geom) for geom in fixed if touching[geom] and geom not in object_geoms]
+
+
 def pad_geoms(model: mujoco.MjModel, body: str) -> np.ndarray:
     """Geoms of a body and of the bodies on it that can touch something; all of them if none can."""
     inside = np.array([_is_on(model, b, model.body(body).id) for b in model.geom_bodyid])

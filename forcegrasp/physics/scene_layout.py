@@ -11,7 +11,7 @@ import numpy as np
 
 from forcegrasp.physics.gripper import Gripper, effort_sensor, own_sensor
 from forcegrasp.physics.gripper_parts import Finger
-from forcegrasp.physics.opening import command_law, least_distance, pad_geoms
+from forcegrasp.physics.opening import command_law, ground_geoms, least_distance, pad_geoms
 from forcegrasp.physics.places import places
 
 
@@ -56,6 +56,8 @@ class SceneLayout:
         """Where the object stands in the engine's arrays, if there is one."""
         #: geoms of the object
         self.object_geoms = np.empty(0, int)
+        #: geoms that it may stand on
+        self.ground_geoms: list[int] = []
         #: degrees of freedom of everything but the object
         self.gripper_dofs = list(range(model.nv))
         if gripper.is_servo:
@@ -68,6 +70,7 @@ class SceneLayout:
         self.gripper_dofs = [i for i in range(model.nv) if model.dof_jntid[i] != joint.id]
         self._object_body = model.geom(gripper.object_geom).bodyid[0]
         self.object_geoms = np.flatnonzero(model.geom_bodyid == self._object_body)
+        self.ground_geoms = ground_geoms(model, self.object_geoms)
 
     def _object_of(self, qpos: np.ndarray) -> np.ndarray:
         """Object positions along the grasp axis from where the scene puts it, metres, ``(...)``; 0 without one."""

@@ -13,6 +13,7 @@ from forcegrasp.effects.base import Contribution
 from forcegrasp.effects.touch import pad_reach
 from forcegrasp.physics.contact_law import contact_numbers
 from forcegrasp.physics.gripper_file import load_gripper
+from forcegrasp.physics.ground import let_ground_decide
 from forcegrasp.physics.plant import Plant, write_base
 
 from .rollouts import FORCE_SCALE, make_plant, play, rollout, start
@@ -421,6 +422,36 @@ def test_contact_friction_multiplies_that_of_the_scene():
     plant.advance(np.full((4, 2), 0.0255), 500)
     ways = 0.002 - plant.object_position
     assert np.all(np.diff(ways) < -1e-5)
+
+
+@pytest.mark.parametrize("tier", ["reference", "fast"])
+def test_table_friction_is_felt_by_the_ground_alone(tier):
+    """The less it rubs, the further a finger pushes; fingers that hold an object in their middle press as before."""
+    factors = np.array([0.5, 1.0, 2.0, 4.0])
+    held, pushed = np.arange(4), np.arange(4, 8)
+    plant = make_plant(8, [(get_effect("table_friction"), np.tile(factors, 2)[:, None], "", range(8))], tier)
+    start(plant, range(8), np.repeat([0.0, 0.002], 4))
+    plant.advance(np.repeat([0.02, 0.0255], 4)[:, None] * [1, 1], 500)
+    assert np.all(np.diff(0.002 - plant.object_position[pushed]) < -5e-5)
+    pressed = plant.pad_force[held].sum(axis=1)
+    np.testing.assert_allclose(pressed, pressed[1], rtol=0.02)
+    assert pressed[1] > 0.1
+
+
+@pytest.mark.parametrize("priorities", [(0, 1), (1, 1), (2, 1)])
+@pytest.mark.parametrize("solref", [(0.02, 1.0), (-2500.0, -100.0)])
+def test_a_ground_that_decides_changes_nothing_by_itself(priorities, solref):
+    plant = make_plant(2, [], "reference")
+    (ground,), own = plant.ground_geoms, plant.object_geoms[0]
+    plant.model.geom_priority[[ground, own]] = priorities
+    plant.model.geom_friction[ground, 0], plant.model.geom_solref[own] = 1.3, solref
+    start(plant, [0, 1], np.full(2, 0.002))
+    for name in ("geom_priority", "geom_friction", "geom_solref"):
+        plant.field(name)[:] = getattr(plant.model, name)
+    let_ground_decide(plant, ground, np.array([0]))
+    assert plant.field("geom_priority")[0, ground] > priorities[1]
+    plant.advance(np.full((2, 2), 0.0255), 300)
+    np.testing.assert_allclose(plant.object_position[0], plant.object_position[1], rtol=1e-12)
 
 
 @pytest.mark.parametrize("tier", ["reference", "fast"])

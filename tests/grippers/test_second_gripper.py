@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from forcegrasp.effects.base import Contribution, Effect
+from forcegrasp.effects.for_gripper import why_left_out
 from forcegrasp.effects.registry import catalogue
 from forcegrasp.physics.gripper_file import load_gripper
 from forcegrasp.physics.plant import Plant, write_base
@@ -111,10 +112,14 @@ def test_typical_size_changes_what_it_should(plain, typical, name, variant):
     seen = typical[0, :, 1 + VARIANTS.index((name, variant))]
     assert np.isfinite(seen).all()
     change = np.abs(seen - plain).max(axis=0)
-    slides_on_a_rail = name == "contact_friction"  # pads press it, and nothing rubs along it
+    slides_on_a_rail = name in ("contact_friction", "table_friction")  # pads press it, and nothing rubs along it
     assert (change[:4].max() > 1e-4) != slides_on_a_rail, "nothing to be read of it"
     if catalogue()[name].reads_only(variant):
         assert (change[4:] == 0).all(), "a sensor moved something"
+
+
+def test_friction_of_a_table_is_left_out_where_there_is_none():
+    assert why_left_out(catalogue()["table_friction"], load_gripper(str(SECOND))).startswith("needs ground")
 
 
 def test_what_ran_before_leaves_no_trace(typical):

@@ -70,7 +70,7 @@ def test_every_effect_of_a_robot_has_a_prior():
     left_out = {
         "smooth_friction", "smooth_load_friction", "smooth_stiction", "smooth_object_friction", "finger_creep",
         "rate_limited_lag", "contact_friction", "hunt_crossley_contact", "encoder_scale", "motor_asymmetry",
-        "return_spring", "contact_damping", "contact_onset", "object_mass", "friction_asymmetry",
+        "return_spring", "contact_damping", "contact_onset", "object_mass", "table_friction", "friction_asymmetry",
         "backlash_asymmetry", "compliance_asymmetry",
     }  # fmt: skip
     assert set(EFFECTS) == (robots - left_out) | {ObjectBody.name}
