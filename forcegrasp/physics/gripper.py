@@ -228,10 +228,8 @@ class Gripper(ShortRepr):
 
     @functools.cached_property
     def has_ground(self) -> bool:
-        """Whether the object stands on something; not where it slides on a rail."""
+        """Whether there is something that the object may stand on."""
         model = self.compile()
-        if model.joint(self.object_joint).type[0] != mujoco.mjtJoint.mjJNT_FREE:
-            return False
         of_object = model.geom(self.object_geom).bodyid[0]
         return bool(ground_geoms(model, np.flatnonzero(model.geom_bodyid == of_object)))
 
