@@ -229,9 +229,7 @@ class Gripper(ShortRepr):
     @functools.cached_property
     def has_ground(self) -> bool:
         """Whether there is something that the object may stand on."""
-        model = self.compile()
-        of_object = model.geom(self.object_geom).bodyid[0]
-        return bool(ground_geoms(model, np.flatnonzero(model.geom_bodyid == of_object)))
+        return len(ground_geoms(self.compile(), self.object_geom)) > 0
 
     @functools.cached_property
     def steps_as_its_drive(self) -> bool:

@@ -119,12 +119,13 @@ def object_half_width(model: mujoco.MjModel, object_geom: str, axis: int) -> flo
     return float(geom.size[axis if geom.type[0] == mujoco.mjtGeom.mjGEOM_BOX else 0])
 
 
-def ground_geoms(model: mujoco.MjModel, object_geoms: np.ndarray) -> list[int]:
-    """Geoms that never move and may touch an object."""
-    fixed = np.flatnonzero(model.body_weldid[model.geom_bodyid] == 0)
+def ground_geoms(model: mujoco.MjModel, object_geom: str) -> np.ndarray:
+    """Geoms that never move and may touch the body that a geom is of."""
+    fixed = model.body_weldid[model.geom_bodyid] == 0
+    own = model.geom_bodyid == model.geom(object_geom).bodyid
     kind, meets = model.geom_contype, model.geom_conaffinity
-    touching = ((kind[:, None] & meets[object_geoms]) | (meets[:, None] & kind[object_geoms])).any(axis=1)
-    return [int(geom) for geom in fixed if touching[geom] and geom not in object_geoms]
+    touching = ((kind[:, None] & meets[own]) | (meets[:, None] & kind[own])).any(axis=1)
+    return np.flatnonzero(fixed & touching)
 
 
 def pad_geoms(model: mujoco.MjModel, body: str) -> np.ndarray:

@@ -57,7 +57,7 @@ class SceneLayout:
         #: geoms of the object
         self.object_geoms = np.empty(0, int)
         #: geoms that it may stand on
-        self.ground_geoms: list[int] = []
+        self.ground_geoms = np.empty(0, int)
         #: degrees of freedom of everything but the object
         self.gripper_dofs = list(range(model.nv))
         if gripper.is_servo:
@@ -70,7 +70,7 @@ class SceneLayout:
         self.gripper_dofs = [i for i in range(model.nv) if model.dof_jntid[i] != joint.id]
         self._object_body = model.geom(gripper.object_geom).bodyid[0]
         self.object_geoms = np.flatnonzero(model.geom_bodyid == self._object_body)
-        self.ground_geoms = ground_geoms(model, self.object_geoms)
+        self.ground_geoms = ground_geoms(model, gripper.object_geom)
 
     def _object_of(self, qpos: np.ndarray) -> np.ndarray:
         """Object positions along the grasp axis from where the scene puts it, metres, ``(...)``; 0 without one."""
