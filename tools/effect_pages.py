@@ -145,6 +145,7 @@ _PLANS = {
         "two slow full releases",
         ((22.6, 0.02, 0.3), (26, 0.006, 0.2), (23, 0.02, 0.3), (25.6, 0.003, 0.2)),
     ),
+    "two_mass_backlash": _STEPS,
     "object_friction": _OFF_CENTRE,
     "smooth_object_friction": _OFF_CENTRE,
     "contact_friction": _OFF_CENTRE,

@@ -36,7 +36,7 @@ def look_beside(fit: Fit, target: Target, simulators: Simulators, place: int = -
     """
     problem, effect = fit.problem, fit.problem.effects[place].effect
     index = problem.first_entry(place % len(problem.effects))
-    while effect.follows_motion or effect.in_steps:
+    while effect.follows_motion or effect.in_steps or effect.in_valleys:
         entry = problem.entries[index]
         sizes = fit.values[index] * np.array(_FAR_AND_NEAR if entry.jumps else _MULTIPLES)
         starts = np.tile(fit.vector, (len(sizes), 1))

@@ -90,10 +90,12 @@ class Effect:
     acts_alike: ClassVar[bool] = False  #: what :meth:`act` adds is the same in every step of a grasp
     follows_motion: ClassVar[bool] = False  #: acts by a memory of positions alone, so that measured ones give it
     in_steps: ClassVar[bool] = False  #: as its size grows, what it does stays as it is, jumps, and stays again
+    in_valleys: ClassVar[bool] = False  #: as its size grows, what it does changes in small steps, besides smoothly
     after_noise: ClassVar[bool] = False  #: acts on readings with their noise, as rounding does
     of_set: ClassVar[bool] = False  #: not of the gripper: what the measurement set says is wrong
     needs_object: ClassVar[bool] = False  #: shows only where fingers press on something
     needs_ground: ClassVar[bool] = False  #: has no meaning where the object stands on nothing
+    needs_rotors: ClassVar[bool] = False  #: has no meaning where motors have no inertia of their own, or move linkages
     needs_parallel_pads: ClassVar[bool] = False  #: would let objects slip out of pads that turn
     instead_of: ClassVar[tuple[str, ...]] = ()  #: effects that mean nothing beside it
     servo_only: ClassVar[bool] = False  #: of drives alone; where fingers grasp, another effect has its part
@@ -206,6 +208,10 @@ class Effect:
         """True force between pads and object, before any scale, newtons."""
         return force
 
+    def motor_position(self, joint: np.ndarray) -> np.ndarray:
+        """Where the motors are, m or rad, ``(rows, motors)``, whose joints are there."""
+        return joint
+
     def read_force(self, force: np.ndarray) -> np.ndarray:
         """What the force sensors say, newtons."""
         return force
@@ -258,7 +264,16 @@ class Effect:
     @classmethod
     def hooks(cls) -> set[str]:
         """Names of the hooks that this effect overrides."""
-        names = ("change_model", "command", "motor_range", "act", "interaction", "read_force", "read_position")
+        names = (
+            "change_model",
+            "command",
+            "motor_range",
+            "act",
+            "interaction",
+            "motor_position",
+            "read_force",
+            "read_position",
+        )
         return {name for name in names if getattr(cls, name) is not getattr(Effect, name)}
 
     @classmethod

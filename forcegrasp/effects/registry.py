@@ -67,6 +67,7 @@ _SHIPPED = (
     "stiffening_contact",
     "swapped_forces",
     "table_friction",
+    "two_mass_backlash",
     "velocity_lag",
     "viscoelastic_contact",
 )

@@ -22,9 +22,9 @@ class AttachedEffects:
 
     def __init__(self, effects: Sequence[PlantEffect]) -> None:
         self._effects = tuple(effects)
-        self._command, self._range, self._act, self._interaction = (
+        self._command, self._range, self._act, self._interaction, self._motor_position = (
             [effect for effect in effects if hook in effect.hooks()]
-            for hook in ("command", "motor_range", "act", "interaction")
+            for hook in ("command", "motor_range", "act", "interaction", "motor_position")
         )
         self._of_commands = [effect for effect in self._command if effect.is_known_beforehand]
         self._of_motion = [effect for effect in self._act if effect.follows_motion]
@@ -143,6 +143,15 @@ class AttachedEffects:
         for effect in self._interaction:
             force[effect.rows] = effect.interaction(force[effect.rows])
         return force
+
+    def motor_position(self, joints: np.ndarray) -> np.ndarray:
+        """Positions of the motors, m or rad, ``(n, motors)``, from those of their joints."""
+        if not self._motor_position:
+            return joints
+        position = joints.copy()
+        for effect in self._motor_position:
+            position[effect.rows] = effect.motor_position(position[effect.rows])
+        return position
 
     def _rows_of(self, ids: np.ndarray) -> list[tuple[PlantEffect, np.ndarray]]:
         """Each effect with those of its own rows that are among these of the plant."""

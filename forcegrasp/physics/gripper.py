@@ -227,6 +227,19 @@ class Gripper(ShortRepr):
         return ("actuator_biasprm", 2) in written or any(gains)
 
     @functools.cached_property
+    def has_rotors(self) -> bool:
+        """Whether positions are commanded to motors that slide a finger each and have inertia of their own besides.
+
+        That is what MuJoCo calls a joint's armature.
+        """
+        if not self.is_direct or self.command != "position":
+            return False
+        model, joint_drive = self.compile(), mujoco.mjtTrn.mjTRN_JOINT
+        drives = [model.actuator(motor.actuator) for motor in self.motors]
+        own = [model.dof_armature[model.joint(motor.joint).dofadr[0]] for motor in self.motors]
+        return min(own) > 0 and all(d.trntype[0] == joint_drive and abs(d.gear[0]) == 1 for d in drives)
+
+    @functools.cached_property
     def has_ground(self) -> bool:
         """Whether there is something that the object may stand on."""
         return len(ground_geoms(self.compile(), self.object_geom)) > 0

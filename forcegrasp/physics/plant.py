@@ -50,10 +50,20 @@ class Plant(ModelFields):
         self.friction, self.damping, self.motor_push = np.zeros((3, n, self.motors))
         self.pad_shift_m, self.finger_push_n, self._contact_shift_m = np.zeros((3, n, 2))
         self.object_push_n = np.zeros(n)
+        self._velocity_change, self._more_inertia = np.zeros((2, n, self.motors))
         pushes = self.finger_push_n, self.object_push_n, self.damping, self.motor_push
-        totals = self.friction, self.pad_shift_m, *pushes, self._contact_shift_m
+        totals = (
+            self.friction,
+            self.pad_shift_m,
+            *pushes,
+            self._contact_shift_m,
+            self._velocity_change,
+            self._more_inertia,
+        )
         self._contributed = dict(zip(Contribution._fields, totals, strict=True))
-        self.position = np.zeros((n, self.motors))  #: of the motors (left, right, or the one), m or rad; 0 is closed
+        #: of the joints that motors move, m or rad, ``(n, motors)``; an effect may let a motor be somewhere else
+        self.joint_position = np.zeros((n, self.motors))
+        self.position = self.joint_position  #: of the motors (left, right, or the one), m or rad; 0 is closed
         #: Sum of each finger's contact forces at the last physics step, before f_α, newtons, ``(n, 2)``.
         self.pad_force = np.zeros((n, 2))
         #: The same with what effects in the contact press, ``(n, 2)``.
@@ -80,6 +90,11 @@ class Plant(ModelFields):
         return self.batch.expand("dof_M0")[:, self._motor_v]
 
     @property
+    def rotor_inertia(self) -> np.ndarray:
+        """What of it is the motor's own, without what it moves, kg or kg·m², ``(n, motors)``."""
+        return self.base("dof_armature")[:, self._motor_v]
+
+    @property
     def motor_force(self) -> np.ndarray:
         """What the motors gave in the last physics step, N or N·m, ``(n, motors)``; 0 before the first one."""
         given = self.batch.bind("qfrc_actuator")[:, self._motor_v] * self._signs
@@ -97,7 +112,7 @@ class Plant(ModelFields):
     @property
     def pad_position(self) -> np.ndarray:
         """How far each side's pads stand from where they are when closed, metres, ``(n, 2)``; 0 if they never move."""
-        return self.to_sides(self.position)
+        return self.to_sides(self.joint_position)
 
     @property
     def object_position(self) -> np.ndarray:
@@ -187,7 +202,7 @@ class Plant(ModelFields):
             self._force_range[ids] = self.field("actuator_forcerange")[ids][:, self.actuators]
         self._enabled[ids] = self._at_start[ids] = True
         self.batch.forward(ids)
-        self.position = self._motors_of(self._qpos)
+        self.position = self.joint_position = self._motors_of(self._qpos)
         self.pad_shift_m[ids] = self._contact_shift_m[ids] = 0
         self.effects.reset(ids)
         self._read_anew(ids)
@@ -342,7 +357,10 @@ class Plant(ModelFields):
             return
         self._write_friction()
         self._write_damping()
+        self._write_inertia()
         self._write_pad_shift()
+        if self._is_given("velocity_change"):
+            self._qvel[:, self._motor_v] += self._velocity_change * self._signs
         on_motors = self._to_motors(self.finger_push_n) + self.motor_push + self._load[:, None]
         self._applied[:, self._motor_v] = on_motors * self._signs
         if not self.gripper.is_servo:
@@ -370,6 +388,12 @@ class Plant(ModelFields):
         if "dof_damping" in self._fields or self._is_given("damping"):
             self.field("dof_damping")[:, self._motor_v] = self.base("dof_damping")[:, self._motor_v] + self.damping
 
+    def _write_inertia(self) -> None:
+        if "dof_armature" in self._fields or self._is_given("inertia"):
+            self.field("dof_armature")[:, self._motor_v] = (
+                self.base("dof_armature")[:, self._motor_v] + self._more_inertia
+            )
+
     def _write_pad_shift(self) -> None:
         if "geom_pos" not in self._fields and not self._is_given("pad_shift_m"):
             return
@@ -396,7 +420,8 @@ class Plant(ModelFields):
         self.measured_position[others], self.measured_force[others] = readings
 
     def _read(self) -> None:
-        self.position, self.pad_force = self._motors_of(self._qpos), self._pads_of(self._sensors)
+        self.joint_position, self.pad_force = self._motors_of(self._qpos), self._pads_of(self._sensors)
+        self.position = self.effects.motor_position(self.joint_position)
         scale = self.force_scale[:, None]
         self.press_n = self.effects.interaction(self.pad_force)
         self.force = self.press_n * scale

@@ -15,14 +15,18 @@ from forcegrasp.diagnosis.result import Step
 TRUE, READINGS = 8.0, 50
 
 
-def _fit(size: float, follows_motion: bool = True, in_steps: bool = False) -> SimpleNamespace:
+def _fit(size: float, kind: str = "follows_motion") -> SimpleNamespace:
     """A fit that is stuck at a size: another parameter shifts all readings alike, which the size does not."""
+    kinds = {name: name == kind for name in ("follows_motion", "in_steps", "in_valleys")}
     residual = np.linspace(-1, 1, READINGS).reshape(1, READINGS, 1) * 10 * (size - TRUE)
     return SimpleNamespace(
         problem=SimpleNamespace(
-            effects=[SimpleNamespace(effect=SimpleNamespace(follows_motion=follows_motion, in_steps=in_steps))],
+            effects=[SimpleNamespace(effect=SimpleNamespace(**kinds))],
             first_entry=lambda place: {0: 1}[place],
-            entries=[None, SimpleNamespace(low=0.0, high=10.0, coordinate=lambda value: value, jumps=in_steps)],
+            entries=[
+                None,
+                SimpleNamespace(low=0.0, high=10.0, coordinate=lambda value: value, jumps=kinds["in_steps"]),
+            ],
             case=lambda vector: vector,
         ),
         vector=np.array([0.0, size]),
@@ -50,15 +54,15 @@ def looked(monkeypatch) -> list[float]:
     return seen
 
 
-@pytest.mark.parametrize("in_steps", [False, True])
-def test_it_goes_to_better_sizes_for_as_long_as_there_are_any(looked, in_steps):
+@pytest.mark.parametrize("kind", ["follows_motion", "in_steps", "in_valleys"])
+def test_it_goes_to_better_sizes_for_as_long_as_there_are_any(looked, kind):
     found = look_beside(
-        _fit(8.7, not in_steps, in_steps),
+        _fit(8.7, kind),
         SimpleNamespace(residual=lambda signals: signals),
         SimpleNamespace(exact=None, cheap=None),
     )
     assert found.values[1] == pytest.approx(TRUE, abs=0.05)
-    assert len(looked) == 3 * (24 if in_steps else 6)  # what jumps is looked for nearer, and further away
+    assert len(looked) == 3 * (24 if kind == "in_steps" else 6)  # what jumps is looked for nearer, and further away
 
 
 def test_it_stays_where_no_size_is_better(looked):
@@ -71,7 +75,7 @@ def test_it_stays_where_no_size_is_better(looked):
 
 
 def test_effects_that_change_smoothly_cost_nothing(looked):
-    fit = _fit(8.7, follows_motion=False)
+    fit = _fit(8.7, "none of these")
     assert look_beside(fit, SimpleNamespace(), SimpleNamespace()) is fit
     assert looked == []
 
