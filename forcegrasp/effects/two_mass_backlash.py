@@ -34,7 +34,14 @@ class TwoMassBacklash(Effect):
     parameters = (
         Parameter("gap_m", "width of the gap g", "m", 0.0, 0.006, 0.0006, trials=(3e-4, 1e-3), follows="position"),
         Parameter(
-            "finger_share", "share s of the damping d that is the finger's", "1", 0.0, 1.0, 0.5, null=0.5, trials=(0.5,)
+            "finger_share",
+            "share s of the damping d that is the finger's",
+            "1",
+            0.0,
+            1.0,
+            0.5,
+            null=0.5,
+            trials=(0.3, 0.8),
         ),
     )
     variants = ("motor_encoder", "finger_encoder")

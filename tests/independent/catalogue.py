@@ -47,6 +47,7 @@ CLASSES: dict[str, type[Effect]] = {
     "rough_guide": outside.RoughGuide,
     "backlash": drive.Backlash,
     "backlash_loose": drive.LooseBacklash,
+    "backlash_behind": drive.FingerEncoderBacklash,
     "finger_compliance": drive.FingerCompliance,
     "damped_finger": otherwise.DampedFinger,
     "ringing_finger": otherwise.RingingFinger,
@@ -125,12 +126,16 @@ CATALOGUE: dict[str, Sizes] = {
 #: Other honest readings of effects of the catalogue: the name up to its variant is the right answer.
 VARIANTS: dict[str, Sizes] = {
     "backlash_loose": _sizes("gap", 1e-4, 3e-4, 1e-3),
+    "backlash_behind": _sizes("gap", 1e-4, 3e-4, 1e-3),
     "force_threshold": _sizes("threshold", 0.04, 0.1, 0.25),
     "encoder_bias_in_loop": CATALOGUE["encoder_bias"],
 }
 VARIANT_OF = {
-    "backlash_loose": "backlash", "force_threshold": "force_deadzone", "encoder_bias_in_loop": "encoder_bias"
-}  # fmt: skip
+    "backlash_loose": "backlash",
+    "backlash_behind": "two_mass_backlash",
+    "force_threshold": "force_deadzone",
+    "encoder_bias_in_loop": "encoder_bias",
+}
 
 #: Effects of the catalogue by another law: the right answer, and sizes.
 OTHERWISE: dict[str, tuple[str, Sizes]] = {

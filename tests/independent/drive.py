@@ -306,3 +306,23 @@ class LooseBacklash(Drivetrain):
         # A joint may push but not stick: no pull while the sides separate.
         knock = np.where(knock * beyond > 0, knock, 0.0) + self.grease * speed
         return knock + self._friction(pad_v, self.friction), -knock
+
+
+@dataclass
+class FingerEncoderBacklash(LooseBacklash):
+    """The same with the encoder at the pad, by which the servo goes; it still damps by the motor's own speed."""
+
+    def start(self, n, rng):
+        super().start(n, rng)
+        self._ahead = np.zeros((n, 2))
+
+    def couple(self, s, pad, pad_v, load):
+        on_pad, on_motor = super().couple(s, pad, pad_v, load)
+        self._ahead = s.q - pad + STEP_S * (s.v - pad_v)
+        return on_pad, on_motor
+
+    def setpoint(self, setpoint, s):
+        return setpoint + self._ahead
+
+    def position(self, q, s):
+        return q - self._ahead

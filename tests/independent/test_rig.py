@@ -81,7 +81,8 @@ def test_every_effect_shows(name: str) -> None:
 def test_names() -> None:
     assert set(CATALOGUE) | set(VARIANTS) | set(OTHERWISE) | set(OUTSIDE) == set(CLASSES)
     assert set(VARIANT_OF) == set(VARIANTS)
-    assert set(VARIANT_OF.values()) | {name for name, _ in OTHERWISE.values()} <= set(CATALOGUE)
+    answers = set(VARIANT_OF.values()) | {name for name, _ in OTHERWISE.values()}
+    assert answers <= set(CATALOGUE) | {"two_mass_backlash"}
 
 
 def test_symptoms_of_the_command() -> None:
@@ -142,6 +143,10 @@ def test_symptoms_between_motor_and_pad() -> None:
     play = rig("backlash", gap=2e-4)
     assert np.all(plain.f[0, EASE] - plain.f[0, RELEASE] > 0.02)
     np.testing.assert_allclose(play.f[0, EASE], play.f[0, RELEASE], atol=0.004)  # the play eats the easing
+    loose, behind = rig("backlash_loose", gap=5e-4), rig("backlash_behind", gap=5e-4)
+    assert np.all(loose.f[0, EASE] < plain.f[0, EASE] - 0.05)  # the motor takes the play before it presses,
+    np.testing.assert_allclose(behind.q[0, EASE], plain.q[0, EASE], atol=3e-5)  # if it doesn't know of it
+    np.testing.assert_allclose(behind.f[0, EASE], plain.f[0, EASE], atol=0.01)
     bent = rig("finger_compliance", compliance=1e-3)
     np.testing.assert_allclose(bent.q[0, SQUEEZE], plain.q[0, SQUEEZE], atol=2e-5)  # no load, no bending
     assert np.all(bent.q[:, EASE] < plain.q[:, EASE] - 2e-5)
