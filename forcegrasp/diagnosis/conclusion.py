@@ -88,7 +88,8 @@ def concluded(begun: Begun, study: Study, steps: Sequence[Step], fit: Fit, in_a_
     numerical, odd = begun.numerical, begun.odd
     if fit is not begun.fit:  # what was missing may have made them odd
         numerical, odd = numerical_error(fit, target), odd_grasps(target, fit)
+    forms = bool(left) and verdict.names_effects and begun.may_be_forms(study, fit)
     return Diagnosis(
         verdict, tuple(dict.fromkeys(names)), tuple(steps), base, fit, target, begun.folds, error_before, error_after,
-        numerical, floor, left, odd, noise, alone=alone, may_be_forms=bool(left) and begun.may_be_forms(study, fit),
+        numerical, floor, left, odd, noise, alone=alone, may_be_forms=forms,
     )  # fmt: skip

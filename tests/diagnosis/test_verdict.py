@@ -375,7 +375,7 @@ def test_only_what_may_be_negative_is_promised_with_that_sign():
 def found_by(made_up, monkeypatch):
     """Runs the search with steps that are given."""
 
-    def run(*steps: Step, converged: bool = True) -> Diagnosis:
+    def run(*steps: Step, converged: bool = True, forms: bool = False) -> Diagnosis:
         following = iter((*steps, Step((), (), (), 1.0, 1.0)))
         base = made_up.base.fit
         monkeypatch.setattr(search, "look_further", lambda *a: next(following))
@@ -383,7 +383,7 @@ def found_by(made_up, monkeypatch):
         for module in (search, conclusion):
             monkeypatch.setattr(module, "numerical_error", lambda fit, target: (0 * fit.residual + 0.1,) * 2)
         monkeypatch.setattr(search, "Screen", lambda *a: None)
-        monkeypatch.setattr(conclusion, "may_be_forms", lambda *a: False)
+        monkeypatch.setattr(conclusion, "may_be_forms", lambda *a: forms)
         monkeypatch.setattr(search, "with_few", lambda study, fit: study)
         effects = [get_effect(name) for name in ("force_bias", "force_drift", "backlash", "stiction")]
         nothing = cast(Any, SimpleNamespace())
@@ -413,6 +413,17 @@ def test_where_the_base_fit_stopped_short_what_explains_most_is_an_answer(made_u
     for candidate, most, verdict in ((bias, 0.9, "effect"), (half, 0.9, "not_fitted"), (half, 0.5, "effect")):
         monkeypatch.setattr(conclusion, "EXPLAINED_FAR", most)
         assert found_by(Step(("force_bias",), (candidate,), (), 2.0, 1.6), converged=False).verdict == verdict
+
+
+@pytest.mark.parametrize(("verdict", "told"), [("effect", True), ("unknown", False)])
+def test_what_is_left_may_be_the_form_only_of_what_is_named(made_up, found_by, monkeypatch, verdict, told):
+    bias, drift = made_up.diagnosis("one_of").steps[0].candidates
+    half = dataclasses.replace(bias, fit=drift.fit)
+    monkeypatch.setattr(conclusion, "conclude", lambda *a, **k: Verdict(verdict))
+    monkeypatch.setattr(conclusion, "MUCH", np.inf)
+    diagnosis = found_by(Step(("force_bias",), (half,), (), 2.0, 1.6), forms=True)
+    assert diagnosis.left
+    assert diagnosis.may_be_forms == told
 
 
 def test_intervals_are_those_of_the_final_fit(made_up, found_by):
