@@ -131,7 +131,7 @@ VARIANTS: dict[str, Sizes] = {
     "encoder_bias_in_loop": CATALOGUE["encoder_bias"],
 }
 VARIANT_OF = {
-    "backlash_loose": "backlash",
+    "backlash_loose": "two_mass_backlash",
     "backlash_behind": "two_mass_backlash",
     "force_threshold": "force_deadzone",
     "encoder_bias_in_loop": "encoder_bias",
