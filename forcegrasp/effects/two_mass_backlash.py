@@ -48,6 +48,11 @@ class TwoMassBacklash(Effect):
     needs_rotors = in_valleys = True
     order = 5
 
+    # of the step that is being made, ``(rows, motors)``
+    _command: np.ndarray
+    _jump: np.ndarray  # of the fingers' velocity
+    _free: np.ndarray  # which fingers are at no end of the gap
+
     def init(self, which: np.ndarray) -> State:
         finger, velocity = self.plant.joint_position[self.rows][which], self.velocity[which]
         nothing = np.zeros_like(finger)

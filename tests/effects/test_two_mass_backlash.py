@@ -72,6 +72,14 @@ def test_motor_and_finger_move_as_two_bodies(variant, share):
     np.testing.assert_allclose(found[-1], expected[-1], atol=1e-5)
 
 
+def test_a_finger_runs_past_the_end_of_its_motors_range():
+    plant = make_plant(1, [(get_effect("two_mass_backlash"), (0.002, 0.1), "", [0])], "reference")
+    plant.reset(np.arange(1), np.zeros(1), np.full((1, 2), 0.035))
+    plant.advance(np.full((1, 2), 0.045), 1000)
+    assert plant.position[0, 0] == pytest.approx(0.045, abs=1e-6)
+    assert plant.joint_position[0, 0] == pytest.approx(0.046, abs=1e-6)
+
+
 def test_an_object_pushes_the_finger_back_at_once():
     """It does not hold while the motor crosses, as a finger does that its guide holds."""
     closed = (0.0245, 0.023, 0.022, 0.021)
