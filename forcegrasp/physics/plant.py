@@ -9,15 +9,15 @@ import numpy as np
 
 from forcegrasp.physics.attached_effects import AttachedEffects
 from forcegrasp.physics.contact_law import contact_numbers
+from forcegrasp.physics.contributed_fields import ContributedFields
 from forcegrasp.physics.gripper import OF_READINGS, START_VELOCITY, Gripper
-from forcegrasp.physics.model_fields import ModelFields
-from forcegrasp.physics.protocols import Contribution, PlantEffect
+from forcegrasp.physics.protocols import PlantEffect
 
 # What motor_force and outside_force are made of.
 _FORCES = ("qfrc_actuator", "qfrc_spring", "qfrc_bias")
 
 
-class Plant(ModelFields):
+class Plant(ContributedFields):
     """Simulates ``n`` grasps, each with its own parameters and effects.
 
     Results do not depend on the number of threads, on ``n``, or on what a row simulated before, to the last bit; nor on
@@ -41,26 +41,7 @@ class Plant(ModelFields):
         self._load, self._enabled = np.zeros(n), np.ones(n, bool)
         self._at_start = np.ones(n, bool)  # which rows made no step since they were reset
         self._force_range: np.ndarray | None = None  # of the motors, before it was changed while they move
-        # the friction that effects added last, and which motors' it stiffened, ``(n, motors)``
-        self._friction_written: np.ndarray | None = None
-        self._friction_active: np.ndarray | None = None
-        self.effects = AttachedEffects(())
         self.force_scale = np.ones(n)  #: f_α, factor from the force sensors to the reading, ``(n,)``
-        #: What effects contribute to a step, all together: see :class:`~forcegrasp.physics.protocols.Contribution`.
-        self.friction, self.damping, self.motor_push = np.zeros((3, n, self.motors))
-        self.pad_shift_m, self.finger_push_n, self._contact_shift_m = np.zeros((3, n, 2))
-        self.object_push_n = np.zeros(n)
-        self._velocity_change, self._more_inertia = np.zeros((2, n, self.motors))
-        pushes = self.finger_push_n, self.object_push_n, self.damping, self.motor_push
-        totals = (
-            self.friction,
-            self.pad_shift_m,
-            *pushes,
-            self._contact_shift_m,
-            self._velocity_change,
-            self._more_inertia,
-        )
-        self._contributed = dict(zip(Contribution._fields, totals, strict=True))
         #: of the joints that motors move, m or rad, ``(n, motors)``; an effect may let a motor be somewhere else
         self.joint_position = np.zeros((n, self.motors))
         self.position = self.joint_position  #: of the motors (left, right, or the one), m or rad; 0 is closed
@@ -187,7 +168,7 @@ class Plant(ModelFields):
           velocity: of the motors, m/s or rad/s, ``(len(ids), motors)``; they stand still by default.
         """
         self.restore_fields(ids)
-        self._friction_written = self._friction_active = None
+        self._forget_friction()
         self.effects.change_model(self, ids)
         self.derive_fields(ids)
         keyframe = {"keyframe": 0} if self.model.nkey else {}
@@ -353,63 +334,14 @@ class Plant(ModelFields):
     def _apply_actions(self) -> None:
         if self.effects.limit_motors:
             self._write_force_range()
-        if not self.effects.contribute(self._contributed):
+        if not self._contribute():
             return
-        self._write_friction()
-        self._write_damping()
-        self._write_inertia()
-        self._write_pad_shift()
         if self._is_given("velocity_change"):
             self._qvel[:, self._motor_v] += self._velocity_change * self._signs
         on_motors = self._to_motors(self.finger_push_n) + self.motor_push + self._load[:, None]
         self._applied[:, self._motor_v] = on_motors * self._signs
         if not self.gripper.is_servo:
             self._applied[:, self.object_dof] = self.object_push_n
-
-    def _is_given(self, name: str) -> bool:
-        """Whether effects contribute anything of this name to this step."""
-        return name in self.effects.given and bool(self._contributed[name].any())
-
-    def _write_friction(self) -> None:
-        if "dof_frictionloss" not in self._fields and not self._is_given("friction"):
-            return
-        if self._friction_written is not None and np.array_equal(self.friction, self._friction_written):
-            return
-        self._friction_written = self.friction.copy()
-        base = self.base("dof_frictionloss")[:, self._motor_v]
-        loss = self.field("dof_frictionloss")[:, self._motor_v] = base + self.friction
-        active = loss > base
-        if self._friction_active is None or not np.array_equal(active, self._friction_active):
-            self._friction_active = active
-            for dof in self.motor_dofs:
-                self.stiffen_friction(dof)
-
-    def _write_damping(self) -> None:
-        if "dof_damping" in self._fields or self._is_given("damping"):
-            self.field("dof_damping")[:, self._motor_v] = self.base("dof_damping")[:, self._motor_v] + self.damping
-
-    def _write_inertia(self) -> None:
-        if "dof_armature" in self._fields or self._is_given("inertia"):
-            self.field("dof_armature")[:, self._motor_v] = (
-                self.base("dof_armature")[:, self._motor_v] + self._more_inertia
-            )
-
-    def _write_pad_shift(self) -> None:
-        if "geom_pos" not in self._fields and not self._is_given("pad_shift_m"):
-            return
-        shifts = self.pad_shift_m + self._contact_shift_m
-        for side, pads in enumerate(self._pads):
-            shift = shifts[:, side : side + 1] * self._outward(side)
-            for field, (indices, places) in pads.moved.items():
-                self.field(field)[:, indices] = places + shift[:, None]
-
-    def _outward(self, side: int) -> np.ndarray:
-        """Direction in which a side's pads open, in the frame of their body, ``(3,)`` or ``(n, 3)``."""
-        finger = self.gripper.fingers[side]
-        if self.gripper.is_direct:
-            return self._signs[finger.motor] * self.model.joint(finger.joint).axis
-        turned = self.batch.bind("xmat")[:, self._pads[side].body].reshape(-1, 3, 3)
-        return turned[:, self.gripper.axis] * (-1.0, 1.0)[side]  # the world's axis, seen from the body
 
     def _read_anew(self, ids: np.ndarray) -> None:
         """Reads rows that were reset; of the others, readings and the memory of their effects stay as they are."""
