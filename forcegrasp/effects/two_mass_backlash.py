@@ -57,8 +57,8 @@ class TwoMassBacklash(Effect):
         finger, velocity = self.plant.joint_position[self.rows][which], self.velocity[which]
         nothing = np.zeros_like(finger)
         return {
-            "motor": finger,  # where it is, if it is at no end
-            "speed": velocity,  # of the motor
+            "motor": finger,  # where it is, and
+            "speed": velocity,  # how fast, if it is at no end
             # at which it is: 1 if it is ahead of the finger and opens it, −1 if it closes it; without a gap always
             "end": nothing + (self["gap_m"][which] == 0),
             "before": velocity,  # of the finger, before the last step
@@ -98,17 +98,18 @@ class TwoMassBacklash(Effect):
         rotor, both = self._inertia
         finger, motor = self.plant.joint_position[self.rows], state["motor"]
         speed = self._speed_after(finger if self.variant == "finger_encoder" else motor, low, high)
-        before, after = motor - finger, motor - finger + dt * (speed - velocity)
-        meets = (state["end"] == 0) & (np.abs(after) > half)
+        before, alone = motor - finger, state["end"] == 0
+        after = before + dt * (speed - velocity)
+        meets = alone & (np.abs(after) > half)
         end, way = np.sign(after), np.where(after == before, 1.0, after - before)
         share = np.clip((end * half - before) / way, 0.0, 1.0)  # of the step, until they meet
         together = ((both - rotor) * velocity + rotor * speed) / both
         on_average = share * velocity + (1 - share) * together
         self._jump = state["to_come"] + np.where(meets, on_average - velocity, 0.0)
-        self._free = free = (state["end"] == 0) & ~meets
+        self._free = free = alone & ~meets
         state.update(
-            motor=np.where(free, motor + dt * speed, motor),
-            speed=np.where(free, speed, state["speed"]),
+            motor=motor + dt * speed,
+            speed=speed,
             end=np.where(meets, end, state["end"]),
             to_come=np.where(meets, together - on_average, 0.0),
             met=meets | (state["to_come"] != 0),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Generator, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -137,22 +137,24 @@ class AttachedEffects:
 
     def interaction(self, force: np.ndarray) -> np.ndarray:
         """True forces between pads and object, newtons, ``(n, 2)``, from those of the contacts."""
-        if not self._interaction:
-            return force
-        force = force.copy()
-        for effect in self._interaction:
-            force[effect.rows] = effect.interaction(force[effect.rows])
-        return force
+        return _in_turn(self._interaction, lambda effect, values: effect.interaction(values), force)
 
     def motor_position(self, joints: np.ndarray) -> np.ndarray:
         """Positions of the motors, m or rad, ``(n, motors)``, from those of their joints."""
-        if not self._motor_position:
-            return joints
-        position = joints.copy()
-        for effect in self._motor_position:
-            position[effect.rows] = effect.motor_position(position[effect.rows])
-        return position
+        return _in_turn(self._motor_position, lambda effect, values: effect.motor_position(values), joints)
 
     def _rows_of(self, ids: np.ndarray) -> list[tuple[PlantEffect, np.ndarray]]:
         """Each effect with those of its own rows that are among these of the plant."""
         return [(effect, np.flatnonzero(np.isin(effect.rows, ids))) for effect in self._effects]
+
+
+def _in_turn(
+    effects: Sequence[PlantEffect], hook: Callable[[PlantEffect, np.ndarray], np.ndarray], values: np.ndarray
+) -> np.ndarray:
+    """Values of all rows after each effect made others of those of its own; the very array if there is none."""
+    if not effects:
+        return values
+    values = values.copy()
+    for effect in effects:
+        values[effect.rows] = hook(effect, values[effect.rows])
+    return values
