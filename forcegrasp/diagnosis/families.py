@@ -29,9 +29,14 @@ _NEXT_TO_NOTHING = 1e-3
 _WORSE = 1e-3
 
 
+def is_richer(effect: type[Effect], than: type[Effect]) -> bool:
+    """Whether an effect contains the other one: it leaves less whatever is missing."""
+    return than.name in _contained(effect)
+
+
 def contain(effect: type[Effect], other: type[Effect]) -> bool:
     """Whether one of the two effects contains the other, so that a model needs one of them at most."""
-    return other.name in _contained(effect) or effect.name in _contained(other)
+    return is_richer(effect, other) or is_richer(other, effect)
 
 
 def may_join(effect: type[Effect], others: Collection[type[Effect]]) -> bool:
@@ -129,10 +134,24 @@ def refit_as(setting: EffectSetting, fit: Fit, without: str | Collection[str], s
     return _refit([setting], fit, without, study)
 
 
-def roughly_as(settings: Sequence[EffectSetting], fit: Fit, without: str | Collection[str], study: Study) -> Fit:
-    """The same by the cheap model, from the best of several sizes."""
+def roughly_as(
+    settings: Sequence[EffectSetting],
+    fit: Fit,
+    without: str | Collection[str],
+    study: Study,
+    at_the_end: bool = True,
+) -> Fit:
+    """The same by the cheap model, from the best of several sizes.
+
+    Args:
+      settings: the effect at these sizes.
+      fit, without, study: as for :func:`refit_as`.
+      at_the_end: whether slopes are measured where the fit ends, too: not needed if only what it leaves counts.
+    """
     problem, start, slopes = _best_start(settings, fit, without, study)
-    return fit_once(study.target, problem, study.simulators, start, fit.correction, rounds=0, slopes=slopes)
+    return fit_once(
+        study.target, problem, study.simulators, start, fit.correction, rounds=0, slopes=slopes, at_the_end=at_the_end
+    )
 
 
 def refit_as_richer(container: type[Effect], fit: Fit, without: str, study: Study) -> Fit:
@@ -141,8 +160,8 @@ def refit_as_richer(container: type[Effect], fit: Fit, without: str, study: Stud
 
 
 def roughly_as_richer(container: type[Effect], fit: Fit, without: str, study: Study) -> Fit:
-    """The same by the cheap model."""
-    return roughly_as(_richer_than(without, container, fit), fit, without, study)
+    """The same by the cheap model, without slopes where it ends."""
+    return roughly_as(_richer_than(without, container, fit), fit, without, study, at_the_end=False)
 
 
 def _richer_than(name: str, container: type[Effect], fit: Fit) -> list[EffectSetting]:
@@ -155,10 +174,12 @@ def refit_without(names: str | Collection[str], fit: Fit, study: Study) -> Fit:
     return fit_exactly(study.target, problem, study.simulators, start, slopes)
 
 
-def roughly_without(names: str | Collection[str], fit: Fit, study: Study) -> Fit:
-    """The same by the cheap model."""
+def roughly_without(names: str | Collection[str], fit: Fit, study: Study, at_the_end: bool = True) -> Fit:
+    """The same by the cheap model; ``at_the_end`` as for :func:`roughly_as`."""
     problem, start, slopes = problem_without(names, fit)
-    return fit_once(study.target, problem, study.simulators, start, fit.correction, rounds=0, slopes=slopes)
+    return fit_once(
+        study.target, problem, study.simulators, start, fit.correction, rounds=0, slopes=slopes, at_the_end=at_the_end
+    )
 
 
 def problem_without(names: str | Collection[str], fit: Fit) -> tuple[Problem, np.ndarray, np.ndarray]:
@@ -201,7 +222,7 @@ def extensions(fit: Fit, effects: Sequence[type[Effect]]) -> Iterator[tuple[str,
     """Effects that could take the place of one in the model that they contain: its name, and the effect."""
     for known in fit.problem.effects:
         for effect in effects:
-            if known.effect.name in _contained(effect):
+            if is_richer(effect, known.effect):
                 yield known.effect.name, effect
 
 

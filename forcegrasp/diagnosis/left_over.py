@@ -6,7 +6,7 @@ import numpy as np
 
 from forcegrasp.diagnosis.noise_check import Noise, unexpected_noise
 from forcegrasp.diagnosis.study import Study
-from forcegrasp.diagnosis.verdict import explained_share
+from forcegrasp.diagnosis.verdict import MUCH, explained_share
 from forcegrasp.identify.cross_validation import rms_of_grasps
 from forcegrasp.identify.fit import Fit
 from forcegrasp.identify.noise_floor import excess
@@ -18,6 +18,8 @@ AS_GOOD_AS_NOTHING = 1.1
 # If that is also less than this share of what was beyond the floor, effects that were found are nearly right, and what
 # takes the rest makes up for their forms: behind a lag, in another engine's contacts, objects were ten times too light.
 _LITTLE = 0.1
+# What effects leave of the mean square beyond the floor is of their forms if it is no more than this share.
+_OF_FORMS = 0.02
 
 
 def left_over(study: Study, fit: Fit) -> tuple[str, Noise | None]:
@@ -57,3 +59,12 @@ def leaves_little(study: Study, fit: Fit, error_before: float, floor: float) -> 
     """Whether effects leave next to nothing, and little of what there was before them."""
     error = study.error(study.heldout(fit))
     return error < AS_GOOD_AS_NOTHING * floor and explained_share(error_before, error, noise=floor) > 1 - _LITTLE
+
+
+def leaves_forms(study: Study, fit: Fit, error_before: float, floor: float) -> bool:
+    """Whether effects leave so small a share of what there was that their forms, a little off, may well leave it.
+
+    And not much: what is still missing would then be small, too, and small effects are as their signatures say.
+    """
+    error = study.error(study.heldout(fit))
+    return error < MUCH * floor and explained_share(error_before, error, noise=floor) > 1 - _OF_FORMS

@@ -104,10 +104,10 @@ def _promising(study: Study, fit: Fit, pair: Collection[str], effects: Sequence[
 
 def _roughly_as_good(study: Study, fit: Fit, pair: Collection[str], effect: type[Effect]) -> EffectSetting | None:
     """The effect as a rough fit has it, unless that says clearly that the others are needed."""
-    less = roughly_as(trials([effect]), fit, pair, study)
+    less = roughly_as(trials([effect]), fit, pair, study, at_the_end=False)
     if is_beyond_chance(study.gains(less.residual, fit.residual), SURELY * LEAST_RISE):
         return None
-    without = roughly_without(pair, fit, study)
+    without = roughly_without(pair, fit, study, at_the_end=False)
     gain, most = (float(np.nansum(study.gains(without.residual, one.residual))) for one in (less, fit))
     return less.effects[-1] if nearly_as_much(gain, most) else None
 

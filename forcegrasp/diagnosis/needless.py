@@ -88,7 +88,7 @@ def simplify(study: Study, steps: Sequence[Step], fit: Fit, given: int) -> tuple
         if known is None:
             continue
         simple = [simpler(known, nested, fit.problem.gripper) for nested in known.effect.contains]
-        roughly = [partial(roughly_as, [one], without=known.effect.name) for one in simple]
+        roughly = [partial(roughly_as, [one], without=known.effect.name, at_the_end=False) for one in simple]
         surely = side_by_side([partial(_is_surely_worse, rough, fit, study) for rough in roughly])
         doubted = [one for one, is_more in zip(simple, surely, strict=True) if not is_more]
         if not doubted:
@@ -177,7 +177,8 @@ def drop_all_needless(study: Study, steps: Sequence[Step], fit: Fit, given: int)
 def _without_needless(study: Study, fit: Fit, names: Sequence[str]) -> tuple[str, Fit] | None:
     """That one of these effects which held-out grasps ask for least, if they don't, and the fit without it."""
     held, without = study.heldout(fit), {}
-    surely = side_by_side([partial(_is_surely_worse, partial(roughly_without, name), fit, study) for name in names])
+    rough = partial(roughly_without, at_the_end=False)
+    surely = side_by_side([partial(_is_surely_worse, partial(rough, name), fit, study) for name in names])
     doubted = [name for name, is_needed in zip(names, surely, strict=True) if not is_needed]
     for name in doubted:
         study.progress(f"fitting without {name}")

@@ -79,7 +79,8 @@ def refine_anyway(effects: Sequence[type[Effect]], study: Study, fit: Fit, witho
       without: name of an effect in it whose place they take; none by default.
     """
     some, part = study.on_few(fit)
-    few = side_by_side([partial(roughly_as, trials([effect]), part, without, some) for effect in effects])
+    rough = partial(roughly_as, fit=part, without=without, study=some, at_the_end=some is study)
+    few = side_by_side([partial(rough, trials([effect])) for effect in effects])
     few = [one for one in few if one.cost < NO_BETTER * part.cost]
     if some is study:
         return few

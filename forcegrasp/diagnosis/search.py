@@ -14,14 +14,14 @@ from forcegrasp.diagnosis.cut_short import REASONS, cut_short
 from forcegrasp.diagnosis.evidence import LEAST_SHARE_TOGETHER
 from forcegrasp.diagnosis.exchange import exchange
 from forcegrasp.diagnosis.few import with_few
-from forcegrasp.diagnosis.left_over import AS_GOOD_AS_NOTHING, is_worth_looking, leaves_little, left_over
+from forcegrasp.diagnosis.left_over import AS_GOOD_AS_NOTHING, is_worth_looking, leaves_forms, leaves_little, left_over
 from forcegrasp.diagnosis.look_beside import look_beside
 from forcegrasp.diagnosis.merge import merge
 from forcegrasp.diagnosis.needless import chained, drop_needless, simplify
 from forcegrasp.diagnosis.odd_grasps import odd_grasps
 from forcegrasp.diagnosis.result import Diagnosis, Step, kept_steps
 from forcegrasp.diagnosis.screen import Screen
-from forcegrasp.diagnosis.several import add_several, none_stands_out
+from forcegrasp.diagnosis.several import add_several, add_up, none_stands_out, one_does_as_well
 from forcegrasp.diagnosis.split import split
 from forcegrasp.diagnosis.step import FAR, look_further
 from forcegrasp.diagnosis.study import Study
@@ -38,6 +38,7 @@ from forcegrasp.identify.weights import reweigh
 
 #: Whether what a set gives, moved within its tolerance, may explain what a fit leaves.
 MayBeGiven = Callable[[Target, Fit], bool]
+Effects = Sequence[type[Effect]]
 #: Largest number of effects that are looked for one by one.
 MOST_EFFECTS = 8
 # Beyond so many times the floor, beside an effect that was found, several others are added at once if none of them
@@ -129,7 +130,10 @@ def _add_effects(so_far: _SoFar, begun: Begun, rng: np.random.Generator, may_be_
         if not (untried or richer or forms) or (several.done and begun.left(study, fit) > MUCH):
             break  # with a dozen effects and much left, all that could be asked takes long and says little
         study = with_few(study, fit)
-        if several.are_likely(study, fit, screen, untried) and several.found(study, steps, fit, EXPLAINED):
+        likely = several.are_likely(study, fit, screen, untried)
+        if several.that_add_up(study, steps, fit, screen, untried) or (
+            likely and several.found(study, steps, fit, EXPLAINED)
+        ):
             _, steps, fit = so_far.all
             continue
         step = look_further(study, fit, screen, untried, rng, richer)
@@ -139,7 +143,8 @@ def _add_effects(so_far: _SoFar, begun: Begun, rng: np.random.Generator, may_be_
         much = much and not (may_be_given is not None and may_be_given(study.target, fit))
         if much and untried and screened is not fit:  # beside what was found since, others may do something else
             screen, screened = Screen(effects, study), fit
-            step = look_further(study, fit, screen, untried, rng, richer)
+            step = look_further(study, fit, screen, untried, rng)
+        much = much and not leaves_forms(study, fit, begun.error, begun.floor)
         if much and not step.effects:
             worth_it = untried and not tried_anyway and step.error_before < FAR
             found = _fitted_anyway(study, fit, screen, untried, rng) if worth_it else None
@@ -178,13 +183,40 @@ class _Several:
     rng: np.random.Generator
     done: bool = False  #: whether it was: no other effect promises anything beside what it found
     _asked: Fit | None = None  #: the fit that it was last tried for
+    _added_up: Fit | None = None  #: the same of effects that add up
 
-    def are_likely(self, study: Study, fit: Fit, screen: Screen, untried: Sequence[type[Effect]]) -> bool:
+    def are_likely(self, study: Study, fit: Fit, screen: Screen, untried: Effects) -> bool:
         """Whether what is left, beside an effect that was found, is not that of one other."""
         if len(fit.problem.effects) == self.begun.given:
             return False
         left = self.begun.left(study, fit)
         return left > _VERY_MUCH_LEFT or (left > _MUCH_LEFT and none_stands_out(study, fit, screen, untried))
+
+    def that_add_up(self, study: Study, steps: list[Step], fit: Fit, screen: Screen, untried: Effects) -> bool:
+        """Whether several were found by their signatures that together explain nearly all that a fit leaves."""
+        if self._added_up is fit or not untried or study.target.gripper.is_servo:
+            return False
+        self._added_up = fit
+        if not add_up(study, fit, screen, untried):
+            return False
+        begun, before = self.begun, study.error(study.heldout(fit))
+
+        def enough(further: Fit) -> bool:
+            after = study.error(study.heldout(further))
+            return explained_share(before, after, noise=begun.floor) >= EXPLAINED_FAR
+
+        def keep(found: list[Step], further: Fit) -> bool:
+            if enough(further):
+                self.so_far.all = study, found, further
+            return leaves_little(study, further, begun.error, begun.floor)
+
+        found = add_several(study, fit, steps, begun.effects, begun.given, self.rng, keep, straight=True)
+        if found is None or not enough(found[1]) or one_does_as_well(study, fit, found[1], screen, untried):
+            self.so_far.all = study, steps, fit
+            return False
+        self.so_far.all = study, *found
+        self.done |= leaves_little(study, found[1], begun.error, begun.floor)
+        return True
 
     def found(self, study: Study, steps: list[Step], fit: Fit, least_share: float) -> bool:
         """Whether several were found that together explain this share of what a fit leaves, or leave nothing."""
@@ -192,9 +224,10 @@ class _Several:
             return False
         held, self._asked = study.heldout(fit), fit
 
-        def keep(found: list[Step], further: Fit) -> None:
+        def keep(found: list[Step], further: Fit) -> bool:
             enough = study.explained(held, study.heldout(further)) >= least_share
             self.so_far.all = (study, found, further) if enough else (study, steps, fit)
+            return False
 
         further = add_several(study, fit, steps, self.begun.effects, self.begun.given, self.rng, keep)
         if further is None:

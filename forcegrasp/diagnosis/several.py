@@ -19,10 +19,10 @@ from forcegrasp.diagnosis.forms import done_by_each
 from forcegrasp.diagnosis.judge import judged
 from forcegrasp.diagnosis.left_over import is_worth_looking
 from forcegrasp.diagnosis.needless import chained
-from forcegrasp.diagnosis.refine import fit_with
+from forcegrasp.diagnosis.refine import fit_with, refine
 from forcegrasp.diagnosis.result import Step
 from forcegrasp.diagnosis.screen import Screen
-from forcegrasp.diagnosis.signatures import Background, Score, direction, null_gains
+from forcegrasp.diagnosis.signatures import Background, Score, direction, null_gains, of_best_effects
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.diagnosis.verdict import EXPLAINED
 from forcegrasp.effects import Effect
@@ -31,8 +31,8 @@ from forcegrasp.identify.fit import Fit, fit_exactly, fit_once
 from forcegrasp.identify.problem import Problem
 from forcegrasp.identify.side_by_side import side_by_side
 
-#: Told the steps that were found so far, and the fit with their effects.
-Keep = Callable[[list[Step], Fit], None]
+#: Told the steps that were found so far, and the fit with their effects; whether that is all there is to find.
+Keep = Callable[[list[Step], Fit], bool]
 # So many effects at a time, in so many rounds; each is to explain this share of the squares beyond the noise.
 _AT_ONCE, _ROUNDS, _LEAST = 5, 6, 0.02
 # Slopes are measured anew where a fit by those of its start came to this share of the cost there.
@@ -41,6 +41,11 @@ _WELL_BELOW = 0.8
 _FLAT = 1e-2
 # One of them stands out, if it promises this share of what they promise together.
 _STANDS_OUT = 0.5
+# Effects add up if they promise this share of the squares beyond the noise together: their signatures are straight, and
+# so are they. They are several if none promises or, fitted alone, gains more than so much of what all do.
+_NEARLY_ALL, _ONE_ALONE = 0.75, 0.9
+# Each of them is to be worth this share of the squares beyond the noise, or such a share of those of the noise.
+_WORTH, _OF_NOISE = 0.01, 0.05
 
 
 def none_stands_out(study: Study, fit: Fit, screen: Screen, effects: Sequence[type[Effect]]) -> bool:
@@ -56,9 +61,39 @@ def none_stands_out(study: Study, fit: Fit, screen: Screen, effects: Sequence[ty
     return len(gains) > 1 and gains[0] < _STANDS_OUT * sum(gains)
 
 
+def add_up(study: Study, fit: Fit, screen: Screen, effects: Sequence[type[Effect]]) -> bool:
+    """Whether signatures of several effects, one added to the other, explain nearly all that a fit leaves.
+
+    Args:
+      study, fit, screen, effects: as for :func:`none_stands_out`.
+    """
+    some, part = study.on_few(fit)
+    gains = [score.gain for score in _chosen(study, fit, screen, effects, of_set=True)]
+    together, beyond = sum(gains), some.target.beyond_noise(part.residual)
+    return len(gains) > 1 and together > _NEARLY_ALL * beyond and gains[0] < _ONE_ALONE * together
+
+
+def one_does_as_well(study: Study, fit: Fit, further: Fit, screen: Screen, effects: Sequence[type[Effect]]) -> bool:
+    """Whether one effect alone, fitted to few grasps, gains nearly what several do: a large one is not straight.
+
+    Args:
+      study: the measurements.
+      fit: without the effects.
+      further: with several of them.
+      screen: of the catalogue.
+      effects: those that are not in the model.
+    """
+    (some, part), (_, several) = study.on_few(fit), study.on_few(further)
+    groups, _ = screen.on_few(study, some, part, effects)
+    best = of_best_effects(sorted((group[0] for group in groups), key=lambda score: -score.gain), _AT_ONCE)
+    alone = refine(best, some, part, Background(part, some.numerical))
+    gained = max((part.cost - one.fit.cost for one in alone), default=0.0)
+    return gained > _ONE_ALONE * (part.cost - several.cost)
+
+
 def add_several(
     study: Study, fit: Fit, steps: Sequence[Step], effects: Sequence[type[Effect]], given: int,
-    rng: np.random.Generator, keep: Keep,
+    rng: np.random.Generator, keep: Keep, straight: bool = False,
 ) -> tuple[list[Step], Fit] | None:  # fmt: skip
     """Steps that found effects together, after those that found others, and the fit with all; None if none are found.
 
@@ -71,14 +106,16 @@ def add_several(
       effects: the catalogue.
       given: number of effects that were in the model before the search; they stay.
       rng: for the null distribution.
-      keep: told what each round has found, which is all there is if no other one ends.
+      keep: told what each round has found, which is all there is if no other one ends, or if it says so.
+      straight: whether they :func:`add_up`: then mistakes of the set are among them, which else may look like anything,
+        and what explains next to nothing is not.
     """
     before, barred = fit, set[str]()
     for _ in range(_ROUNDS):
         study = with_few(study, fit)
         known = [one.effect for one in fit.problem.effects]
         untried = [e for e in effects if e.name not in barred and may_join(e, known)]
-        chosen = [score.setting for score in _chosen(study, fit, Screen(effects, study), untried)]
+        chosen = [score.setting for score in _chosen(study, fit, Screen(effects, study), untried, straight)]
         if not chosen:
             break
         study.progress(f"fitting together {', '.join(one.effect.name for one in chosen)}")
@@ -93,20 +130,24 @@ def add_several(
         change = f"{study.error(held):.2f} → {study.error(after):.2f} × noise"
         study.progress(f"found {', '.join(names)}: held-out error {change}")
         fit = further
-        keep(_steps(study, steps, before, fit, rng, in_a_hurry=True), fit)
-        if not is_worth_looking(study, fit):
+        if keep(_steps(study, steps, before, fit, rng, in_a_hurry=True), fit) or not is_worth_looking(study, fit):
             break
     if fit is not before:
-        fit = _needed(study, fit, given)
+        target = study.target
+        worth = min(_WORTH * target.beyond_noise(before.residual), _OF_NOISE * target.cost_of_noise)
+        fit = _needed(study, fit, given, worth if straight else 0.0)
     if set(_names(fit)) <= set(_names(before)):
         return None
     fit = _at_the_end(study, fit)
     return _steps(study, steps, before, fit, rng), fit
 
 
-def _chosen(study: Study, fit: Fit, screen: Screen, effects: Sequence[type[Effect]]) -> list[Score]:
-    """Signatures that are worth a fit together; no mistakes of the set, which may look like anything."""
-    return screen.one_after_the_other(study, fit, [e for e in effects if not e.of_set], _AT_ONCE, _LEAST)
+def _chosen(
+    study: Study, fit: Fit, screen: Screen, effects: Sequence[type[Effect]], of_set: bool = False
+) -> list[Score]:
+    """Signatures that are worth a fit together, with or without those of mistakes of the set."""
+    tried = [e for e in effects if of_set or not e.of_set]
+    return screen.one_after_the_other(study, fit, tried, _AT_ONCE, _LEAST)
 
 
 def _names(fit: Fit) -> list[str]:
@@ -171,13 +212,17 @@ def _without_each(names: Sequence[str], study: Study, fit: Fit) -> list[Fit]:
     return side_by_side([partial(one, name) for name in names])
 
 
-def _needed(study: Study, fit: Fit, given: int) -> Fit:
-    """The fit without the effects that held-out grasps do not ask for."""
+def _needed(study: Study, fit: Fit, given: int, worth: float = 0.0) -> Fit:
+    """The fit without the effects that held-out grasps do not ask for, or that are worth less than so many squares."""
     while names := _names(fit)[given:]:
         study.progress("fitting without each of them")
         held = study.heldout(fit)
         fits = _without_each(names, study, fit)
-        needless = [less for less in fits if not is_beyond_chance(study.gains(study.heldout(less), held), LEAST_RISE)]
+        needless = [
+            less for less in fits
+            if less.cost - fit.cost < worth
+            or not is_beyond_chance(study.gains(study.heldout(less), held), LEAST_RISE)
+        ]  # fmt: skip
         if not needless:
             break
         fit = min(needless, key=lambda less: less.cost)

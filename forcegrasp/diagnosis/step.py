@@ -220,6 +220,8 @@ class _Start:
           at_the_end: names of those that were fitted to the end, too.
         """
         rough = [c for c in candidates if c.effect.name not in at_the_end and not c.replaces]
+        # what contains it takes its place in the next step, if it earns that
+        rough = [c for c in rough if not families.is_richer(c.effect, best.effect)]
         least = LOST_IF_FITTED * (self._fit.cost - best.fit.cost)
         return [c for c in rough if self._fit.cost - c.fit.cost > least]
 
@@ -246,8 +248,7 @@ class _Start:
         """
         name, own = best.effect.name, best.effect
         alike = families.look_alikes_of(own, effects, of_any_family=best.share < EXPLAINED_FAR)
-        # what contains it leaves less whatever is missing: it takes its place in the next step, if it earns that
-        alike = [effect for effect in alike if name not in {nested.effect for nested in effect.contains}]
+        alike = [effect for effect in alike if not families.is_richer(effect, own)]
         for effect in alike:
             self._study.progress(f"trying {effect.name} in place of {name}")
         fits = refine_anyway(alike, self._study, best.fit, name)

@@ -153,6 +153,7 @@ def fit_once(
     free: np.ndarray | None = None,
     known_slopes: np.ndarray | None = None,
     slopes: np.ndarray | None = None,
+    at_the_end: bool = True,
 ) -> Fit:
     """Fits from one start.
 
@@ -167,6 +168,8 @@ def fit_once(
       known_slopes: of the first k coordinates from an earlier fit nearby, ``(G, S, C, k)``; they are kept, which spares
         most of the simulations.
       slopes: the same, for the start alone.
+      at_the_end: whether slopes are measured where the fit ends, too, which takes most of the simulations; otherwise
+        they are those that led there.
     """
     local = _Local(target, problem, simulators.cheap, simulators.cheap, known_slopes, simulators.step)
     vector = np.clip(start, problem.low + 1e-9, problem.high - 1e-9)
@@ -186,7 +189,7 @@ def fit_once(
         correction = renewed
         if change < 0.02:
             break
-    return _finish(local, vector, local.value(vector) + correction, correction, free, total)
+    return _finish(local, vector, local.value(vector) + correction, correction, free, total, at_the_end)
 
 
 def descend_roughly(
@@ -310,9 +313,12 @@ class _SettledError(Exception):
     """A step that slopes promised a gain for made as good as no difference."""
 
 
-def _finish(local: _Local, vector: np.ndarray, predicted: np.ndarray, correction, free: np.ndarray, total: int) -> Fit:
+def _finish(
+    local: _Local, vector: np.ndarray, predicted: np.ndarray, correction, free: np.ndarray, total: int,
+    anew: bool = True,
+) -> Fit:  # fmt: skip
     problem, weight = local.problem, local.target.weight
-    residual, jacobian = local.target.residual(predicted), local.slopes(vector, anew=True)
+    residual, jacobian = local.target.residual(predicted), local.slopes(vector, anew) if anew else local.latest(vector)
     correction = np.broadcast_to(correction, predicted.shape)
     fit = Fit(problem, vector, predicted, residual, jacobian, correction, 0.0, total, weight)
     flat = fit.slopes
@@ -368,6 +374,10 @@ class _Local:
         if slopes.shape[-1] < len(x):
             slopes = self._measured(x, value, slopes)
         self._slope, self._age = (x.copy(), value, slopes), 1
+
+    def latest(self, x: np.ndarray) -> np.ndarray:
+        """The slopes that are at hand, ``(G, S, C, p)``; measured if there are none."""
+        return self.slopes(x) if self._slope is None else self._slope[2]
 
     def slopes(self, x: np.ndarray, anew: bool = False) -> np.ndarray:
         """Slopes of the signals ÷ noise over the coordinates, ``(G, S, C, p)``."""

@@ -9,13 +9,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from forcegrasp.diagnosis import search
+from forcegrasp.diagnosis import search, several
 from forcegrasp.diagnosis.families import roughly_without
 from forcegrasp.diagnosis.judge import judged
 from forcegrasp.diagnosis.refine import fit_with
 from forcegrasp.diagnosis.result import Step
 from forcegrasp.diagnosis.screen import Screen
-from forcegrasp.diagnosis.several import _needed, add_several, none_stands_out
+from forcegrasp.diagnosis.several import _needed, add_several, add_up, none_stands_out, one_does_as_well
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.effects.for_gripper import effect_of
 from forcegrasp.effects.setting import EffectSetting
@@ -32,6 +32,12 @@ HIDDEN = {
     "force_crosstalk": "share=0.12",
     "force_lag": "time_constant_s=0.06",
     "force_bias": "left_n=0.06 right_n=-0.05",
+}
+SMALL = {
+    "coulomb_friction": "force_n=0.01",
+    "force_bias": "left_n=0.02 right_n=-0.01",
+    "force_lag": "time_constant_s=0.01",
+    "force_gain_asymmetry": "share=0.03",
 }
 ACTUATOR_LAG = effect_of("actuator_lag", light_gripper())
 CATALOGUE = [
@@ -55,6 +61,7 @@ def mixed():
 
 def kept_by_nobody(steps, fit):
     """What a round found, thrown away."""
+    return False
 
 
 @pytest.fixture(scope="module")
@@ -120,6 +127,94 @@ def test_of_one_effect_alone_it_stands_out(mixed):
     assert not none_stands_out(*at_first(*study_of("command_delay delay_s=0.03")))
 
 
+@pytest.fixture(scope="module")
+def small():
+    """Four small effects, hidden in one set."""
+    return study_of(*(f"{name} {sizes}" for name, sizes in SMALL.items()))
+
+
+def test_signatures_of_several_effects_add_up(small):
+    assert add_up(*at_first(*small))
+    assert not add_up(*at_first(*study_of("force_lag time_constant_s=0.06")))  # one alone
+    assert not add_up(*at_first(*study_of("command_delay delay_s=0.01")))  # straight signatures explain too little
+
+
+def test_effects_that_add_up_are_found_at_once(small, monkeypatch):
+    study, base = small
+
+    def one_by_one(study, fit, screen, effects, *_, **__):
+        assert not effects
+        error = study.error(study.heldout(fit))
+        return Step((), (), (), error, error)
+
+    monkeypatch.setattr(search, "look_further", one_by_one)
+    diagnosis = search.diagnose(study.target, base, study.simulators, CATALOGUE, np.random.default_rng(0))
+    assert set(diagnosis.preferred) == set(SMALL)
+    for name, sizes in SMALL.items():
+        true = [float(size.partition("=")[2]) for size in sizes.split()]
+        assert diagnosis.fit.effect(name).values == pytest.approx(true, rel=0.15), name
+
+
+def test_rounds_end_where_one_leaves_little(small, monkeypatch):
+    study, base = small
+    monkeypatch.setattr(several, "_AT_ONCE", 1)
+    rounds = []
+
+    def keep(steps, fit):
+        rounds.append([step.effects[0] for step in steps])
+        return len(rounds) == 2
+
+    _, fit = add_several(study, base.fit, (), CATALOGUE, 0, np.random.default_rng(0), keep)
+    assert [len(names) for names in rounds] == [1, 2]
+    assert {one.effect.name for one in fit.problem.effects} == set(rounds[1])
+
+
+@pytest.mark.parametrize("why_not", ["none is found", "too little is explained", "one does as well"])
+def test_otherwise_they_are_looked_for_one_by_one(small, monkeypatch, why_not):
+    study, base = small
+    asked = []
+
+    def added(study, fit, steps, *_, **__):
+        one = [Step((), (), (), 2.0, 2.0)]
+        further = {"none is found": None, "too little is explained": (one, fit)}
+        return further.get(why_not, (one, fit_with([setting("force_bias")], fit.vector, study, fit)))
+
+    def one_by_one(study, fit, screen, effects, *_, **__):
+        asked.append((len(effects), [one.effect.name for one in fit.problem.effects]))
+        return Step((), (), (), 1.0, 1.0)
+
+    monkeypatch.setattr(search, "look_further", one_by_one)
+    monkeypatch.setattr(search, "add_several", added)
+    monkeypatch.setattr(search, "one_does_as_well", lambda *_: why_not == "one does as well")
+    if why_not == "one does as well":
+        monkeypatch.setattr(search, "explained_share", lambda *_, **__: 1.0)
+    diagnosis = search.diagnose(study.target, base, study.simulators, CATALOGUE, np.random.default_rng(0))
+    assert asked[0] == (len(CATALOGUE), [])
+    assert diagnosis.preferred == ()
+
+
+def setting(name: str) -> EffectSetting:
+    """An effect as it is hidden among the small ones."""
+    values = [float(size.partition("=")[2]) for size in SMALL[name].split()]
+    return EffectSetting(effect_of(name, light_gripper()), "", np.array(values))
+
+
+def test_one_effect_alone_does_as_well_as_several_only_where_one_is_hidden(small):
+    study, base = small
+    every = fit_with([setting(name) for name in SMALL], base.fit.vector, study, base.fit)
+    assert not one_does_as_well(study, base.fit, every, Screen(CATALOGUE, study), CATALOGUE)
+    one = fit_with([setting("coulomb_friction")], base.fit.vector, study, base.fit)
+    assert one_does_as_well(study, base.fit, one, Screen(CATALOGUE, study), CATALOGUE)
+
+
+def test_what_explains_next_to_nothing_is_not_needed(small):
+    study, base = small
+    every = fit_with([setting(name) for name in SMALL], base.fit.vector, study, base.fit)
+    assert _needed(study, every, 0) is every
+    fewer = _needed(study, every, 0, worth=0.1 * study.target.beyond_noise(base.fit.residual))
+    assert set(SMALL) - {one.effect.name for one in fewer.problem.effects} == {"force_gain_asymmetry"}
+
+
 def at_first(study, base):
     """What is asked of a base model."""
     return study, base.fit, Screen(CATALOGUE, study), CATALOGUE
@@ -137,7 +232,7 @@ def test_a_search_that_is_stopped_keeps_what_rounds_found_if_it_explains_enough(
     some = steps if enough else steps[3:]
     less = fit if enough else roughly_without(left_out, fit, study)
 
-    def one_round(*given):
+    def one_round(*given, **_):
         keep = given[-1]
         keep(some, less)
         raise KeyboardInterrupt

@@ -12,7 +12,7 @@ from forcegrasp.diagnosis import conclusion, search
 from forcegrasp.diagnosis import step as step_module
 from forcegrasp.diagnosis.families import look_alike
 from forcegrasp.diagnosis.few import with_few
-from forcegrasp.diagnosis.left_over import leaves_little
+from forcegrasp.diagnosis.left_over import leaves_forms, leaves_little
 from forcegrasp.diagnosis.odd_grasps import OddGrasp
 from forcegrasp.diagnosis.refine import refine_anyway
 from forcegrasp.diagnosis.result import Step, kept_steps
@@ -21,6 +21,7 @@ from forcegrasp.diagnosis.step import _Start, look_further
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.effects import catalogue
 from forcegrasp.effects.for_gripper import effect_of
+from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.identify.cross_validation import make_folds
 from forcegrasp.identify.fit import fit_once
 from forcegrasp.identify.fit_set import fit_model
@@ -113,6 +114,9 @@ def test_a_rough_fit_that_gained_nearly_as_much_is_held_against_what_leaves_more
     assert start._rivals(ahead, [rough], {"smooth_friction"}) == []
     assert start._rivals(ahead, [dataclasses.replace(rough, fit=base.fit)], set()) == []
     assert not start._leads_further(ahead, truth)
+    # what contains the best one takes its place in the next step, if it earns that
+    simple = dataclasses.replace(ahead, setting=EffectSetting.typical(effect_of("coulomb_friction", light_gripper())))
+    assert start._rivals(simple, [rough], set()) == []
 
 
 def test_where_noise_alone_is_left_no_look_alike_is_fitted(creeping, monkeypatch):
@@ -211,6 +215,36 @@ def test_a_search_ends_where_little_is_left(creeping, monkeypatch, little, looks
 def test_little_is_near_the_floor_and_a_small_part_of_what_was_beyond_it(before, after, floor, is_little):
     study = SimpleNamespace(heldout=lambda fit: None, error=lambda held: after)
     assert leaves_little(study, None, before, floor) == is_little
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "of_forms"), [(4.8, 1.13, True), (4.8, 1.25, False), (2.2, 1.1, False), (20.0, 1.6, False)]
+)
+def test_forms_leave_a_very_small_part_of_a_large_error(before, after, of_forms):
+    study = SimpleNamespace(heldout=lambda fit: None, error=lambda held: after)
+    assert leaves_forms(study, None, before, 1.01) == of_forms
+
+
+@pytest.mark.parametrize("of_forms", [True, False])
+def test_effects_that_promise_little_are_not_fitted_for_what_forms_leave(creeping, monkeypatch, of_forms):
+    study, base = creeping
+    found, asked = looked(creeping, [SMOOTH, DELAY], anyway=True), []
+
+    def step(study, fit, *_, anyway=False, **__):
+        asked.append(anyway)
+        return Step((), (), (), 2.0, 2.0) if fit.problem.effects else found
+
+    monkeypatch.setattr(search, "look_further", step)
+    for module in (search, conclusion):
+        monkeypatch.setattr(module, "odd_grasps", lambda *_: ())
+    monkeypatch.setattr("forcegrasp.diagnosis.left_over.left_over", lambda *_: ("somewhere", None))
+    monkeypatch.setattr(search, "leaves_little", lambda *_: False)
+    monkeypatch.setattr(search, "leaves_forms", lambda *_: of_forms)
+    for name in ("exchange", "split", "add_several"):
+        monkeypatch.setattr(search, name, lambda *_: None)
+    monkeypatch.setattr(conclusion, "may_be_forms", lambda *_: False)
+    search.diagnose(study.target, base, study.simulators, [SMOOTH, DELAY], np.random.default_rng(0))
+    assert asked == [False, False, False] + [True] * (not of_forms)
 
 
 def test_an_effect_that_comes_back_after_it_gave_way_is_kept(made_up):

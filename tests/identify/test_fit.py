@@ -226,6 +226,24 @@ def test_known_slopes_spare_simulations_and_lead_to_the_same_place(fitted, monke
     assert np.abs(fits[0].vector - fits[1].vector)[:6] == pytest.approx(0, abs=0.02)
 
 
+def test_slopes_where_a_fit_ends_are_measured_unless_only_the_place_is_asked_for(fitted, monkeypatch):
+    counts, fits = [], []
+
+    def counted(replay, cases):
+        counts[-1] += len(cases)
+        return predict(replay, cases)
+
+    monkeypatch.setattr(fit_module, "predict", counted)
+    given = fitted.target, fitted.problem, fitted.simulators, fitted.fit.vector + 0.02, fitted.fit.correction, 0
+    for at_the_end in (True, False):
+        counts.append(0)
+        fits.append(fit_once(*given, slopes=fitted.fit.jacobian, at_the_end=at_the_end))
+    assert counts[1] == counts[0] - len(fitted.problem.columns())
+    assert np.array_equal(fits[1].vector, fits[0].vector)
+    assert fits[1].cost == fits[0].cost
+    assert not np.array_equal(fits[1].jacobian, fits[0].jacobian)
+
+
 def test_cases_that_differ_in_sensors_share_a_simulation(fitted, monkeypatch):
     base = fitted.problem.case(fitted.fit.vector).base
     bias, delay = get_effect("force_bias"), get_effect("command_delay")
