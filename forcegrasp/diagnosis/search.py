@@ -210,7 +210,7 @@ class _Several:
                 self.so_far.all = study, found, further
             return leaves_little(study, further, begun.error, begun.floor)
 
-        found = add_several(study, fit, steps, begun.effects, begun.given, self.rng, keep, straight=True)
+        found = add_several(study, fit, steps, begun.effects, begun.given, self.rng, keep, straight=screen)
         if found is None or not enough(found[1]) or one_does_as_well(study, fit, found[1], screen, untried):
             self.so_far.all = study, steps, fit
             return False

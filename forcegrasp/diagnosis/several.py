@@ -93,7 +93,7 @@ def one_does_as_well(study: Study, fit: Fit, further: Fit, screen: Screen, effec
 
 def add_several(
     study: Study, fit: Fit, steps: Sequence[Step], effects: Sequence[type[Effect]], given: int,
-    rng: np.random.Generator, keep: Keep, straight: bool = False,
+    rng: np.random.Generator, keep: Keep, straight: Screen | None = None,
 ) -> tuple[list[Step], Fit] | None:  # fmt: skip
     """Steps that found effects together, after those that found others, and the fit with all; None if none are found.
 
@@ -107,15 +107,16 @@ def add_several(
       given: number of effects that were in the model before the search; they stay.
       rng: for the null distribution.
       keep: told what each round has found, which is all there is if no other one ends, or if it says so.
-      straight: whether they :func:`add_up`: then mistakes of the set are among them, which else may look like anything,
-        and what explains next to nothing is not.
+      straight: signatures of those that :func:`add_up`, to begin with: then mistakes of the set are among them, which
+        else may look like anything, and what explains next to nothing is not.
     """
     before, barred = fit, set[str]()
     for _ in range(_ROUNDS):
         study = with_few(study, fit)
         known = [one.effect for one in fit.problem.effects]
         untried = [e for e in effects if e.name not in barred and may_join(e, known)]
-        chosen = [score.setting for score in _chosen(study, fit, Screen(effects, study), untried, straight)]
+        screen = straight if straight is not None and fit is before else Screen(effects, study)
+        chosen = [one.setting for one in _chosen(study, fit, screen, untried, of_set=straight is not None)]
         if not chosen:
             break
         study.progress(f"fitting together {', '.join(one.effect.name for one in chosen)}")
@@ -135,7 +136,7 @@ def add_several(
     if fit is not before:
         target = study.target
         worth = min(_WORTH * target.beyond_noise(before.residual), _OF_NOISE * target.cost_of_noise)
-        fit = _needed(study, fit, given, worth if straight else 0.0)
+        fit = _needed(study, fit, given, 0.0 if straight is None else worth)
     if set(_names(fit)) <= set(_names(before)):
         return None
     fit = _at_the_end(study, fit)
