@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from forcegrasp.diagnosis import families
+from forcegrasp.diagnosis.at_once import AtOnce
 from forcegrasp.diagnosis.conclusion import Begun, concluded
 from forcegrasp.diagnosis.cut_short import REASONS, cut_short
 from forcegrasp.diagnosis.evidence import LEAST_SHARE_TOGETHER
@@ -21,7 +21,7 @@ from forcegrasp.diagnosis.needless import chained, drop_needless, simplify
 from forcegrasp.diagnosis.odd_grasps import odd_grasps
 from forcegrasp.diagnosis.result import Diagnosis, Step, kept_steps
 from forcegrasp.diagnosis.screen import Screen
-from forcegrasp.diagnosis.several import add_several, add_up, none_stands_out, one_does_as_well
+from forcegrasp.diagnosis.so_far import SoFar
 from forcegrasp.diagnosis.split import split
 from forcegrasp.diagnosis.step import FAR, look_further
 from forcegrasp.diagnosis.study import Study
@@ -38,12 +38,8 @@ from forcegrasp.identify.weights import reweigh
 
 #: Whether what a set gives, moved within its tolerance, may explain what a fit leaves.
 MayBeGiven = Callable[[Target, Fit], bool]
-Effects = Sequence[type[Effect]]
 #: Largest number of effects that are looked for one by one.
 MOST_EFFECTS = 8
-# Beyond so many times the floor, beside an effect that was found, several others are added at once if none of them
-# stands out; or whether one does or not.
-_MUCH_LEFT, _VERY_MUCH_LEFT = 3.0, 5.0
 
 
 def diagnose(
@@ -88,7 +84,7 @@ def diagnose(
     if (rounding := target.rounding) is not None and start is None:
         progress(f"found {rounding.effect.name}: readings are multiples of one step")
         steps.append(Step((rounding.effect.name,), (), (), error_before, study.error(study.heldout(first))))
-    so_far = _SoFar((study, steps, first))
+    so_far = SoFar((study, steps, first))
     try:
         if start is None or is_worth_looking(study, first):
             _add_effects(so_far, begun, rng, may_be_given)
@@ -99,28 +95,11 @@ def diagnose(
         return dataclasses.replace(concluded(begun, *so_far.sure, in_a_hurry=True), stopped=stopped)
 
 
-#: A study, the steps that found effects, and a fit with all of them.
-Found = tuple[Study, list[Step], Fit]
-
-
-@dataclass(eq=False)
-class _SoFar:
-    """What a search has found, to be taken whenever it is cut short: each changes all at once."""
-
-    all: Found
-    believed: Found | None = None  #: what is, if the rest explains too little in the end
-
-    @property
-    def sure(self) -> Found:
-        """What is believed whatever else may be found."""
-        return self.believed or self.all
-
-
-def _add_effects(so_far: _SoFar, begun: Begun, rng: np.random.Generator, may_be_given: MayBeGiven | None) -> None:
+def _add_effects(so_far: SoFar, begun: Begun, rng: np.random.Generator, may_be_given: MayBeGiven | None) -> None:
     """Adds one effect after the other."""
     effects = begun.effects
     study, steps, fit = so_far.all
-    screen, screened, tried_anyway, several = Screen(effects, study), fit, False, _Several(so_far, begun, rng)
+    screen, screened, tried_anyway, several = Screen(effects, study), fit, False, AtOnce(so_far, begun, rng)
     for _ in range(MOST_EFFECTS):
         others, richer = left_to_try(effects, fit, steps), list(families.extensions(fit, effects))
         forms = begun.may_be_forms(study, fit)  # another effect could not be told from those of what was found
@@ -130,9 +109,8 @@ def _add_effects(so_far: _SoFar, begun: Begun, rng: np.random.Generator, may_be_
         if not (untried or richer or forms) or (several.done and begun.left(study, fit) > MUCH):
             break  # with a dozen effects and much left, all that could be asked takes long and says little
         study = with_few(study, fit)
-        likely = several.are_likely(study, fit, screen, untried)
         if several.that_add_up(study, steps, fit, screen, untried) or (
-            likely and several.found(study, steps, fit, EXPLAINED)
+            several.are_likely(study, fit, screen, untried) and several.found(study, steps, fit, EXPLAINED)
         ):
             _, steps, fit = so_far.all
             continue
@@ -174,73 +152,7 @@ def _add_effects(so_far: _SoFar, begun: Begun, rng: np.random.Generator, may_be_
             break
 
 
-@dataclass(eq=False)
-class _Several:
-    """Adds several effects at once, which is done once."""
-
-    so_far: _SoFar
-    begun: Begun
-    rng: np.random.Generator
-    done: bool = False  #: whether it was: no other effect promises anything beside what it found
-    _asked: Fit | None = None  #: the fit that it was last tried for
-    _added_up: Fit | None = None  #: the same of effects that add up
-
-    def are_likely(self, study: Study, fit: Fit, screen: Screen, untried: Effects) -> bool:
-        """Whether what is left, beside an effect that was found, is not that of one other."""
-        if len(fit.problem.effects) == self.begun.given:
-            return False
-        left = self.begun.left(study, fit)
-        return left > _VERY_MUCH_LEFT or (left > _MUCH_LEFT and none_stands_out(study, fit, screen, untried))
-
-    def that_add_up(self, study: Study, steps: list[Step], fit: Fit, screen: Screen, untried: Effects) -> bool:
-        """Whether several were found by their signatures that together explain nearly all that a fit leaves."""
-        if self._added_up is fit or not untried or study.target.gripper.is_servo:
-            return False
-        self._added_up = fit
-        if not add_up(study, fit, screen, untried):
-            return False
-        begun, before = self.begun, study.error(study.heldout(fit))
-
-        def enough(further: Fit) -> bool:
-            after = study.error(study.heldout(further))
-            return explained_share(before, after, noise=begun.floor) >= EXPLAINED_FAR
-
-        def keep(found: list[Step], further: Fit) -> bool:
-            if enough(further):
-                self.so_far.all = study, found, further
-            return leaves_little(study, further, begun.error, begun.floor)
-
-        found = add_several(study, fit, steps, begun.effects, begun.given, self.rng, keep, straight=screen)
-        if found is None or not enough(found[1]) or one_does_as_well(study, fit, found[1], screen, untried):
-            self.so_far.all = study, steps, fit
-            return False
-        self.so_far.all = study, *found
-        self.done |= leaves_little(study, found[1], begun.error, begun.floor)
-        return True
-
-    def found(self, study: Study, steps: list[Step], fit: Fit, least_share: float) -> bool:
-        """Whether several were found that together explain this share of what a fit leaves, or leave nothing."""
-        if self.done or self._asked is fit or study.target.gripper.is_servo:
-            return False
-        held, self._asked = study.heldout(fit), fit
-
-        def keep(found: list[Step], further: Fit) -> bool:
-            enough = study.explained(held, study.heldout(further)) >= least_share
-            self.so_far.all = (study, found, further) if enough else (study, steps, fit)
-            return False
-
-        further = add_several(study, fit, steps, self.begun.effects, self.begun.given, self.rng, keep)
-        if further is None:
-            self.so_far.all = study, steps, fit
-        elif not left_over(study, further[1])[0]:
-            self.so_far.all = study, *further
-        else:
-            keep(*further)
-        self.done = self.so_far.all[2] is not fit
-        return self.done
-
-
-def _tidy_up(so_far: _SoFar, begun: Begun) -> None:
+def _tidy_up(so_far: SoFar, begun: Begun) -> None:
     """Leaves out and puts together what can be, now that all is found, and fits effects that jump once more."""
     study, steps, fit = so_far.all
     if len(fit.problem.effects) <= MOST_EFFECTS:  # a dozen make 66 pairs; what they do not need was left out already
@@ -251,7 +163,7 @@ def _tidy_up(so_far: _SoFar, begun: Begun) -> None:
     so_far.all = study, *_look_beside_all(study, steps, fit)
 
 
-def _believed(so_far: _SoFar, begun: Begun) -> Diagnosis:
+def _believed(so_far: SoFar, begun: Begun) -> Diagnosis:
     """What all that was found adds up to; or what is sure of it, where the rest explains too little."""
     study, steps, fit = so_far.all
     found = concluded(begun, study, steps, fit)

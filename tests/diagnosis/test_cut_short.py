@@ -13,6 +13,7 @@ from forcegrasp.diagnosis.cut_short import INTERRUPTED
 from forcegrasp.diagnosis.diagnose_set import diagnose_set
 from forcegrasp.diagnosis.faults import Fault
 from forcegrasp.diagnosis.search import diagnose
+from forcegrasp.diagnosis.so_far import SoFar
 from forcegrasp.diagnosis.step import look_further
 from forcegrasp.effects.for_gripper import effect_of
 from forcegrasp.identify.verdict import Verdict
@@ -63,8 +64,8 @@ def test_what_was_found_is_kept(rubbing, monkeypatch, when, reason, words):
 
 
 def test_effects_on_trial_are_not_told_when_the_trial_is_cut_short():
-    assert SEARCH._SoFar("all", "believed").sure == "believed"
-    assert SEARCH._SoFar("all").sure == "all"
+    assert SoFar("all", "believed").sure == "believed"
+    assert SoFar("all").sure == "all"
 
 
 @pytest.mark.parametrize("reason", [reason for reason, _ in REASONS])

@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from forcegrasp.diagnosis import search, several
+from forcegrasp.diagnosis import at_once, search, several
 from forcegrasp.diagnosis.families import roughly_without
 from forcegrasp.diagnosis.judge import judged
 from forcegrasp.diagnosis.refine import fit_with
@@ -184,10 +184,10 @@ def test_otherwise_they_are_looked_for_one_by_one(small, monkeypatch, why_not):
         return Step((), (), (), 1.0, 1.0)
 
     monkeypatch.setattr(search, "look_further", one_by_one)
-    monkeypatch.setattr(search, "add_several", added)
-    monkeypatch.setattr(search, "one_does_as_well", lambda *_: why_not == "one does as well")
+    monkeypatch.setattr(at_once, "add_several", added)
+    monkeypatch.setattr(at_once, "one_does_as_well", lambda *_: why_not == "one does as well")
     if why_not == "one does as well":
-        monkeypatch.setattr(search, "explained_share", lambda *_, **__: 1.0)
+        monkeypatch.setattr(at_once, "explained_share", lambda *_, **__: 1.0)
     diagnosis = search.diagnose(study.target, base, study.simulators, CATALOGUE, np.random.default_rng(0))
     assert asked[0] == (len(CATALOGUE), [])
     assert diagnosis.preferred == ()
@@ -239,7 +239,7 @@ def test_a_search_that_is_stopped_keeps_what_rounds_found_if_it_explains_enough(
 
     error = study.error(study.heldout(base.fit))
     monkeypatch.setattr(search, "look_further", lambda *_, **__: Step((), (), (), error, error))
-    monkeypatch.setattr(search, "add_several", one_round)
+    monkeypatch.setattr(at_once, "add_several", one_round)
     for name in ("exchange", "split"):
         monkeypatch.setattr(search, name, lambda *_: None)
     rng = np.random.default_rng(0)

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from forcegrasp.diagnosis import conclusion, search
+from forcegrasp.diagnosis import at_once, conclusion, search
 from forcegrasp.diagnosis import step as step_module
 from forcegrasp.diagnosis.families import look_alike
 from forcegrasp.diagnosis.few import with_few
@@ -174,8 +174,8 @@ def test_a_search_fits_anyway_once_and_judges_odd_grasps_again(creeping, monkeyp
         monkeypatch.setattr(module, "odd_grasps", odd)
     monkeypatch.setattr("forcegrasp.diagnosis.left_over.left_over", lambda *_: ("somewhere", None))
     monkeypatch.setattr(search, "leaves_little", lambda *_: False)
-    for name in ("exchange", "split", "add_several"):
-        monkeypatch.setattr(search, name, lambda *_: None)
+    for module, name in ((search, "exchange"), (search, "split"), (at_once, "add_several")):
+        monkeypatch.setattr(module, name, lambda *_: None)
     monkeypatch.setattr(conclusion, "may_be_forms", lambda *_: False)
     diagnosis = search.diagnose(study.target, base, study.simulators, [SMOOTH, DELAY], np.random.default_rng(0))
     # beside what was found, signatures are others
@@ -240,8 +240,8 @@ def test_effects_that_promise_little_are_not_fitted_for_what_forms_leave(creepin
     monkeypatch.setattr("forcegrasp.diagnosis.left_over.left_over", lambda *_: ("somewhere", None))
     monkeypatch.setattr(search, "leaves_little", lambda *_: False)
     monkeypatch.setattr(search, "leaves_forms", lambda *_: of_forms)
-    for name in ("exchange", "split", "add_several"):
-        monkeypatch.setattr(search, name, lambda *_: None)
+    for module, name in ((search, "exchange"), (search, "split"), (at_once, "add_several")):
+        monkeypatch.setattr(module, name, lambda *_: None)
     monkeypatch.setattr(conclusion, "may_be_forms", lambda *_: False)
     search.diagnose(study.target, base, study.simulators, [SMOOTH, DELAY], np.random.default_rng(0))
     assert asked == [False, False, False] + [True] * (not of_forms)

@@ -9,7 +9,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from forcegrasp.diagnosis import conclusion, search
+from forcegrasp.diagnosis import at_once, conclusion, search
 from forcegrasp.diagnosis.evidence import (
     LEAST_SHARE_OF_MANY,
     indistinguishable,
@@ -383,7 +383,7 @@ def found_by(made_up, monkeypatch):
         for module in (search, conclusion):
             monkeypatch.setattr(module, "numerical_error", lambda fit, target: (0 * fit.residual + 0.1,) * 2)
         monkeypatch.setattr(search, "Screen", lambda *a: None)
-        monkeypatch.setattr(search, "add_up", lambda *a: False)
+        monkeypatch.setattr(at_once, "add_up", lambda *a: False)
         monkeypatch.setattr(conclusion, "may_be_forms", lambda *a: forms)
         monkeypatch.setattr(search, "with_few", lambda study, fit: study)
         effects = [get_effect(name) for name in ("force_bias", "force_drift", "backlash", "stiction")]
