@@ -11,7 +11,7 @@ from forcegrasp.diagnosis.conclusion import Begun
 from forcegrasp.diagnosis.left_over import leaves_little, left_over
 from forcegrasp.diagnosis.result import Step
 from forcegrasp.diagnosis.screen import Screen
-from forcegrasp.diagnosis.several import add_several, add_up, none_stands_out, one_does_as_well
+from forcegrasp.diagnosis.several import add_several, add_up, none_stands_out, share_of_all, share_of_one
 from forcegrasp.diagnosis.so_far import SoFar
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.diagnosis.verdict import EXPLAINED_FAR, explained_share
@@ -21,6 +21,8 @@ from forcegrasp.identify.fit import Fit
 # Beyond so many times the floor, beside an effect that was found, several others are added at once if none of them
 # stands out; or whether one does or not.
 _MUCH_LEFT, _VERY_MUCH_LEFT = 3.0, 5.0
+# One effect does as well as several if it gains this share of what they do: a fit to few grasps ends within as much.
+_AS_WELL = 0.95
 
 
 @dataclass(eq=False)
@@ -48,7 +50,7 @@ class AtOnce:
         if self._added_up is fit or not untried or study.target.gripper.is_servo:
             return False
         self._added_up = fit
-        if not add_up(study, fit, screen, untried):
+        if not add_up(study, fit, screen, untried) or (one := share_of_one(study, fit, screen, untried)) > _AS_WELL:
             return False
         begun, before = self.begun, study.error(study.heldout(fit))
 
@@ -62,7 +64,7 @@ class AtOnce:
             return leaves_little(study, further, begun.error, begun.floor)
 
         found = add_several(study, fit, steps, begun.effects, begun.given, self.rng, keep, straight=screen)
-        if found is None or not enough(found[1]) or one_does_as_well(study, fit, found[1], screen, untried):
+        if found is None or not enough(found[1]) or one > _AS_WELL * share_of_all(study, fit, found[1]):
             self.so_far.all = study, steps, fit
             return False
         self.so_far.all = study, *found

@@ -42,7 +42,7 @@ _FLAT = 1e-2
 # One of them stands out, if it promises this share of what they promise together.
 _STANDS_OUT = 0.5
 # Effects add up if they promise this share of the squares beyond the noise together: their signatures are straight, and
-# so are they. They are several if none promises or, fitted alone, gains more than so much of what all do.
+# so are they. They are several if none promises more than so much of what all do.
 _NEARLY_ALL, _ONE_ALONE = 0.75, 0.9
 # Each of them is to be worth this share of the squares beyond the noise, or such a share of those of the noise.
 _WORTH, _OF_NOISE = 0.01, 0.05
@@ -73,22 +73,24 @@ def add_up(study: Study, fit: Fit, screen: Screen, effects: Sequence[type[Effect
     return len(gains) > 1 and together > _NEARLY_ALL * beyond and gains[0] < _ONE_ALONE * together
 
 
-def one_does_as_well(study: Study, fit: Fit, further: Fit, screen: Screen, effects: Sequence[type[Effect]]) -> bool:
-    """Whether one effect alone, fitted to few grasps, gains nearly what several do: a large one is not straight.
+def share_of_one(study: Study, fit: Fit, screen: Screen, effects: Sequence[type[Effect]]) -> float:
+    """Share of the squares beyond the noise that one effect alone gains, fitted to few grasps: large ones bend.
 
     Args:
-      study: the measurements.
-      fit: without the effects.
-      further: with several of them.
-      screen: of the catalogue.
-      effects: those that are not in the model.
+      study, fit, screen, effects: as for :func:`none_stands_out`.
     """
-    (some, part), (_, several) = study.on_few(fit), study.on_few(further)
+    some, part = study.on_few(fit)
     groups, _ = screen.on_few(study, some, part, effects)
     best = of_best_effects(sorted((group[0] for group in groups), key=lambda score: -score.gain), _AT_ONCE)
     alone = refine(best, some, part, Background(part, some.numerical))
     gained = max((part.cost - one.fit.cost for one in alone), default=0.0)
-    return gained > _ONE_ALONE * (part.cost - several.cost)
+    return gained / max(some.target.beyond_noise(part.residual), 1e-9)
+
+
+def share_of_all(study: Study, fit: Fit, further: Fit) -> float:
+    """The same share that all effects gain which a further fit has."""
+    (some, part), (_, several) = study.on_few(fit), study.on_few(further)
+    return (part.cost - several.cost) / max(some.target.beyond_noise(part.residual), 1e-9)
 
 
 def add_several(

@@ -15,7 +15,7 @@ from forcegrasp.diagnosis.judge import judged
 from forcegrasp.diagnosis.refine import fit_with
 from forcegrasp.diagnosis.result import Step
 from forcegrasp.diagnosis.screen import Screen
-from forcegrasp.diagnosis.several import _needed, add_several, add_up, none_stands_out, one_does_as_well
+from forcegrasp.diagnosis.several import _needed, add_several, add_up, none_stands_out, share_of_all, share_of_one
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.effects.for_gripper import effect_of
 from forcegrasp.effects.setting import EffectSetting
@@ -169,7 +169,7 @@ def test_rounds_end_where_one_leaves_little(small, monkeypatch):
     assert {one.effect.name for one in fit.problem.effects} == set(rounds[1])
 
 
-@pytest.mark.parametrize("why_not", ["none is found", "too little is explained", "one does as well"])
+@pytest.mark.parametrize("why_not", ["none is found", "too little is explained", "one does as well", "one does all"])
 def test_otherwise_they_are_looked_for_one_by_one(small, monkeypatch, why_not):
     study, base = small
     asked = []
@@ -185,8 +185,11 @@ def test_otherwise_they_are_looked_for_one_by_one(small, monkeypatch, why_not):
 
     monkeypatch.setattr(search, "look_further", one_by_one)
     monkeypatch.setattr(at_once, "add_several", added)
-    monkeypatch.setattr(at_once, "one_does_as_well", lambda *_: why_not == "one does as well")
-    if why_not == "one does as well":
+    monkeypatch.setattr(
+        at_once, "share_of_one", lambda *_: {"one does as well": 0.9, "one does all": 1.0}.get(why_not, 0)
+    )
+    monkeypatch.setattr(at_once, "share_of_all", lambda *_: 0.9)
+    if why_not.startswith("one"):
         monkeypatch.setattr(at_once, "explained_share", lambda *_, **__: 1.0)
     diagnosis = search.diagnose(study.target, base, study.simulators, CATALOGUE, np.random.default_rng(0))
     assert asked[0] == (len(CATALOGUE), [])
@@ -199,12 +202,14 @@ def setting(name: str) -> EffectSetting:
     return EffectSetting(effect_of(name, light_gripper()), "", np.array(values))
 
 
-def test_one_effect_alone_does_as_well_as_several_only_where_one_is_hidden(small):
+def test_one_of_several_effects_explains_little_and_one_that_is_alone_all(small):
     study, base = small
     every = fit_with([setting(name) for name in SMALL], base.fit.vector, study, base.fit)
-    assert not one_does_as_well(study, base.fit, every, Screen(CATALOGUE, study), CATALOGUE)
+    assert share_of_all(study, base.fit, every) == pytest.approx(1.0, abs=0.02)
+    assert share_of_one(*at_first(study, base)) == pytest.approx(0.55, abs=0.05)
     one = fit_with([setting("coulomb_friction")], base.fit.vector, study, base.fit)
-    assert one_does_as_well(study, base.fit, one, Screen(CATALOGUE, study), CATALOGUE)
+    assert share_of_all(study, base.fit, one) == pytest.approx(0.55, abs=0.05)
+    assert share_of_one(*at_first(*study_of("force_lag time_constant_s=0.06"))) == pytest.approx(1.0, abs=0.02)
 
 
 def test_what_explains_next_to_nothing_is_not_needed(small):
