@@ -10,15 +10,19 @@ import numpy as np
 
 from forcegrasp.diagnosis.evidence import indistinguishable, rivals_in
 from forcegrasp.diagnosis.exchange import against, steps_of
-from forcegrasp.diagnosis.families import look_alikes_of, may_join, refit_as, refit_without, roughly_as
+from forcegrasp.diagnosis.families import look_alike, look_alikes_of, may_join, refit_as, refit_without, roughly_as
+from forcegrasp.diagnosis.merge import promising
 from forcegrasp.diagnosis.needless import chained
-from forcegrasp.diagnosis.refine import refine_anyway
+from forcegrasp.diagnosis.refine import NO_BETTER, refine_anyway
 from forcegrasp.diagnosis.result import Candidate, Step
 from forcegrasp.diagnosis.signatures import direction, trials
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.effects import Effect
 from forcegrasp.identify.fit import Fit
 from forcegrasp.identify.side_by_side import side_by_side
+
+# On few grasps an effect may leave so many times as much as the one in whose place it is, and yet do as well on all.
+_AS_GOOD = 1.02
 
 
 def ask_again(
@@ -27,7 +31,7 @@ def ask_again(
     """The steps less those rivals that the whole model tells apart, or with one in the first one's place; and the fit.
 
     Two effects may have fitted alike only because what was still missing hid the difference. Of the step that found
-    the last effect all was in the model already.
+    the last effect all was in the model already. Those that were found at once had no rivals yet.
 
     Args:
       study: the measurements.
@@ -35,23 +39,40 @@ def ask_again(
       fit: with all effects.
       effects: that may do better than one of their family that was found when others were still missing.
     """
-    left = list(steps)
-    for step in steps_of(fit, steps)[:-1]:
-        rivals = [*rivals_in(step, fit), *_better_of_its_family(study, step, fit, effects)]
+    left, found = list(steps), steps_of(fit, steps)
+    for step in found:
+        if step.candidates[0].without is not None:
+            rivals = list(_in_its_place(study, step, fit, effects, of_any_family=True, most=_AS_GOOD))
+        elif step is not found[-1]:
+            rivals = [*rivals_in(step, fit), *_in_its_place(study, step, fit, effects)]
+        else:
+            rivals = []
         if rivals:
             left[left.index(step)], fit = _asked(study, step, rivals, fit)
     return (left if left == list(steps) else chained(left, study.error(study.heldout(fit)))), fit
 
 
-def _better_of_its_family(study: Study, step: Step, fit: Fit, effects: Sequence[type[Effect]]) -> Iterator[Candidate]:
-    """Candidates that leave less than a model on few grasps in the place of the effect that a step found."""
+def _in_its_place(
+    study: Study, step: Step, fit: Fit, effects: Sequence[type[Effect]], of_any_family: bool = False,
+    most: float = NO_BETTER,
+) -> Iterator[Candidate]:  # fmt: skip
+    """Candidates in the place of the effect that a step found that leave less on few grasps, or as little.
+
+    Args:
+      study: the measurements.
+      step: that found the effect.
+      fit: with all effects.
+      effects: those that are asked, if they look like it and are of its family.
+      of_any_family: whether they may be of another one, or a mistake of the set.
+      most: share of what the fit leaves that one may leave on few grasps.
+    """
     own = fit.effect(step.effects[0]).effect
     others = [one.effect for one in fit.problem.effects if one.effect is not own]
-    alike = [
-        effect for effect in look_alikes_of(own, effects)
-        if effect.name not in step.effects and may_join(effect, [*others, own])
-    ]  # fmt: skip
-    for better in refine_anyway(alike, study, fit, own.name) if alike else ():
+    look_alikes = [e for e in effects if look_alike(e, own)] if of_any_family else look_alikes_of(own, effects)
+    alike = [e for e in look_alikes if e.name not in step.effects and may_join(e, [*others, own])]
+    if of_any_family and alike:  # which are many
+        alike = promising(*study.on_few(fit), own.name, alike)
+    for better in refine_anyway(alike, study, fit, own.name, most) if alike else ():
         signature = direction(fit, better)
         yield dataclasses.replace(step.candidates[0], setting=better.effects[-1], fit=better, signature=signature)
 

@@ -62,8 +62,8 @@ def _one_for_two(
     searched = {one.effect.name for one in fit.problem.effects[given:]}
     found = [step.effects[0] for step in kept_steps(steps) if step.candidates and step.effects[0] in searched]
     pairs = [(pair, alike) for pair in combinations(found, 2) if (alike := list(_like_both(pair, fit, effects)))]
-    promising = side_by_side([partial(_promising, *few, pair, alike) for pair, alike in pairs])
-    tried = [(pair, effect) for (pair, _), some in zip(pairs, promising, strict=True) for effect in some]
+    near = side_by_side([partial(promising, *few, pair, alike) for pair, alike in pairs])
+    tried = [(pair, effect) for (pair, _), some in zip(pairs, near, strict=True) for effect in some]
     for pair, effect in tried:
         study.progress(f"fitting with {effect.name} in place of {pair[0]} and {pair[1]}")
     settings = side_by_side([partial(_roughly_as_good, *few, pair, effect) for pair, effect in tried])
@@ -91,9 +91,11 @@ def _like_both(pair: Collection[str], fit: Fit, effects: Sequence[type[Effect]])
             yield effect
 
 
-def _promising(study: Study, fit: Fit, pair: Collection[str], effects: Sequence[type[Effect]]) -> list[type[Effect]]:
-    """Those of the effects whose signatures, without the pair, come near enough to what the pair explains."""
-    problem, start, slopes = problem_without(pair, fit)
+def promising(
+    study: Study, fit: Fit, names: str | Collection[str], effects: Sequence[type[Effect]]
+) -> list[type[Effect]]:
+    """Those of the effects whose signatures, without those of these names, come near enough to what these explain."""
+    problem, start, slopes = problem_without(names, fit)
     without = fit_once(study.target, problem, study.simulators, start, fit.correction, rounds=0, known_slopes=slopes)
     signatures, tried = Signatures(study), trials(effects)
     signatures.simulate(without, tried)

@@ -67,7 +67,9 @@ def refine(scores: Sequence[Score], study: Study, fit: Fit, background: Backgrou
     return [Refined(pairs[i][1], refitted) for i, refitted in zip(left, side_by_side(tasks), strict=True)]
 
 
-def refine_anyway(effects: Sequence[type[Effect]], study: Study, fit: Fit, without: str | tuple[()] = ()) -> list[Fit]:
+def refine_anyway(
+    effects: Sequence[type[Effect]], study: Study, fit: Fit, without: str | tuple[()] = (), most: float = NO_BETTER
+) -> list[Fit]:
     """Rough fits with each effect that may be the best one, of those that leave less than a fit does on few grasps.
 
     They start from the best of the sizes that are tried, and nothing is asked of signatures.
@@ -77,11 +79,12 @@ def refine_anyway(effects: Sequence[type[Effect]], study: Study, fit: Fit, witho
       study: the measurements.
       fit: of the model that they are added to.
       without: name of an effect in it whose place they take; none by default.
+      most: share of what the fit leaves that one may leave on few grasps.
     """
     some, part = study.on_few(fit)
     rough = partial(roughly_as, fit=part, without=without, study=some, at_the_end=some is study)
     few = side_by_side([partial(rough, trials([effect])) for effect in effects])
-    few = [one for one in few if one.cost < NO_BETTER * part.cost]
+    few = [one for one in few if one.cost < most * part.cost]
     if some is study:
         return few
     tasks = []

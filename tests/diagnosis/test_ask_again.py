@@ -97,6 +97,28 @@ def test_of_the_last_step_all_was_in_the_model(found, monkeypatch):
     assert ask_again(study, alone, fit) == (alone, fit)
 
 
+def test_what_was_found_at_once_is_asked_among_look_alikes_of_any_family(found, monkeypatch):
+    study, steps, fit = tied(found, FRICTION)
+    asked = []
+
+    def with_rivals(study, step, rivals, fit):
+        asked.append((step.effects[0], [one.effect.name for one in rivals]))
+        return step, fit
+
+    monkeypatch.setattr("forcegrasp.diagnosis.ask_again._asked", with_rivals)
+    at_once = [dataclasses.replace(s, candidates=(dataclasses.replace(s.candidates[0], without=fit),)) for s in steps]
+    alike = [effect_of(name, fit.problem.gripper) for name in (DEADBAND, "command_delay")]
+    ask_again(study, at_once, fit, alike)
+    assert (FRICTION, [DEADBAND]) not in asked
+    monkeypatch.setattr("forcegrasp.diagnosis.ask_again._AS_GOOD", np.inf)
+    ask_again(study, at_once, fit, alike)
+    assert (FRICTION, [DEADBAND]) not in asked  # its signature promises too little
+    monkeypatch.setattr("forcegrasp.diagnosis.ask_again.promising", lambda study, fit, name, effects: effects)
+    ask_again(study, at_once, fit, alike)
+    assert (FRICTION, [DEADBAND]) in asked
+    assert (LAG, ["command_delay"]) in asked  # the last of them, too
+
+
 # --- which models are asked whether a move of what the set gives explains what they leave ---------------------------
 
 

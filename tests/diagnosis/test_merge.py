@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from forcegrasp.diagnosis.merge import _promising, merge
+from forcegrasp.diagnosis.merge import merge, promising
 from forcegrasp.diagnosis.result import Candidate, Step
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.effects import get_effect
@@ -66,9 +66,9 @@ def test_a_late_command_stands_for_late_positions_and_late_forces(late):
 def test_what_promises_less_than_half_of_what_both_explain_is_not_fitted(late, monkeypatch):
     study, _, fit = late
     delay, *others = (effect_of(name, light_gripper()) for name in ("command_delay", "force_bias", "force_drift"))
-    assert _promising(study, fit, LATE, [delay, *others]) == [delay]
+    assert promising(study, fit, LATE, [delay, *others]) == [delay]
     monkeypatch.setattr("forcegrasp.diagnosis.merge._PROMISE", -1.0)
-    assert set(_promising(study, fit, LATE, [delay, *others])) > {delay}
+    assert set(promising(study, fit, LATE, [delay, *others])) > {delay}
 
 
 def test_what_was_given_stays(late):
