@@ -230,8 +230,11 @@ def test_nothing_is_found_where_nothing_is_hidden():
     assert add_several(study, base.fit, (), CATALOGUE, 0, np.random.default_rng(0), kept_by_nobody) is None
 
 
+@pytest.mark.parametrize("straight", [True, False])
 @pytest.mark.parametrize("enough", [True, False])
-def test_a_search_that_is_stopped_keeps_what_rounds_found_if_it_explains_enough(mixed, found, monkeypatch, enough):
+def test_a_search_that_is_stopped_keeps_what_rounds_found_if_it_explains_enough(
+    mixed, found, monkeypatch, enough, straight
+):
     (study, base), (steps, fit) = mixed, found
     left_out = [step.effects[0] for step in steps[:3]]
     some = steps if enough else steps[3:]
@@ -244,6 +247,7 @@ def test_a_search_that_is_stopped_keeps_what_rounds_found_if_it_explains_enough(
 
     error = study.error(study.heldout(base.fit))
     monkeypatch.setattr(search, "look_further", lambda *_, **__: Step((), (), (), error, error))
+    monkeypatch.setattr(at_once, "add_up", lambda *_: straight)
     monkeypatch.setattr(at_once, "add_several", one_round)
     for name in ("exchange", "split"):
         monkeypatch.setattr(search, name, lambda *_: None)
