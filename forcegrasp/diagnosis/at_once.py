@@ -27,7 +27,7 @@ _AS_WELL = 0.95
 
 @dataclass(eq=False)
 class AtOnce:
-    """Adds several effects at once, which is done once."""
+    """Adds several effects at once, each way once to a fit."""
 
     so_far: SoFar
     begun: Begun

@@ -57,8 +57,7 @@ def is_worth_looking(study: Study, fit: Fit) -> bool:
 
 def leaves_little(study: Study, fit: Fit, error_before: float, floor: float) -> bool:
     """Whether effects leave next to nothing, and little of what there was before them."""
-    error = study.error(study.heldout(fit))
-    return error < AS_GOOD_AS_NOTHING * floor and explained_share(error_before, error, noise=floor) > 1 - _LITTLE
+    return _leaves_less(study, fit, error_before, floor, AS_GOOD_AS_NOTHING, _LITTLE)
 
 
 def leaves_forms(study: Study, fit: Fit, error_before: float, floor: float) -> bool:
@@ -66,5 +65,10 @@ def leaves_forms(study: Study, fit: Fit, error_before: float, floor: float) -> b
 
     And not much: what is still missing would then be small, too, and small effects are as their signatures say.
     """
+    return _leaves_less(study, fit, error_before, floor, MUCH, _OF_FORMS)
+
+
+def _leaves_less(study: Study, fit: Fit, error_before: float, floor: float, times: float, share: float) -> bool:
+    """Whether less is left than so many times the floor, and than this share of what was beyond it before."""
     error = study.error(study.heldout(fit))
-    return error < MUCH * floor and explained_share(error_before, error, noise=floor) > 1 - _OF_FORMS
+    return error < times * floor and explained_share(error_before, error, noise=floor) > 1 - share

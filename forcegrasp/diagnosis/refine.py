@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from forcegrasp.diagnosis.families import roughly_as
+from forcegrasp.diagnosis.families import is_richer, roughly_as
 from forcegrasp.diagnosis.signatures import Background, Score, best_sizes, trials
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.effects import Effect
@@ -103,8 +103,8 @@ def _in_the_race(gains: Sequence[float], least: float) -> list[int]:
 
 def _adds_nothing(fit: Fit, others: Sequence[Fit]) -> bool:
     """Whether an effect, the last of a fit, leaves as much as one that it contains; it may take its place later."""
-    contained = {nested.effect for nested in fit.problem.effects[-1].effect.contains}
-    return any(one.problem.effects[-1].effect.name in contained and NO_BETTER * one.cost < fit.cost for one in others)
+    own = fit.problem.effects[-1].effect
+    return any(is_richer(own, one.problem.effects[-1].effect) and NO_BETTER * one.cost < fit.cost for one in others)
 
 
 def fit_with(settings: Sequence[EffectSetting], start: np.ndarray, study: Study, fit: Fit) -> Fit:

@@ -197,12 +197,11 @@ class _Start:
           The candidate, and the names of those that it was preferred to.
         """
         best, *others = ordered
-        contained = {nested.effect for nested in best.effect.contains}
         of_set = [c for c in others if c.effect.of_set]
         if best.replaces or not of_set or rms_error(best.fit, self._study.target) <= _ALL_FITTED:
             return best, set()
         for simpler in others:
-            enough = simpler.effect.name in contained and is_significant(simpler, self.least_gain)
+            enough = families.is_richer(best.effect, simpler.effect) and is_significant(simpler, self.least_gain)
             if enough and any(indistinguishable(simpler, c) for c in of_set):
                 (first,) = self._at_the_end([simpler], {simpler.effect.name: []})
                 return first, {best.effect.name}
