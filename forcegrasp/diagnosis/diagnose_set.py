@@ -27,10 +27,11 @@ from forcegrasp.effects.for_gripper import effect_of, effects_of
 from forcegrasp.errors import MeasurementError
 from forcegrasp.identify import fit_set
 from forcegrasp.identify.base_fit import BaseFit
-from forcegrasp.identify.fit import Fit, Simulators
+from forcegrasp.identify.fit import Fit
 from forcegrasp.identify.intervals import listed
 from forcegrasp.identify.loading import Loaded
 from forcegrasp.identify.progress import Progress
+from forcegrasp.identify.simulators import Simulators
 from forcegrasp.identify.target import Target
 from forcegrasp.identify.verdict import Verdict
 from forcegrasp.measure import MeasurementSet

@@ -8,8 +8,9 @@ import numpy as np
 
 from forcegrasp.diagnosis.shifted_rows import WORTH_A_FIT, left_beyond_noise
 from forcegrasp.diagnosis.signatures import Background
-from forcegrasp.identify.fit import Fit, cheap_tier
+from forcegrasp.identify.fit import Fit
 from forcegrasp.identify.predict import predict
+from forcegrasp.identify.simulators import cheap_tier
 from forcegrasp.identify.target import Target
 from forcegrasp.measure.schema import MeasuredGrasp
 from forcegrasp.replay.replay import Replay

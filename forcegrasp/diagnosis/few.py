@@ -7,7 +7,8 @@ import dataclasses
 import numpy as np
 
 from forcegrasp.diagnosis.study import Few, Study
-from forcegrasp.identify.fit import Fit, Simulators, cheap_tier
+from forcegrasp.identify.fit import Fit
+from forcegrasp.identify.simulators import Simulators, cheap_tier
 from forcegrasp.identify.target import Target
 from forcegrasp.replay.replay import Replay
 

@@ -20,12 +20,13 @@ from forcegrasp.effects.law import Formula, Law, Size, make_law
 from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.errors import PhysicsError
 from forcegrasp.identify.cross_validation import evidence_folds
-from forcegrasp.identify.fit import Fit, Simulators
+from forcegrasp.identify.fit import Fit
 from forcegrasp.identify.fitted_model import effects_of_fit
 from forcegrasp.identify.intervals import standard_errors
 from forcegrasp.identify.noise_floor import beyond_fit, excess, numerical_error
 from forcegrasp.identify.problem import Problem
 from forcegrasp.identify.progress import Progress
+from forcegrasp.identify.simulators import Simulators
 from forcegrasp.identify.target import Target
 from forcegrasp.identify.verdict import Verdict
 from forcegrasp.identify.weights import reweigh

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from forcegrasp.diagnosis.other_starts import costs_without
-from forcegrasp.identify.fit import Fit, Simulators, fit_exactly
+from forcegrasp.identify.fit import Fit, fit_exactly
 from forcegrasp.identify.predict import predict
+from forcegrasp.identify.simulators import Simulators
 from forcegrasp.identify.target import Target
 
 # Sizes that are looked at, as multiples of the one at which the fit ended.

@@ -21,11 +21,12 @@ from forcegrasp.effects.object_size import ObjectSize
 from forcegrasp.effects.readout_skew import ReadoutSkew
 from forcegrasp.identify.base_fit import BaseFit
 from forcegrasp.identify.cross_validation import evidence_folds
-from forcegrasp.identify.fit import Fit, Simulators, fit_exactly
+from forcegrasp.identify.fit import Fit, fit_exactly
 from forcegrasp.identify.loading import Loaded
 from forcegrasp.identify.noise_floor import beyond_fit
 from forcegrasp.identify.problem import Problem
 from forcegrasp.identify.progress import Progress
+from forcegrasp.identify.simulators import Simulators
 from forcegrasp.identify.target import Target
 from forcegrasp.identify.verdict import Verdict
 from forcegrasp.measure import MeasurementSet

@@ -29,9 +29,10 @@ from forcegrasp.diagnosis.verdict import EXPLAINED, EXPLAINED_FAR, MUCH, explain
 from forcegrasp.effects import Effect
 from forcegrasp.identify.base_fit import BaseFit
 from forcegrasp.identify.cross_validation import evidence_folds, make_folds
-from forcegrasp.identify.fit import Fit, Simulators
+from forcegrasp.identify.fit import Fit
 from forcegrasp.identify.noise_floor import beyond_fit, numerical_error, numerical_floor
 from forcegrasp.identify.progress import Progress, silent
+from forcegrasp.identify.simulators import Simulators
 from forcegrasp.identify.target import Target
 from forcegrasp.identify.verdict import Verdict
 from forcegrasp.identify.weights import reweigh

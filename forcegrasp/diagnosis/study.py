@@ -9,8 +9,9 @@ import numpy as np
 
 from forcegrasp.diagnosis.verdict import explained_share
 from forcegrasp.identify.cross_validation import heldout_residual, log_likelihood, rms, rms_of_recordings, to_check_with
-from forcegrasp.identify.fit import Fit, Simulators
+from forcegrasp.identify.fit import Fit
 from forcegrasp.identify.progress import Progress, silent
+from forcegrasp.identify.simulators import Simulators
 from forcegrasp.identify.target import Target
 from forcegrasp.replay.replay import Replay
 

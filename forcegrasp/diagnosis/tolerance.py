@@ -8,10 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from forcegrasp.identify.fit import Fit, Simulators, cheap_tier, fit_once
+from forcegrasp.identify.fit import Fit, fit_once
 from forcegrasp.identify.intervals import listed
 from forcegrasp.identify.predict import Case, predict
 from forcegrasp.identify.problem import Problem
+from forcegrasp.identify.simulators import Simulators, cheap_tier
 from forcegrasp.identify.target import Target
 from forcegrasp.measure.schema import MeasuredGrasp, MeasurementSet
 from forcegrasp.physics.gripper import FORCE_SKEW, SKEW

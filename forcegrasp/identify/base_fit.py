@@ -9,11 +9,12 @@ from functools import partial
 import numpy as np
 
 from forcegrasp.identify.cross_validation import rms
-from forcegrasp.identify.fit import LARGE_STEP, STEP, Fit, Simulators, descend_roughly, fit_exactly, fit_once
+from forcegrasp.identify.fit import Fit, descend_roughly, fit_exactly, fit_once
 from forcegrasp.identify.initial_guess import guess
 from forcegrasp.identify.problem import Problem
 from forcegrasp.identify.progress import Progress, silent
 from forcegrasp.identify.side_by_side import side_by_side
+from forcegrasp.identify.simulators import LARGE_STEP, STEP, Simulators
 from forcegrasp.identify.target import Target
 from forcegrasp.short_repr import ShortRepr
 

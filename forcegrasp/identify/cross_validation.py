@@ -7,8 +7,9 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from forcegrasp.identify.fit import Fit, cheap_tier
+from forcegrasp.identify.fit import Fit
 from forcegrasp.identify.predict import predict
+from forcegrasp.identify.simulators import cheap_tier
 from forcegrasp.identify.target import Target
 from forcegrasp.measure.schema import MeasuredGrasp
 from forcegrasp.replay.replay import Replay

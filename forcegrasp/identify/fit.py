@@ -10,18 +10,13 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from forcegrasp.effects.setting import EffectSetting
+from forcegrasp.identify.local_slopes import LocalSlopes
 from forcegrasp.identify.predict import predict
 from forcegrasp.identify.problem import Problem
+from forcegrasp.identify.simulators import STEP, Simulators
 from forcegrasp.identify.target import Target
-from forcegrasp.physics.gripper import Gripper
-from forcegrasp.replay.replay import Replay
 from forcegrasp.short_repr import ShortRepr, counted
 
-# Slopes are measured anew after so many steps; in between they follow the values (Broyden 1965), if they are few.
-_SLOPES_LAST, _FEW = 3, 30
-#: Step of the finite differences in a problem's coordinates: above contact noise, within the linear range; and one that
-#: smooths the signals of a finger that sticks and slips.
-STEP, LARGE_STEP = 0.02, 0.06
 # Relative change of the cost at which a fit ends, one that only ranks, and the most evaluations until then.
 _TOLERANCE, _ROUGH, _EVALUATIONS = 1e-4, 1e-3, 15
 # A step that makes the cost rise by this share of what one reading costs ends a fit, or one as small as this, in
@@ -30,39 +25,6 @@ _FLAT, _SMALLEST_STEP, _FAILED = 0.1, STEP / 20, 2
 # Where a fit ended it goes on if slopes measured there promise to lower the cost by this share of one reading's; but
 # not so many times the noise off, where the model is wrong by more than that.
 _WORTH, _NEAR = 0.5, 2.0
-
-
-class Simulators:
-    """The replays that a fit needs: the model itself, and a cheap one where larger steps or a fast tier make one.
-
-    Slopes come from the cheap one, and values too, corrected by the difference of the two at a nearby point; so few
-    evaluations of the model itself are needed, and what is fitted in the end is the model itself.
-
-    Args:
-      problem: whose grasps are simulated.
-      exact: never use the cheap one.
-    """
-
-    def __init__(self, problem: Problem, exact: bool = False) -> None:
-        gripper, grasps = problem.gripper, problem.grasps
-        self.exact = Replay(gripper, grasps)
-        cheap = "reference" if exact else cheap_tier(gripper)
-        self.cheap = self.exact if cheap == "reference" else Replay(gripper, grasps, cheap)
-        #: Where a fit of the model itself takes slopes from. With larger steps those of a scene whose joints rub led a
-        #: fit along a flat valley; a sphere says that somebody compared them.
-        self.at_the_end = self.exact if gripper.fast == "none" else self.cheap
-        self.step = STEP  #: of the finite differences, in coordinates
-
-    @property
-    def one_model(self) -> bool:
-        """Whether there is no cheap one: all that is simulated is the model itself."""
-        return self.cheap is self.exact
-
-
-def cheap_tier(gripper: Gripper, tier: str = "fitting") -> str:
-    """Physics tier that is good enough for slopes, or as rough as another; that of the model where it isn't cheaper."""
-    steps = [gripper.compile(name).opt.timestep for name in (tier, "reference")]
-    return "reference" if gripper.fast == "none" and steps[0] == steps[1] else tier
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -171,7 +133,7 @@ def fit_once(
       at_the_end: whether slopes are measured where the fit ends, too, which takes most of the simulations; otherwise
         they are those that led there.
     """
-    local = _Local(target, problem, simulators.cheap, simulators.cheap, known_slopes, simulators.step)
+    local = LocalSlopes(target, problem, simulators.cheap, simulators.cheap, known_slopes, simulators.step)
     vector = np.clip(start, problem.low + 1e-9, problem.high - 1e-9)
     if slopes is not None:
         local.begin(vector, slopes)
@@ -200,7 +162,7 @@ def descend_roughly(
     Args:
       target, problem, simulators, start, correction: as there.
     """
-    local = _Local(target, problem, simulators.cheap, simulators.cheap, None, simulators.step)
+    local = LocalSlopes(target, problem, simulators.cheap, simulators.cheap, None, simulators.step)
     vector = np.clip(start, problem.low + 1e-9, problem.high - 1e-9)
     vector, _ = _descend(local, vector, correction, np.ones(len(problem), bool), rough=True)
     return vector, target.residual(local.value(vector) + correction)
@@ -218,7 +180,7 @@ def fit_exactly(
       slopes: of the first k coordinates, as they were found near the start, ``(G, S, C, k)``, which spares finding them
         there.
     """
-    local = _Local(target, problem, simulators.exact, simulators.at_the_end, None, simulators.step)
+    local = LocalSlopes(target, problem, simulators.exact, simulators.at_the_end, None, simulators.step)
     free = np.ones(len(problem), bool)
     start = np.clip(start, problem.low + 1e-9, problem.high - 1e-9)
     if slopes is not None:
@@ -230,7 +192,7 @@ def fit_exactly(
 
 
 def _descend(
-    local: _Local, start: np.ndarray, shift: np.ndarray | float, free: np.ndarray, rough: bool
+    local: LocalSlopes, start: np.ndarray, shift: np.ndarray | float, free: np.ndarray, rough: bool
 ) -> tuple[np.ndarray, int]:
     """Goes to the next optimum in the free coordinates; also returns the number of evaluations.
 
@@ -243,7 +205,7 @@ def _descend(
     return vector, count
 
 
-def _may_fall(local: _Local, vector: np.ndarray, shift: np.ndarray | float, free: np.ndarray) -> bool:
+def _may_fall(local: LocalSlopes, vector: np.ndarray, shift: np.ndarray | float, free: np.ndarray) -> bool:
     """Whether slopes that are measured where a descent ended promise more than the ones that it ended with."""
     if local.has_measured(vector):
         return False
@@ -256,18 +218,18 @@ def _may_fall(local: _Local, vector: np.ndarray, shift: np.ndarray | float, free
     return bool(gain * local.target.readings > _WORTH * (residual @ residual))
 
 
-def _left(local: _Local, vector: np.ndarray, shift: np.ndarray | float) -> np.ndarray:
+def _left(local: LocalSlopes, vector: np.ndarray, shift: np.ndarray | float) -> np.ndarray:
     """Residuals ÷ noise as they count, of predictions shifted by so much, ``(N,)``."""
     return (local.target.weight * local.target.residual(local.value(vector) + shift)).ravel()
 
 
-def _slopes(local: _Local, vector: np.ndarray, anew: bool = False) -> np.ndarray:
+def _slopes(local: LocalSlopes, vector: np.ndarray, anew: bool = False) -> np.ndarray:
     """Slopes of the predictions ÷ noise as they count, ``(N, p)``."""
     return (local.target.weight[..., None] * local.slopes(vector, anew=anew)).reshape(-1, len(vector))
 
 
 def _descend_once(
-    local: _Local, start: np.ndarray, shift: np.ndarray | float, free: np.ndarray, rough: bool, evaluations: int
+    local: LocalSlopes, start: np.ndarray, shift: np.ndarray | float, free: np.ndarray, rough: bool, evaluations: int
 ) -> tuple[np.ndarray, int]:
     def whole(part: np.ndarray) -> np.ndarray:
         vector = start.copy()
@@ -314,7 +276,7 @@ class _SettledError(Exception):
 
 
 def _finish(
-    local: _Local, vector: np.ndarray, predicted: np.ndarray, correction, free: np.ndarray, total: int,
+    local: LocalSlopes, vector: np.ndarray, predicted: np.ndarray, correction, free: np.ndarray, total: int,
     anew: bool = True,
 ) -> Fit:  # fmt: skip
     problem, weight = local.problem, local.target.weight
@@ -331,90 +293,3 @@ def _finish(
 def _difference(problem: Problem, simulators: Simulators, vector: np.ndarray) -> np.ndarray:
     case = [problem.case(vector)]
     return predict(simulators.exact, case)[0] - predict(simulators.cheap, case)[0]
-
-
-class _Local:
-    """Values and slopes of a prediction, with as few simulations as will do.
-
-    Args:
-      target: the measurements.
-      problem: what may be changed.
-      values: simulates the values.
-      slopes: simulates the slopes.
-      known: slopes of the first coordinates, which are not to be found again, ``(G, S, C, k)``.
-      step: of the finite differences, in coordinates.
-    """
-
-    def __init__(
-        self, target: Target, problem: Problem, values: Replay, slopes: Replay, known: np.ndarray | None, step: float
-    ) -> None:
-        self.target, self.problem = target, problem
-        self._values, self._slopes, self._known, self._step = values, slopes, known, step
-        self._value: tuple[np.ndarray, np.ndarray] | None = None  # the last point, and the signals there
-        self._slope: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None  # point, signals, slopes
-        self._age = 0
-
-    def value(self, x: np.ndarray) -> np.ndarray:
-        """Predicted signals, ``(G, S, C)``."""
-        if self._value is None or not np.array_equal(self._value[0], x):
-            self._value = (x.copy(), predict(self._values, [self.problem.case(x)])[0])
-        return self._value[1]
-
-    def recall(self, x: np.ndarray, signals: np.ndarray) -> None:
-        """Takes signals that were predicted at a point before."""
-        self._value = (x.copy(), signals)
-
-    def has_measured(self, x: np.ndarray) -> bool:
-        """Whether the slopes at hand were measured at this point."""
-        return self._slope is not None and self._age == 0 and np.array_equal(self._slope[0], x)
-
-    def begin(self, x: np.ndarray, slopes: np.ndarray) -> None:
-        """Takes slopes of the first coordinates for those at a point; the others are measured."""
-        value = self.value(x)
-        if slopes.shape[-1] < len(x):
-            slopes = self._measured(x, value, slopes)
-        self._slope, self._age = (x.copy(), value, slopes), 1
-
-    def latest(self, x: np.ndarray) -> np.ndarray:
-        """The slopes that are at hand, ``(G, S, C, p)``; measured if there are none."""
-        return self.slopes(x) if self._slope is None else self._slope[2]
-
-    def slopes(self, x: np.ndarray, anew: bool = False) -> np.ndarray:
-        """Slopes of the signals ÷ noise over the coordinates, ``(G, S, C, p)``."""
-        value = self.value(x)
-        if self._slope is not None and np.array_equal(self._slope[0], x) and not (anew and self._age):
-            return self._slope[2]
-        if self._slope is None or anew or self._age >= _SLOPES_LAST or len(x) > _FEW:
-            self._age, slopes = 0, self._measured(x, value, self._known)
-        else:
-            self._age += 1
-            before, signals, slopes = self._slope
-            step = x - before
-            surprise = self.target.change(value, signals) - slopes @ step
-            slopes = slopes + surprise[..., None] * (step / (step @ step))
-        self._slope = (x.copy(), value, slopes)
-        return slopes
-
-    def _measured(self, x: np.ndarray, value: np.ndarray, known: np.ndarray | None) -> np.ndarray:
-        """One-sided differences, all in one simulation; 0 where a coordinate jumps, and no slope leads anywhere."""
-        problem, target = self.problem, self.target
-        count = 0 if known is None else known.shape[-1]
-        groups = [g for g in problem.columns() if min(g) >= count and not problem.entries[g[0]].jumps]
-        width = problem.high - problem.low
-        step = np.where(x + self._step > problem.high, -self._step, self._step)
-        step = np.where(width < 2 * self._step, width / 4, step)
-        moved = [x + step * np.isin(np.arange(len(x)), group) for group in groups]
-        same = self._values is self._slopes or not moved
-        asked = [problem.case(v) for v in (moved if same else [x, *moved])]
-        signals = predict(self._slopes, asked) if asked else np.empty((0, *value.shape))
-        signals, base = (signals, value) if same else (signals[1:], signals[0])
-        slopes = np.zeros((*value.shape, len(problem)))
-        for change, group in zip(signals - base, groups, strict=True):
-            for index in group:
-                members = problem.entries[index].members
-                slopes[members, :, :, index] = change[members] / step[index]
-        slopes /= target.sigma[:, None]
-        slopes[~target.mask] = 0
-        if known is not None:
-            slopes[..., :count] = known
-        return slopes

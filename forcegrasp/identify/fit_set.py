@@ -8,10 +8,11 @@ import numpy as np
 
 from forcegrasp.errors import ConfigError, PhysicsError
 from forcegrasp.identify.base_fit import BaseFit, check_gradient, cost_tolerance, fit_base
-from forcegrasp.identify.fit import Simulators, fit_exactly, fit_once
+from forcegrasp.identify.fit import fit_exactly, fit_once
 from forcegrasp.identify.loading import Loaded
 from forcegrasp.identify.problem import Problem
 from forcegrasp.identify.progress import Progress
+from forcegrasp.identify.simulators import Simulators
 from forcegrasp.identify.target import Target, make_target
 from forcegrasp.identify.weights import reweigh, weights
 from forcegrasp.measure import MeasurementSet

@@ -6,8 +6,9 @@ import dataclasses
 
 import numpy as np
 
-from forcegrasp.identify.fit import Fit, Simulators, fit_exactly, fit_once
+from forcegrasp.identify.fit import Fit, fit_exactly, fit_once
 from forcegrasp.identify.predict import predict
+from forcegrasp.identify.simulators import Simulators
 from forcegrasp.identify.target import Target
 
 # Left out is this share of the grasps, but one at least, or those of an object, or else this larger share: whichever

@@ -6,7 +6,8 @@ import dataclasses
 
 import numpy as np
 
-from forcegrasp.identify.fit import Fit, Simulators, fit_exactly
+from forcegrasp.identify.fit import Fit, fit_exactly
+from forcegrasp.identify.simulators import Simulators
 from forcegrasp.identify.target import Target
 
 # Rounds of fitting and weighing, and the largest factor by which weights may still change at the end.

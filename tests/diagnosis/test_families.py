@@ -20,12 +20,13 @@ from forcegrasp.effects import get_effect
 from forcegrasp.effects.for_gripper import effect_of, effects_of
 from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.identify.base_fit import BaseFit
-from forcegrasp.identify.fit import Simulators, fit_exactly
+from forcegrasp.identify.fit import fit_exactly
 from forcegrasp.identify.fit_set import fit_model
 from forcegrasp.identify.fitted_model import model_of
 from forcegrasp.identify.loading import Loaded
 from forcegrasp.identify.predict import predict
 from forcegrasp.identify.problem import Problem
+from forcegrasp.identify.simulators import Simulators
 from forcegrasp.identify.target import Target
 from forcegrasp.importers.example import example_set
 from forcegrasp.physics import load_gripper

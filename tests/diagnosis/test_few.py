@@ -17,8 +17,9 @@ from forcegrasp.diagnosis.signatures import Background
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.effects import get_effect
 from forcegrasp.effects.setting import EffectSetting
-from forcegrasp.identify.fit import Fit, Simulators
+from forcegrasp.identify.fit import Fit
 from forcegrasp.identify.problem import Problem
+from forcegrasp.identify.simulators import Simulators
 from forcegrasp.identify.target import Target
 
 #: Where sixteen grasps leave most: the second ones of the made-up set's eight.

@@ -14,11 +14,12 @@ from forcegrasp.effects import get_effect
 from forcegrasp.effects.for_gripper import effect_of, effects_of
 from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.identify.cross_validation import make_folds
-from forcegrasp.identify.fit import Simulators, fit_exactly
+from forcegrasp.identify.fit import fit_exactly
 from forcegrasp.identify.fit_set import fit_model
 from forcegrasp.identify.noise_floor import beyond_fit, numerical_error
 from forcegrasp.identify.problem import Problem
 from forcegrasp.identify.progress import silent
+from forcegrasp.identify.simulators import Simulators
 from tests.light_set import light_gripper, light_set
 
 LATE = ("readout_skew", "force_delay")

@@ -14,10 +14,11 @@ from forcegrasp.diagnosis.study import Study
 from forcegrasp.effects.for_gripper import effect_of
 from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.identify.cross_validation import make_folds, rms
-from forcegrasp.identify.fit import Simulators, fit_exactly
+from forcegrasp.identify.fit import fit_exactly
 from forcegrasp.identify.fit_set import fit_model
 from forcegrasp.identify.noise_floor import beyond_fit, numerical_error
 from forcegrasp.identify.problem import Problem
+from forcegrasp.identify.simulators import Simulators
 from tests.diagnosis.test_families import jaw_with, silent
 
 

@@ -20,17 +20,17 @@ from forcegrasp.diagnosis.signatures import Background, Score, Signatures, best_
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.effects import get_effect
 from forcegrasp.effects.setting import EffectSetting
-from forcegrasp.identify import base_fit, cross_validation
-from forcegrasp.identify import fit as fit_module
+from forcegrasp.identify import base_fit, cross_validation, local_slopes
 from forcegrasp.identify.base_fit import BaseFit, check_gradient, fit_base, rms_error
 from forcegrasp.identify.cross_validation import heldout_residual, make_folds, rms
-from forcegrasp.identify.fit import Fit, Simulators, fit_exactly, fit_once
+from forcegrasp.identify.fit import Fit, fit_exactly, fit_once
 from forcegrasp.identify.fitted_model import model_of
 from forcegrasp.identify.intervals import intervals, standard_errors, warnings
 from forcegrasp.identify.loading import Loaded
 from forcegrasp.identify.noise_floor import beyond_fit, excess, numerical_error, numerical_floor
 from forcegrasp.identify.predict import Case, predict
 from forcegrasp.identify.problem import Problem
+from forcegrasp.identify.simulators import Simulators
 from forcegrasp.identify.target import Target, make_target
 from forcegrasp.measure import MeasuredGrasp, MeasurementSet
 from forcegrasp.physics.gripper_file import load_gripper
@@ -166,13 +166,13 @@ def test_slopes(fitted):
 def test_slopes_follow_the_values_between_measurements(fitted, monkeypatch):
     """Broyden's update (1965): along a step the new slopes give what was seen, across it they stay."""
     fit, target = fitted.fit, fitted.target
-    local = fit_module._Local(target, fit.problem, fitted.simulators.cheap, fitted.simulators.cheap, None, 0.02)
+    local = local_slopes.LocalSlopes(target, fit.problem, fitted.simulators.cheap, fitted.simulators.cheap, None, 0.02)
     start, rng = fit.vector, np.random.default_rng(0)
     before, value = local.slopes(start), local.value(start)
     step = 0.2 * rng.standard_normal(len(start))
     counts = []
     monkeypatch.setattr(
-        fit_module, "predict", lambda replay, cases: counts.append(len(cases)) or predict(replay, cases)
+        local_slopes, "predict", lambda replay, cases: counts.append(len(cases)) or predict(replay, cases)
     )
     after = local.slopes(start + step)
     assert counts == [1]  # the values alone
@@ -210,7 +210,7 @@ def test_known_slopes_spare_simulations_and_lead_to_the_same_place(fitted, monke
         counts[-1] += len(cases)
         return predict(replay, cases)
 
-    monkeypatch.setattr(fit_module, "predict", counted)
+    monkeypatch.setattr(local_slopes, "predict", counted)
     fits = []
     for given in ({}, {"known_slopes": before.jacobian}, {"slopes": before.jacobian}):
         counts.append(0)
@@ -233,7 +233,7 @@ def test_slopes_where_a_fit_ends_are_measured_unless_only_the_place_is_asked_for
         counts[-1] += len(cases)
         return predict(replay, cases)
 
-    monkeypatch.setattr(fit_module, "predict", counted)
+    monkeypatch.setattr(local_slopes, "predict", counted)
     given = fitted.target, fitted.problem, fitted.simulators, fitted.fit.vector + 0.02, fitted.fit.correction, 0
     for at_the_end in (True, False):
         counts.append(0)

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from forcegrasp.identify import led_astray
-from forcegrasp.identify.fit import Fit, Simulators
+from forcegrasp.identify.fit import Fit
 from forcegrasp.identify.led_astray import fit_led_by_others
+from forcegrasp.identify.simulators import Simulators
 
 
 @pytest.fixture

@@ -7,11 +7,12 @@ import pytest
 
 from forcegrasp.effects import get_effect
 from forcegrasp.effects.setting import EffectSetting
-from forcegrasp.identify.fit import Simulators, fit_exactly, fit_once
+from forcegrasp.identify.fit import fit_exactly, fit_once
 from forcegrasp.identify.intervals import intervals, standard_errors, warnings
 from forcegrasp.identify.plateaus import plateaus
 from forcegrasp.identify.predict import predict
 from forcegrasp.identify.problem import Problem
+from forcegrasp.identify.simulators import Simulators
 from forcegrasp.identify.target import make_target
 from tests.light_set import light_set
 

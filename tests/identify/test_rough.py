@@ -11,7 +11,7 @@ import pytest
 
 from forcegrasp.identify import base_fit
 from forcegrasp.identify.base_fit import BaseFit, fit_base
-from forcegrasp.identify.fit import LARGE_STEP, STEP
+from forcegrasp.identify.simulators import LARGE_STEP, STEP
 
 
 @pytest.mark.parametrize(("left", "kept"), [(0.7, LARGE_STEP), (1.0, STEP)])

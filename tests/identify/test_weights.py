@@ -9,11 +9,12 @@ import pytest
 
 from forcegrasp.identify.base_fit import BaseFit, rms_error
 from forcegrasp.identify.cross_validation import heldout_residual, make_folds, rms
-from forcegrasp.identify.fit import Simulators, fit_exactly
+from forcegrasp.identify.fit import fit_exactly
 from forcegrasp.identify.fit_set import _weighed, apply_model
 from forcegrasp.identify.fitted_model import model_of
 from forcegrasp.identify.loading import load
 from forcegrasp.identify.problem import Problem
+from forcegrasp.identify.simulators import Simulators
 from forcegrasp.identify.target import make_target
 from forcegrasp.identify.weights import reweigh
 from tests.independent.slide import record

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from forcegrasp.identify import fit
-from forcegrasp.identify.fit import STEP
+from forcegrasp.identify.simulators import STEP
 
 TRUE = np.array([0.3, -0.2])
 

@@ -10,9 +10,10 @@ import pytest
 
 from forcegrasp.errors import MeasurementError
 from forcegrasp.identify.comparison import compare
-from forcegrasp.identify.fit import Simulators, fit_once
+from forcegrasp.identify.fit import fit_once
 from forcegrasp.identify.loading import Loaded
 from forcegrasp.identify.problem import Problem
+from forcegrasp.identify.simulators import Simulators
 from forcegrasp.identify.target import make_target
 from forcegrasp.importers.recording import Recording
 from forcegrasp.importers.servo_set import as_set

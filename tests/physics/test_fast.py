@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from forcegrasp.identify.fit import cheap_tier
+from forcegrasp.identify.simulators import cheap_tier
 from forcegrasp.physics import GraspParameters, GraspSimulator, fast
 from forcegrasp.physics.gripper_file import load_gripper
 from forcegrasp.physics.plant import Plant

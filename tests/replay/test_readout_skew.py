@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 
 from forcegrasp.errors import ConfigError
-from forcegrasp.identify.fit import Simulators, fit_once
+from forcegrasp.identify.fit import fit_once
 from forcegrasp.identify.fit_set import apply_model
 from forcegrasp.identify.fitted_model import model_of
 from forcegrasp.identify.loading import Loaded
 from forcegrasp.identify.problem import Problem
 from forcegrasp.identify.progress import silent
+from forcegrasp.identify.simulators import Simulators
 from forcegrasp.identify.target import make_target
 from forcegrasp.importers.example import example_set
 from forcegrasp.measure.schema import MeasuredGrasp, columns_of

@@ -10,13 +10,14 @@ import numpy as np
 
 from forcegrasp.effects.for_gripper import effect_of
 from forcegrasp.effects.setting import EffectSetting
-from forcegrasp.identify.fit import Simulators, fit_exactly
+from forcegrasp.identify.fit import fit_exactly
 from forcegrasp.identify.fit_set import apply_model
 from forcegrasp.identify.fitted_model import model_of
 from forcegrasp.identify.loading import Loaded, load
 from forcegrasp.identify.predict import predict
 from forcegrasp.identify.problem import Problem
 from forcegrasp.identify.progress import silent
+from forcegrasp.identify.simulators import Simulators
 from forcegrasp.measure import MeasurementSet
 from forcegrasp.models.model_file import Model, read_model, write_model
 from forcegrasp.replay.replay import Replay
