@@ -1,4 +1,4 @@
-"""``forcegrasp doctor``: is this installation in order?"""
+"""``forcegrasp doctor``: is this installation, a gripper or a measurement set in order?"""
 
 from __future__ import annotations
 
@@ -7,10 +7,11 @@ from forcegrasp.errors import ConfigError
 
 NOTES = """
 Looks at Python and packages, at the physics (a grasp of each gripper that comes with the package), the renderer of
-videos, cores, memory, disk, and at variables of the environment; or at a gripper alone:
+videos, cores, memory, disk, and at variables of the environment; or alone at
 
   gripper=GRIPPER   what its description says, by name or path, how it grasps in its scene, and whether its sensors
                     feel that
+  data=SET          what a measurement set holds, and whether it can be right; nothing is fitted
 
 A line each:
 
@@ -26,13 +27,16 @@ Exit status: 0, or 1 if something must be mended.
 def run(arguments: list[str]) -> int:
     """Runs the verb; returns the exit status."""
     key, _, name = (arguments or [""])[0].partition("=")
-    if arguments and (len(arguments) > 1 or key != "gripper" or not name):
-        raise ConfigError(f"doctor takes gripper=NAME, not {' '.join(arguments)!r}; see forcegrasp doctor --help")
     from forcegrasp.doctor import examine
     from forcegrasp.doctor.gripper import check_gripper
+    from forcegrasp.doctor.measurements import check_data
 
+    alone = {"gripper": check_gripper, "data": check_data}
+    if arguments and (len(arguments) > 1 or key not in alone or not name):
+        told = f"doctor takes gripper=NAME or data=SET, not {' '.join(arguments)!r}"
+        raise ConfigError(f"{told}; see forcegrasp doctor --help")
     levels = []
-    for finding in examine([lambda: check_gripper(name)]) if name else examine():
+    for finding in examine([lambda: alone[key](name)]) if name else examine():
         print(finding.line(), flush=True)
         levels.append(finding.level)
     bad, odd = levels.count("mend"), levels.count("warning")
@@ -43,9 +47,9 @@ def run(arguments: list[str]) -> int:
 
 VERB = Verb(
     "doctor",
-    "check this installation, or a gripper, and say what to do where something is wrong",
+    "check this installation, a gripper or a measurement set, and say what to do where something is wrong",
     run=run,
     notes=NOTES,
-    usage="[gripper=GRIPPER]",
+    usage="[gripper=GRIPPER | data=SET]",
     needs_mujoco=False,
 )

@@ -22,6 +22,10 @@ _MISSED = 0.1
 _HEAVIER = 0.1
 # Speed at which half of its dry friction may let an object creep, m/s: 0.1 mm in a second.
 _CREEPS = 1e-4
+# Share of a number of the scene by which a description's may differ: it is rounded.
+_ROUNDED = 0.01
+# Times the noise of the encoders by which fingers may run into their end stops.
+_INTO_A_STOP = 3.0
 _PAGE = "see docs/your-gripper.md"
 
 
@@ -45,6 +49,7 @@ def check_gripper(name: str) -> Iterator[Finding]:
     if gripper.is_servo:
         return
     yield from _sizes(gripper)
+    yield from _nominals(gripper)
     try:
         yield from _grasp(gripper)
     except PhysicsError as error:
@@ -77,6 +82,23 @@ def _sizes(gripper: Gripper) -> Iterator[Finding]:
     yield fine("objects", f"radii of {1e3 * small:.3g} to {1e3 * large:.3g} mm are trained on{soft}")
 
 
+def _nominals(gripper: Gripper) -> Iterator[Finding]:
+    """Whether parameters start where the scene has them: fits begin at the one, trainings take the other."""
+    from forcegrasp.physics.gripper_checks import compile_scene, scene_values
+
+    model = compile_scene(gripper.model)
+    for parameter in gripper.parameters.values():
+        for write in parameter.writes:
+            values = scene_values(gripper, model, write)
+            other = values[abs(values - parameter.nominal) > _ROUNDED * abs(parameter.nominal)]
+            if len(other):
+                column = "" if write.column is None else f" {write.column}"
+                told = f"{parameter.name} is {parameter.nominal:g}, and {gripper.model.name} has {other[0]:g}"
+                told += f" ({write.field}{column}): fits start from the first, trainings take the other"
+                yield warning("nominal", told, "give the scene's own value as nominal")
+                break
+
+
 def _grasp(gripper: Gripper) -> Iterator[Finding]:
     """Closes on an object in the middle and presses: who touches, and what sensors say of it."""
     import numpy as np
@@ -100,6 +122,9 @@ def _grasp(gripper: Gripper) -> Iterator[Finding]:
         yield fine("stiffness", f"pads are {depths} mm in the object then: {float(f'{stiff:.3g}'):g} N/m on each side")
     if gripper.force == "sensors":
         yield from _sensors(gripper, pressed, force[-1])
+    if (deep := _into_a_stop(gripper, plant)) > _INTO_A_STOP * gripper.training.position_std:
+        told = f"fingers that open at once run {1e3 * deep:.2g} m{gripper.unit} into the joints' range, which is soft"
+        yield note("end stops", f"{told}; give joints the range that your gripper's own stops leave them, {_PAGE}")
     if (heavier := _heavier(plant)) > _HEAVIER:
         told = f"implicit steps of {1e3 * plant.dt:g} ms make motors {100 * heavier:.0f} % heavier than the scene says"
         yield note("time step", f"{told}, and forces that are fitted to a set with them; shorter steps do so less")
@@ -161,6 +186,22 @@ def _creep(gripper: Gripper, plant: Plant) -> float:
     pushed = 0.5 * model.dof_frictionloss[dof] * model.dof_invweight0[dof]
     by_speed = 2 / (most * max(constant, 2 * plant.dt)) if constant > 0 else -damping / most
     return float((1 - impedance) / impedance * pushed / by_speed)
+
+
+def _into_a_stop(gripper: Gripper, plant: Plant) -> float:
+    """How far motors run into the range of their joints when they open at once, m or rad; 0 if not at all."""
+    import numpy as np
+
+    joints = [plant.model.joint(motor.joint) for motor in gripper.motors]
+    if not all(plant.model.jnt_limited[joint.id] for joint in joints):
+        return 0.0
+    ends = [joint.range[int(motor.sign > 0)] for joint, motor in zip(joints, gripper.motors, strict=True)]
+    furthest = [motor.sign * (end - motor.closed) for end, motor in zip(ends, gripper.motors, strict=True)]
+    deepest = 0.0
+    for _ in range(round(2 / plant.dt)):
+        plant.advance(np.full((1, len(joints)), gripper.stroke))
+        deepest = max(deepest, float(np.max(plant.position[0] - furthest)))
+    return deepest
 
 
 def _pressed(gripper: Gripper, plant: Plant) -> tuple[np.ndarray, np.ndarray]:

@@ -13,7 +13,7 @@ from mujoco.batch import MODEL_FIELDS
 from forcegrasp.errors import ConfigError, closest
 from forcegrasp.files.validate import refusal
 from forcegrasp.physics.gripper import SIDES, Gripper
-from forcegrasp.physics.gripper_parts import FieldWrite, Finger, Motor
+from forcegrasp.physics.gripper_parts import BaseParameter, FieldWrite, Finger, Motor
 from forcegrasp.physics.guard import silence_log
 from forcegrasp.physics.scene_file import check_scene
 
@@ -61,7 +61,9 @@ def check_gripper(gripper: Gripper, names: Mapping[str, str]) -> None:
     _check_object(gripper, model, data)
     for parameter in gripper.parameters.values():
         for write in parameter.writes:
-            check_write(f"{gripper.path}: parameters.{parameter.name}.writes: {write.field}", model, write)
+            where = f"{gripper.path}: parameters.{parameter.name}.writes: {write.field}"
+            check_write(where, model, write)
+            _check_sign(where, gripper, model, parameter, write)
     try:
         _ = gripper.opening
     except ValueError as error:
@@ -162,6 +164,32 @@ def _check_object(gripper: Gripper, model: mujoco.MjModel, data: mujoco.MjData) 
     shapes = mujoco.mjtGeom
     if shapes(geom.type[0]) not in (shapes.mjGEOM_CYLINDER, shapes.mjGEOM_SPHERE, shapes.mjGEOM_BOX):
         raise ConfigError(f"{where}.geom: {geom.name!r} must be a cylinder, a sphere or a box, to have a radius")
+
+
+def scene_values(gripper: Gripper, model: mujoco.MjModel, write: FieldWrite) -> np.ndarray:
+    """What a parameter is in the scene, by one of the fields that it writes, in its own sign, one-dimensional."""
+    rows = {
+        "actuator": [model.actuator(motor.actuator).id for motor in gripper.motors],
+        "dof": np.flatnonzero(np.asarray(model.dof_jntid) != model.joint(gripper.object_joint).id),
+        "geom": [model.geom(gripper.object_geom).id],
+    }
+    values = np.asarray(getattr(model, write.field))[rows.get(write.field.split("_")[0], [])]
+    return write.sign * (values if write.column is None else values[:, write.column])
+
+
+def _check_sign(
+    where: str, gripper: Gripper, model: mujoco.MjModel, parameter: BaseParameter, write: FieldWrite
+) -> None:
+    """Refuses a parameter that would turn the sign of what it writes: a minus was forgotten, or is too much."""
+    values = scene_values(gripper, model, write)
+    if parameter.low >= 0 and (values < 0).any():
+        column = "" if write.column is None else f" {write.column}"
+        minus = "-" if write.sign > 0 else ""
+        has, would = write.sign * values.min(), write.sign * parameter.nominal
+        raise ConfigError(
+            f"{where}{column} is {has:g} in {gripper.model.name}, and {parameter.name} would make it {would:g}:"
+            f" write {minus}{write.field}{column}"
+        )
 
 
 def check_write(where: str, model: mujoco.MjModel, write: FieldWrite) -> None:

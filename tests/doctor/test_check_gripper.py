@@ -103,6 +103,26 @@ def test_a_contact_of_one_impedance_is_as_stiff_as_its_solref_says(changed):
     assert found[1] / found[0] == pytest.approx(5.0, rel=0.02)
 
 
+@pytest.mark.parametrize("more", [0.0, 0.005])
+def test_fingers_that_open_into_the_range_of_their_joints_meet_a_stop(changed, more):
+    """As any that overshoot: the servo's damping is taken away."""
+    lines = {
+        'range="0 0.05" armature': f'range="{-more:g} 0.05" armature',
+        'kv="20"': 'kv="0"',
+        'damping="40"': 'damping="12"',
+    }
+    found = said(changed(xml=lines, yaml={"nominal: 40, low": "nominal: 12, low"}))
+    assert any("into the joints' range" in line for line in found.get("note", [])) == (more == 0)
+    assert not found.get("warning")
+
+
+@pytest.mark.parametrize(("nominal", "told"), [("250", False), ("251", False), ("300", True)])
+def test_a_nominal_that_is_not_the_scenes(changed, nominal, told):
+    found = said(changed(yaml={"nominal: 250": f"nominal: {nominal}"}))
+    lines = [line for line in found.get("warning", []) if "servo_stiffness is 300, and second.xml has 250" in line]
+    assert len(lines) == told
+
+
 def test_what_follows_from_the_description_is_told_in_users_units():
     lines = " ".join(said("robotiq_2f85")["fine"])
     for told in ("85.0 mm between the pads when open", "0.8 rad", "q_rad, qdes_rad, f_l_n, f_r_n", "7.21 and 7.21 N"):

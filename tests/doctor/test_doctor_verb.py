@@ -58,7 +58,9 @@ def test_a_check_that_fails_is_a_finding():
 @pytest.mark.parametrize("arguments", [["physics"], ["a=1"], ["--verbose"]])
 def test_takes_no_other_options(arguments, capsys):
     assert main(["doctor", *arguments]) == 2
-    assert capsys.readouterr().err.startswith(f"forcegrasp: doctor takes gripper=NAME, not '{arguments[0]}'")
+    assert capsys.readouterr().err.startswith(
+        f"forcegrasp: doctor takes gripper=NAME or data=SET, not '{arguments[0]}'"
+    )
 
 
 def test_works_where_nothing_else_does(tmp_path):

@@ -243,6 +243,16 @@ BROKEN_VALUES = [
     (f"{_DAMPING}.writes", ["dof_dampin"], "in MuJoCo's model; did you mean dof_damping"),
     (f"{_DAMPING}.writes", ["geom_type"], "geom_type is no field of numbers"),
     (f"{_DAMPING}.writes", ["dof_damping 0"], "dof_damping needs no column"),
+    (
+        f"{_DAMPING}.writes",
+        ["-dof_damping"],
+        "dof_damping is 40 in second.xml, and joint_damping would make it -40: write",
+    ),
+    (
+        "parameters.contact_stiffness.writes",
+        ["geom_solref 0"],
+        "geom_solref 0 is -900 in second.xml, and contact_stiffness would make it 900: write -geom_solref 0",
+    ),
     (f"{_DAMPING}.writes", ["geom_solimp"], "geom_solimp needs a column from 0 to 4"),
     (f"{_DAMPING}.writes", ["geom_solimp 5"], "geom_solimp needs a column from 0 to 4"),
     ("parameters.radius_m.writes", ["geom_size 0"], "parameters.radius_m.writes: must be []"),

@@ -1,0 +1,54 @@
+"""Is a measurement set what its author meant? It is read and checked; nothing is simulated or fitted."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from forcegrasp.doctor.finding import Finding, fine, mend, note, warning
+from forcegrasp.errors import ConfigError, MeasurementError
+from forcegrasp.short_repr import counted
+
+if TYPE_CHECKING:
+    from forcegrasp.measure import MeasurementSet
+    from forcegrasp.physics import Gripper
+
+_PAGE = "see docs/compare-your-data.md"
+
+
+def check_data(path: str) -> Iterator[Finding]:
+    """What a measurement set holds, in the user's units, and what is wrong or odd in it.
+
+    Args:
+      path: the set's folder.
+    """
+    from forcegrasp.identify.loading import load
+    from forcegrasp.measure import MeasurementSet
+
+    try:
+        loaded = load(path)
+    except (MeasurementError, ConfigError) as error:
+        yield mend("set", str(error), _PAGE)
+        return
+    yield fine("set", loaded.measured.summary())
+    if isinstance(loaded.measured, MeasurementSet):
+        yield from _readings(loaded.measured, loaded.gripper)
+    for told in loaded.warnings:
+        yield warning("set", told, "look whether it is meant so")
+
+
+def _readings(measured: MeasurementSet, gripper: Gripper) -> Iterator[Finding]:
+    import numpy as np
+
+    rows = sum(len(grasp.time_s) for grasp in measured.grasps)
+    apart = 1e3 * np.median(np.concatenate([np.diff(grasp.time_s) for grasp in measured.grasps]))
+    sessions = counted(len({grasp.session for grasp in measured.grasps}), "session")
+    yield fine("rows", f"{rows} in {sessions}, {apart:.3g} ms apart; columns {', '.join(measured.columns.signals)}")
+    for name, value, channels in (
+        ("positions", measured.position_std_m, gripper.positions),
+        ("forces", measured.force_std_n, gripper.forces),
+    ):
+        if value is not None:
+            yield fine("noise", f"of {name} is given: {value:.3g} {channels[0].unit}")
+        elif channels:
+            yield note("noise", f"of {name} is not given: it is estimated from the readings")

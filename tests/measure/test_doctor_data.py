@@ -1,0 +1,55 @@
+"""``forcegrasp doctor data=SET``: what a set holds, what is odd in it, and what must be mended; without a fit."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import pytest
+
+from forcegrasp.cli.main import main
+from forcegrasp.measure import write_set
+
+
+def said(capsys, folder) -> tuple[int, dict[str, list[str]]]:
+    """Exit status, and level → lines."""
+    status, found = main(["doctor", f"data={folder}"]), dict[str, list[str]]()
+    for line in capsys.readouterr().out.splitlines()[:-1]:
+        found.setdefault(line.split()[0], []).append(line)
+    return status, found
+
+
+def test_what_a_set_holds(measured, folder, capsys):
+    status, found = said(capsys, folder)
+    rows = sum(len(grasp.time_s) for grasp in measured.grasps)
+    assert (status, set(found)) == (0, {"fine"})
+    lines = " ".join(found["fine"])
+    for told in (f"{len(measured.grasps)} grasps of", f"{rows} in 2 sessions", "40 ms apart", "q_l_m, q_r_m, f_l_n"):
+        assert told in lines
+    assert f"of positions is given: {measured.position_std_m:.3g} m" in lines
+    assert f"of forces is given: {measured.force_std_n:.3g} N" in lines
+
+
+def test_noise_that_is_not_given(measured, tmp_path, capsys):
+    write_set(dataclasses.replace(measured, force_std_n=None), tmp_path / "set")
+    status, found = said(capsys, tmp_path / "set")
+    assert status == 0
+    (line,) = found["note"]
+    assert "of forces is not given" in line
+
+
+def test_what_is_odd_is_a_warning(measured, tmp_path, capsys):
+    slow = [dataclasses.replace(grasp, time_s=2 * grasp.time_s) for grasp in measured.grasps]
+    write_set(dataclasses.replace(measured, grasps=tuple(slow)), tmp_path / "set")
+    status, found = said(capsys, tmp_path / "set")
+    assert status == 0
+    assert any("2 times too long" in line for line in found["warning"])
+
+
+@pytest.mark.parametrize("named", [True, False])
+def test_what_cannot_be_right_is_to_be_mended(named, folder, capsys):
+    if named:
+        text = (folder / "samples.csv").read_text("utf-8")
+        (folder / "samples.csv").write_text(text.replace("q_l_m", "q_left", 1), "utf-8")
+    status, found = said(capsys, folder if named else folder / "nowhere")
+    assert (status, set(found)) == (1, {"mend"})
+    assert ("did you mean q_l_m?" if named else "no such measurement set") in found["mend"][0]
