@@ -158,6 +158,11 @@ _PLANS = {
         "the same squeeze and release at two speeds",
         ((25, 0.03, 0.1), (21, 0.012, 0.08), (25.2, 0.012, 0.2), (21, 0.003, 0.08), (25.2, 0.003, 0.2)),
     ),
+    "rounded_force_hysteresis": Show(
+        "a squeeze with partial releases of several sizes",
+        ((25, 0.03, 0.1), (21, 0.012, 0.1), (21.8, 0.012, 0.1), (21, 0.012, 0.1), (23.4, 0.012, 0.1),
+         (21, 0.012, 0.1), (26.5, 0.012, 0.2)),
+    ),
     "force_gain_asymmetry": Show(
         "a squeeze, a hold, a release", ((25, 0.02, 0.1), (21, 0.01, 1.0), (26.5, 0.01, 0.2))
     ),

@@ -21,7 +21,7 @@ class ForceHysteresis(Effect):
     symptom = "loading and unloading curves differ, at any speed"
     formula = "f₁ ← clip(f₁, f − w/2, f + w/2); f' ← max(f₁, min(f', (1 + h) f₁)); 0 if f = 0 (zeroed)"
     source = "play and generalised play operators (Krasnosel'skii and Pokrovskii 1989)"
-    look_alikes = ("backlash", "force_lag", "viscoelastic_contact")
+    look_alikes = ("rounded_force_hysteresis", "backlash", "force_lag", "viscoelastic_contact")
     separates = "loading and unloading at several speeds: lag shrinks when slow, hysteresis does not"
     parameters = (
         Parameter("width_n", "width of the play w", "N", 0.0, 1.0, 0.04, follows="force"),

@@ -10,27 +10,37 @@ from forcegrasp.effects.base import Contribution, Effect, Parameter
 COEFFICIENT = Parameter("coefficient", "friction per load c", "1", 0.0, 0.6, 0.15, trials=(0.1,))
 
 
+#: What the load is: what the transmission carries, or what presses alone.
+LOADS = ("carried", "pressed")
+#: Where nothing is grasped, all that acts from outside is a load that the transmission carries.
+LOADS_NEED = {"pressed": "pads"}
+
+
 def load_of(effect: Effect) -> np.ndarray:
-    """What the transmission carries, N or N·m, ``(rows, motors)``."""
-    return np.abs(effect.plant.motor_force[effect.rows] - effect.plant.outside_force[effect.rows])
+    """What loads the transmission, N or N·m, ``(rows, motors)``."""
+    outside = effect.plant.outside_force[effect.rows]
+    return np.abs(outside if effect.variant == "pressed" else effect.plant.motor_force[effect.rows] - outside)
 
 
 class LoadFriction(Effect):
-    """Gears that are pressed together rub: dry friction in proportion to the force that the transmission carries.
+    """Gears that are pressed together rub: dry friction in proportion to their load.
 
-    It carries what the motor gives against what acts on the joint from outside: gravity, springs, a load, fingertips
-    that press. At rest the two are opposite, and it counts both, so that friction is 2 c times the load that is held.
+    ``carried``: what the motor gives against what acts on the joint from outside (gravity, springs, a load, fingertips
+    that press). At rest the two are opposite, and both count, so that friction is 2 c times the load that is held.
+    ``pressed``: what acts from outside alone, as in a screw or a guide that turns freely until fingertips press.
     """
 
     name = "load_friction"
     stage = "actuator"
     family = "friction"
     symptom = "force is lost while squeezing and held while easing; the offset that flips grows with the load"
-    formula = "|F| ≤ c |F_motor − F_outside|"
-    source = "Duclusaud et al. (2024), arXiv 2410.08650, model M3, forces of the last physics step"
+    formula = "|F| ≤ c |F_motor − F_outside| (carried), c |F_outside| (pressed)"
+    source = "carried: Duclusaud et al. (2024), arXiv 2410.08650, model M3, forces of the last physics step"
     look_alikes = ("coulomb_friction", "stiction", "force_hysteresis", "backlash")
     separates = "holds that are approached from both sides under several loads: the band is as wide as the load is high"
     parameters = (COEFFICIENT,)
+    variants = LOADS
+    variant_needs = LOADS_NEED
     order = 4
 
     def act(self) -> Contribution:

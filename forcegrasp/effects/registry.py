@@ -60,6 +60,7 @@ _SHIPPED = (
     "rate_limited_lag",
     "readout_skew",
     "return_spring",
+    "rounded_force_hysteresis",
     "smooth_friction",
     "smooth_load_friction",
     "smooth_stiction",

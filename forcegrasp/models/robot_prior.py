@@ -33,10 +33,11 @@ class Prior:
 #: smooth_friction, which coulomb_friction and presliding stand for, lest a robot rubs three times, nor the smooth forms
 #: of stiction and load_friction, smooth_object_friction, which object_friction stands for, finger_creep, which
 #: finger_compliance and viscoelastic_contact do, rate_limited_lag, which rate_limit and actuator_lag do,
-#: contact_friction, table_friction and object_mass, which object_body stands for, and hunt_crossley_contact, for robots
-#: keep the scene's contact and stiffen it. Nor has one an effect that came later (encoder_scale, return_spring,
-#: contact_damping, contact_onset, two_mass_backlash, the asymmetries of motors, friction, lost motion and compliance),
-#: or such a variant: policies were compared on robots as they are.
+#: contact_friction, table_friction and object_mass, which object_body stands for, hunt_crossley_contact, for robots
+#: keep the scene's contact and stiffen it, and rounded_force_hysteresis, which force_hysteresis stands for. Nor has one
+#: an effect that came later (encoder_scale, return_spring, contact_damping, contact_onset, two_mass_backlash, the
+#: asymmetries of motors, friction, lost motion and compliance), or such a variant: policies were compared on robots as
+#: they are.
 EFFECTS = {
     "command_deadband": Prior(0.3, 1 / 3, 3, "the paper's robot: its driver sends no command below 0.3 mm"),
     "command_delay": Prior(0.6, 0.1, 0.7, "assumed: from a bus cycle to one control step of 40 ms"),
@@ -47,7 +48,11 @@ EFFECTS = {
     "force_limit": Prior(0.1, 2, 10, "assumed: firmware limits; tighter ones would leave the goals out of reach"),
     "motor_offset": Prior(0.2, 0.2, 1, "found in a real drive (real-data.md); sizes assumed"),
     "load_friction": Prior(
-        0.3, 0.2, 2, "gears lose 3 to 30 % of what they transmit, from one spur gear to several stages"
+        0.3,
+        0.2,
+        2,
+        "gears lose 3 to 30 % of what they transmit, from one spur gear to several stages",
+        variants=("carried",),
     ),
     "presliding": Prior(0.15, 1 / 3, 3, "assumed: as Coulomb friction"),
     "direction_friction": Prior(0.15, 0.2, 1, "found in a real drive (real-data.md); sizes assumed"),

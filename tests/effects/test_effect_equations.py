@@ -609,6 +609,24 @@ def test_force_hysteresis_share(speed):
     assert out[falling] == pytest.approx(np.minimum(1.25 * f, peak)[falling], abs=1e-12)
 
 
+@pytest.mark.parametrize("excess", [-0.1, 0.05])
+def test_rounded_force_hysteresis_turns_as_dahl_says(excess):
+    """From the virgin curve: s = 1 − exp(−f / r); after a turn at f₁: s = −1 + (1 + s₁) exp(−(f₁ − f) / r)."""
+    reach = 0.2
+    f = np.concatenate([np.linspace(0, 1, 101), np.linspace(1, 0.4, 61)[1:], np.full(20, 0.4)])
+    out = read(make("rounded_force_hysteresis", excess, reach), f)[:, 0]
+    loading = f + excess * (1 - np.exp(-f / reach))
+    turned = f + excess * ((2 - np.exp(-1 / reach)) * np.exp(-(1 - f) / reach) - 1)
+    np.testing.assert_allclose(out, np.where(np.arange(len(f)) <= 100, loading, turned), atol=1e-12)
+
+
+@pytest.mark.parametrize(("variant", "released"), [("lasting", 0.1), ("zeroed", 0.0)])
+def test_rounded_force_hysteresis_once_released(variant, released):
+    f = np.concatenate([np.linspace(0, 1, 50), np.linspace(1, 0, 50), np.zeros(5)])
+    out = read(make("rounded_force_hysteresis", -0.1, 0.05, variant=variant), f)[:, 0]
+    assert out[-5:] == pytest.approx(released, abs=1e-6)
+
+
 def test_force_gain_asymmetry_keeps_the_common_gain():
     out = read(make("force_gain_asymmetry", 0.1), wave())
     assert out == pytest.approx(np.outer(wave(), [1.1, 0.9]))

@@ -68,6 +68,19 @@ def test_load_friction_takes_its_share_of_a_squeeze(coefficient):
     assert plant.pad_force[0] == pytest.approx(motor * (1 - coefficient) / (1 + coefficient), rel=0.04)
 
 
+@pytest.mark.parametrize("coefficient", [0.1, 0.3])
+def test_friction_of_a_transmission_that_turns_freely_until_pads_press(coefficient):
+    """While closing P = F / (1 + c); where nothing presses, fingers go as without it."""
+    plant = settle("load_friction", (coefficient,), 0.0245, 0.0235, 0.0225, variant="pressed")
+    motor = GAIN * (plant.position[0] - 0.0225)
+    assert plant.pad_force[0] == pytest.approx(motor / (1 + coefficient), rel=0.04)
+    loaded, free = (
+        rollout(1, uses, commands=path((0.034, 0.04, 0.3), (0.036, 0.02, 0.2))).position
+        for uses in ([(get_effect("load_friction"), [coefficient], "pressed", [0])], [])
+    )
+    np.testing.assert_array_equal(loaded, free)
+
+
 @pytest.mark.parametrize("side", [-1, 1])
 def test_load_friction_of_a_pendulum_is_as_wide_as_its_load(side):
     """Crept to from either side: F (1 ∓ c) = W (1 ± c), with F = kp (u − q) and W = m g l sin q."""
@@ -225,10 +238,11 @@ def test_smooth_load_friction_takes_its_share_until_it_has_crept(coefficient):
     assert creeping.pad_force[0] == pytest.approx(at_rest, rel=0.02)
 
 
-def test_smooth_load_friction_is_a_damping_by_the_load():
+@pytest.mark.parametrize(("variant", "load"), [("carried", 0.5), ("pressed", 0.2)])
+def test_smooth_load_friction_is_a_damping_by_the_load(variant, load):
     stub = SimpleNamespace(
         velocity=np.array([[0.0, 1e-3]]), motor_force=np.array([[-0.3, -0.3]]), outside_force=np.array([[0.2, 0.2]])
     )
-    added = make("smooth_load_friction", 0.1, 1e-3).attach(stub, np.array([0])).act()
-    np.testing.assert_allclose(added.damping, [[0.05 / 1e-3, 0.05 * np.tanh(1.0) / 1e-3]], rtol=1e-9)
+    added = make("smooth_load_friction", 0.1, 1e-3, variant=variant).attach(stub, np.array([0])).act()
+    np.testing.assert_allclose(added.damping, [[100 * load, 100 * load * np.tanh(1.0)]], rtol=1e-9)
     np.testing.assert_allclose(added.friction, 0)
