@@ -191,7 +191,8 @@ def _put_right_or_as_said(ways: _Ways, loaded: Loaded[MeasurementSet], said: Fit
         if not further.stopped and not fault.is_borne_out(further.fit):  # an effect had made it seem so
             continue
         likely = with_fault(further, fault.told_by(further.fit), (said[0], said[2].fit))
-        certain = likely.verdict is Verdict.DATA and not (likely.left or fault.moved or fault.of_most)
+        of_most = fault.of_most and not fault.is_of_few(further.fit)
+        certain = likely.verdict is Verdict.DATA and not (likely.left or fault.moved or of_most)
         if not (certain or likely.stopped):  # effects may do as well without it
             as_it_is = ways.search(*said)
             likely = dataclasses.replace(more_likely(likely, as_it_is), stopped=as_it_is.stopped)

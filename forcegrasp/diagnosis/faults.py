@@ -46,7 +46,7 @@ class Fault(ShortRepr):
     fitted_m: dict[str, float] = field(default_factory=dict)  #: given radii that are fitted instead, by object, metres
     least_m: float = SEEN_M  #: by how much less they were as given
     worth: float = EXPLAINED  #: least share of what is left beyond the noise that it must explain
-    of_most: bool = False  #: radii of most objects are doubted, so that an effect may do as well
+    of_most: bool = False  #: radii of most objects are doubted, so that an effect may do as well, unless few were wrong
     wider: Fault | None = None  #: the same of more objects, to be tried if something is left
     instead_of: str = ""  #: the one effect that it stands for where it is a rival; otherwise it stands for all
 
@@ -54,6 +54,10 @@ class Fault(ShortRepr):
         """Whether a fit of the set put right, with the effects that were found, still wants other radii than given."""
         wrong = self._still_wrong(fit)
         return bool(wrong) if self.of_most else len(wrong) == len(self.fitted_m)
+
+    def is_of_few(self, fit: Fit) -> bool:
+        """Whether a fit of the set put right puts fewer than half of the objects elsewhere: no effect is of so few."""
+        return 2 * len(self._still_wrong(fit)) < len({grasp.object for grasp in fit.problem.grasps})
 
     def _still_wrong(self, fit: Fit) -> dict[str, float]:
         """The given radii, by object, that a fit puts elsewhere."""

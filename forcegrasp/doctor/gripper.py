@@ -192,15 +192,10 @@ def _into_a_stop(gripper: Gripper, plant: Plant) -> float:
     """How far motors run into the range of their joints when they open at once, m or rad; 0 if not at all."""
     import numpy as np
 
-    joints = [plant.model.joint(motor.joint) for motor in gripper.motors]
-    if not all(plant.model.jnt_limited[joint.id] for joint in joints):
-        return 0.0
-    ends = [joint.range[int(motor.sign > 0)] for joint, motor in zip(joints, gripper.motors, strict=True)]
-    furthest = [motor.sign * (end - motor.closed) for end, motor in zip(ends, gripper.motors, strict=True)]
     deepest = 0.0
     for _ in range(round(2 / plant.dt)):
-        plant.advance(np.full((1, len(joints)), gripper.stroke))
-        deepest = max(deepest, float(np.max(plant.position[0] - furthest)))
+        plant.advance(np.full((1, plant.motors), gripper.stroke))
+        deepest = max(deepest, float(np.max(plant.position[0] - gripper.motor_range[1])))
     return deepest
 
 

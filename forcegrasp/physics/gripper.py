@@ -210,6 +210,16 @@ class Gripper(ShortRepr):
 
         return bool(np.abs(axes(self.opening.qpos[0]) - axes(self.opening.qpos[-1])).max() < _TURNED)
 
+    @functools.cached_property
+    def motor_range(self) -> np.ndarray:
+        """Least and largest position that the range of its joint leaves each motor, m or rad, ``(2, motors)``."""
+        model, found = self.compile(), np.empty((2, len(self.motors)))
+        for index, motor in enumerate(self.motors):
+            joint = model.joint(motor.joint)
+            limits = joint.range if model.jnt_limited[joint.id] else np.array([-np.inf, np.inf])
+            found[:, index] = np.sort(motor.sign * (limits - motor.closed))
+        return found
+
     @property
     def stall(self) -> float:
         """Movement in a control step above which a motor's effort says nothing of contact, m or rad.

@@ -16,13 +16,12 @@ from forcegrasp.physics.gripper import START_VELOCITY, Gripper
 from forcegrasp.physics.plant import Plant, write_base
 from forcegrasp.physics.sensors import ReadingEffects
 from forcegrasp.replay.sample_steps import at_nearest_steps, fitting_factor, place_samples, steps_passed
+from forcegrasp.replay.start import encoder_noise, start_position
 from forcegrasp.replay.time_limit import check_time
 from forcegrasp.short_repr import ShortRepr
 
 #: Threads of the engine; 0 uses every core. Programs that run several diagnoses side by side set it to 1.
 THREADS = 0
-# A motor starts where its first command or the end of its range is, if measured so near to it. Share of its stroke.
-_AT_REST = 1 / 45
 #: Rows × physics steps that are kept in memory at once.
 _CHUNK = 8_000_000
 #: Where a row is that diverged, m or rad, N or N·m: so far off that no search for parameters goes there.
@@ -124,7 +123,8 @@ class Replay:
             self._fresh[start, index] = True
         #: Motions of all grasps that may be asked for again, by what was simulated; see :meth:`remember`.
         self.remembered: dict[bytes, Motion] = {}
-        starts_at = [g.start or (start_position(g, gripper.stroke), np.zeros(len(gripper.motors))) for g in self.grasps]
+        still, noise = np.zeros(len(gripper.motors)), encoder_noise(self.grasps)
+        starts_at = [g.start or (start_position(g, gripper.stroke, noise), still) for g in self.grasps]
         #: where the motors stand at the first sample, m or rad, and how fast they move, ``(grasps, motors)``
         self.start_m, self._start_velocity = (np.stack([pair[i] for pair in starts_at]) for i in (0, 1))
         known = any(g.before is not None for g in self.grasps)
@@ -190,7 +190,7 @@ class Replay:
         for effect, rows in attached:
             start[rows] = effect.rests_at(start[rows])
         if not self.gripper.is_servo:  # logs of a servo begin in motion, and joints have another zero
-            start = np.clip(start, 0.0, self.gripper.stroke)
+            start = np.clip(start, *self.gripper.motor_range)
         offset = write_base(plant, ids, base)
         velocity = self._start_velocity[grasp] if self.gripper.is_servo else None
         if velocity is not None and START_VELOCITY in base:
@@ -352,18 +352,6 @@ def join(motions: Sequence[Motion]) -> Motion:
     if len(motions) == 1:
         return motions[0]
     return Motion(*(np.concatenate([getattr(m, field.name) for m in motions]) for field in fields(Motion)))
-
-
-def start_position(grasp: MeasuredGrasp, stroke: float) -> np.ndarray:
-    """Where the motors stood at the first sample, m or rad, ``(motors,)``.
-
-    An encoder may be off and is noisy: near enough to the open end, or to the first command, they stood there.
-    """
-    first = grasp.position_m[0]
-    start = np.clip(first, 0.0, stroke)
-    for anchor in (grasp.command_m[0], np.full(len(first), stroke)):
-        start = np.where(np.abs(first - anchor) < _AT_REST * stroke, anchor, start)
-    return np.clip(start, 0.0, stroke)
 
 
 def _cut(effect: EffectOn, part: slice) -> EffectOn:

@@ -142,6 +142,8 @@ def test_radii_that_a_ruler_gave_are_doubted_where_no_effect_would_do(sound):
     assert "thing_0" in fault.told_by(one).words
     assert "thing_1" not in fault.told_by(one).words
     assert not fault.is_borne_out(fitted(said["thing_0"] + 1e-5, said["thing_1"] + 1e-5))
+    assert fault.is_of_few(one)
+    assert not fault.is_of_few(fitted(said["thing_0"] - 4e-4, said["thing_1"] + 4e-4))  # of three
 
     alike = changed(loaded, lambda g: dataclasses.replace(g, radius_m=g.radius_m + 4e-4))
     target, _, base = apply_model(alike, model, silent, refit=True)

@@ -449,3 +449,17 @@ def test_a_compiled_scene_may_be_changed_and_no_other_is():
     changed.dof_damping[:] = 7
     assert not (gripper.compile().dof_damping == 7).any()
     assert gripper.compile("fast").opt.timestep > gripper.compile().opt.timestep
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "expected"),
+    [
+        ("range", "range", [0.0, 0.05]),
+        ('range="0 0.05" armature', 'range="-0.001 0.07" armature', [-0.02, 0.051]),
+        ('range="0 0.05" armature', "armature", [-np.inf, np.inf]),
+    ],
+)
+def test_range_of_motors_is_that_of_their_joints(tmp_path, old, new, expected):
+    """Joints of the second gripper grow from 0, open, to 0.05 m, closed."""
+    gripper = load_gripper(str(_copy(tmp_path, swap={old: new})))
+    np.testing.assert_allclose(gripper.motor_range, np.repeat(np.array(expected)[:, None], 2, axis=1), atol=1e-12)

@@ -15,7 +15,7 @@ from forcegrasp.measure import MeasuredGrasp
 from forcegrasp.physics.gripper_file import load_gripper
 from forcegrasp.physics.plant import Plant, write_base
 from forcegrasp.replay import replay
-from forcegrasp.replay.replay import EffectOn, Replay, start_position
+from forcegrasp.replay.replay import EffectOn, Replay
 
 TIAGO = load_gripper("tiago")
 OPEN_M = TIAGO.stroke
@@ -289,21 +289,6 @@ def test_the_other_collision_code_is_another_one():
     seen = [replayed(Replay(TIAGO, [one], other_collisions=o), np.array([0]))[0] for o in (False, True)]
     assert not np.array_equal(*seen)
     assert seen[0][:, :2] == pytest.approx(seen[1][:, :2], abs=1e-4)
-
-
-def test_where_the_fingers_start():
-    def start(position: tuple[float, float], command: tuple[float, float]) -> list[float]:
-        one = grasp(REGULAR)
-        measured = np.tile(np.array(position), (20, 1))
-        return start_position(
-            dataclasses.replace(one, position_m=measured, command_m=np.tile(np.array(command), (20, 1))), OPEN_M
-        ).tolist()
-
-    assert start((0.0301, 0.0303), (0.030, 0.0305)) == [0.030, 0.0305]  # at the command but for noise
-    assert start((0.0448, 0.0452), (0.030, 0.030)) == [OPEN_M, OPEN_M]  # open
-    assert start((0.040, 0.035), (0.030, 0.030)) == [0.040, 0.035]  # on the way
-    assert start((0.046, -0.002), (0.010, 0.010)) == [OPEN_M, 0.0]  # within its range
-    assert start((0.0302, 0.0451), (0.030, 0.020)) == [0.030, OPEN_M]  # each finger by itself
 
 
 def test_divergence_names_the_grasp_and_its_parameters():

@@ -1,0 +1,52 @@
+"""Where motors stand when the log of a grasp begins."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from forcegrasp.measure import MeasuredGrasp
+
+# A motor starts where its first command or the end of its range is, if measured so near to it. Share of its stroke.
+_AT_REST = 1 / 45
+# It was not at rest if the encoder leaves its first reading by so many times its noise while the first command is held,
+# which must be for so many samples.
+_MOVED, _HELD = 4.0, 6
+
+
+def encoder_noise(grasps: Sequence[MeasuredGrasp]) -> np.ndarray:
+    """Standard deviation of encoders, m or rad, ``(motors,)``: third differences of white noise have variance 20 σ²."""
+    third = np.abs(np.concatenate([np.diff(grasp.position_m, n=3, axis=0) for grasp in grasps]))
+    if not len(third):
+        return np.zeros(third.shape[1])
+    return 1.4826 * np.median(third, axis=0) / np.sqrt(20)
+
+
+def start_position(grasp: MeasuredGrasp, stroke: float, noise: np.ndarray) -> np.ndarray:
+    """Where the motors stood at the first sample, m or rad, ``(motors,)``.
+
+    An encoder may be off and is noisy: near enough to the open end, or to the first command, motors stood there; unless
+    they are seen to go from where they were first read to another place while the first command is held.
+
+    Args:
+      grasp: whose log begins.
+      stroke: of the motors, m or rad.
+      noise: of their encoders, ``(motors,)``.
+    """
+    first, command = grasp.position_m[0], grasp.command_m[0]
+    start = np.clip(first, 0.0, stroke)
+    for anchor in (command, np.full(len(first), stroke)):
+        start = np.where(np.abs(first - anchor) < _AT_REST * stroke, anchor, start)
+    to_command = np.abs(first - command) < _AT_REST * stroke
+    return np.where(to_command & _went(grasp, noise), first, np.clip(start, 0.0, stroke))
+
+
+def _went(grasp: MeasuredGrasp, noise: np.ndarray) -> np.ndarray:
+    """Which motors left their first reading, and for good, while the first command was held, ``(motors,)``."""
+    other = np.any(grasp.command_m != grasp.command_m[0], axis=1)
+    held = int(np.argmax(other)) if other.any() else len(other)
+    if held < _HELD:
+        return np.zeros(len(noise), bool)
+    settled = np.median(grasp.position_m[held // 2 : held], axis=0)
+    return np.abs(grasp.position_m[0] - settled) > _MOVED * noise
