@@ -20,6 +20,7 @@ from forcegrasp.diagnosis.moved_set import (
     timing_within_tolerance_after_all,
     within_tolerance_after_all,
 )
+from forcegrasp.diagnosis.radii_besides import Fitted, with_radii_put_right
 from forcegrasp.diagnosis.result import Diagnosis, Step
 from forcegrasp.diagnosis.search import MayBeGiven, diagnose
 from forcegrasp.effects import Effect
@@ -28,6 +29,7 @@ from forcegrasp.errors import MeasurementError
 from forcegrasp.identify import fit_set
 from forcegrasp.identify.base_fit import BaseFit
 from forcegrasp.identify.fit import Fit
+from forcegrasp.identify.fitted_model import model_of
 from forcegrasp.identify.intervals import listed
 from forcegrasp.identify.loading import Loaded
 from forcegrasp.identify.progress import Progress
@@ -40,8 +42,6 @@ from forcegrasp.physics.gripper import Gripper
 
 #: A diagnosis needs so many grasps: with fewer, nothing can be held out.
 LEAST_GRASPS = 6
-#: A set lined up, what simulates its grasps, and the base model that was fitted to it.
-Fitted = tuple[Target, Simulators, BaseFit]
 #: A diagnosis, and what simulates its grasps.
 Found = tuple[Diagnosis, Simulators]
 
@@ -158,10 +158,22 @@ class _Ways:
         self.progress(f"fitting the set without {listed(names)}, which the model misses most")
         rest = without(loaded, names)
         of_rest, simulators, base = self.fitted(rest)
-        found = self.search(of_rest, simulators, base, may_be_given=lambda *_: True)
+        found = self.search(of_rest, simulators, base, may_be_given=_it_is)
         further = None if found.stopped else self.moved(found, rest)
         found, simulators = further or (found, simulators)
         return told_of(found, names, target), simulators
+
+    def put_right_besides(self, found: Diagnosis, loaded: Loaded[MeasurementSet]) -> Found | None:
+        """See :func:`.with_radii_put_right`."""
+
+        def put_right(fault: Fault, said: Fitted) -> tuple[Fault, Fitted] | None:
+            model = model_of(found.fit, found.target, loaded, ())
+            return dataclasses.replace(self, model=model).put_right(fault, said)
+
+        try:
+            return with_radii_put_right(found, loaded, put_right, self._search_on, self.progress)
+        except REASONS as reason:
+            return dataclasses.replace(found, stopped=cut_short(reason, self.progress)), Simulators(found.fit.problem)
 
     def put_right(self, fault: Fault, said: Fitted) -> tuple[Fault, Fitted] | None:
         """The fault, or a wider one, and the set without it, fitted; None unless that leaves much less."""
@@ -175,6 +187,11 @@ class _Ways:
             if leaves_less(wider, (more[0], more[2].fit), (right[0], right[2].fit)):
                 return wider, more
         return fault, right
+
+
+def _it_is(_target: Target, _fit: Fit) -> bool:
+    """What the set gives explains what is left, so that effects which promise too little are not fitted."""
+    return True
 
 
 def _put_right_or_as_said(ways: _Ways, loaded: Loaded[MeasurementSet], said: Fitted) -> Found:
@@ -194,11 +211,14 @@ def _put_right_or_as_said(ways: _Ways, loaded: Loaded[MeasurementSet], said: Fit
         of_most = fault.of_most and not fault.is_of_few(further.fit)
         certain = likely.verdict is Verdict.DATA and not (likely.left or fault.moved or of_most)
         if not (certain or likely.stopped):  # effects may do as well without it
-            as_it_is = ways.search(*said)
+            # where nothing is left what does as well would show; what promises little need not be fitted, too
+            as_it_is = ways.search(*said, may_be_given=None if likely.left else _it_is)
             likely = dataclasses.replace(more_likely(likely, as_it_is), stopped=as_it_is.stopped)
         return likely, right[1] if likely.target.grasps is right[0].grasps else said[1]
     found, further = ways.search_and_move(loaded, said)
-    return further or (within_tolerance_after_all(found, loaded), said[1])
+    if further is None and (further := ways.put_right_besides(found, loaded)) is None:
+        return within_tolerance_after_all(found, loaded), said[1]
+    return further
 
 
 def chosen_effects(gripper: Gripper, names: Sequence[str]) -> list[type[Effect]]:

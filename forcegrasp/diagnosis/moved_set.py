@@ -129,7 +129,7 @@ def go_on_with_moved(
         return None
     given = len(found.base.fit.problem.effects)
     steps, fit = drop_all_needless(study, _with_rivals_that_do_as_well(best, models, study), best.fit, given)
-    steps, bare = _one_after_the_other(study, steps, fit)
+    steps, bare = one_after_the_other(study, steps, fit)
     again = search_on(target, simulators, dataclasses.replace(found.base, fit=bare), fit, steps)
     before, after = found.error_before, again.error_before
     return dataclasses.replace(again, fault=best.fault, error_before=before, error_moved=after), simulators
@@ -219,7 +219,7 @@ def _with_rivals_that_do_as_well(best: _Model, models: Sequence[_Model], study: 
     return steps
 
 
-def _one_after_the_other(study: Study, steps: Sequence[Step], fit: Fit) -> tuple[list[Step], Fit]:
+def one_after_the_other(study: Study, steps: Sequence[Step], fit: Fit) -> tuple[list[Step], Fit]:
     """The steps with what each effect explains of what the move of the set leaves; and a fit without any of them.
 
     Args:
