@@ -54,3 +54,14 @@ def test_noise_of_encoders():
     ]
     assert encoder_noise(grasps) == pytest.approx([SIGMA, 3 * SIGMA], rel=0.1)
     assert encoder_noise([grasp(np.array((0.03, 0.03)), (0.03, 0.03))]).tolist() == [0.0, 0.0]
+
+
+def test_one_step_of_a_rounded_encoder_is_no_motion():
+    """Fingers rest, one step from what is read first, and a few other grasps go slowly through many steps."""
+    read = np.where(TIME < 0.06, 0.0301, 0.030)
+    resting = grasp(np.stack([read, read], axis=1), (0.030, 0.030))
+    going = [grasp(0.030 - 1e-4 * ((np.arange(40).reshape(20, 2) + i) // 4), (0.030, 0.030)) for i in range(4)]
+    noise = encoder_noise([*[resting] * 12, *going])
+    assert noise == pytest.approx(1e-4 / np.sqrt(12), rel=1e-3)
+    assert start_position(resting, OPEN_M, noise).tolist() == [0.030, 0.030]
+    assert start_position(resting, OPEN_M, np.zeros(2)).tolist() == [0.0301, 0.0301]
