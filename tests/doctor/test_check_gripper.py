@@ -119,7 +119,9 @@ def test_fingers_that_open_into_the_range_of_their_joints_meet_a_stop(changed, m
 @pytest.mark.parametrize(("nominal", "told"), [("250", False), ("251", False), ("300", True)])
 def test_a_nominal_that_is_not_the_scenes(changed, nominal, told):
     found = said(changed(yaml={"nominal: 250": f"nominal: {nominal}"}))
-    lines = [line for line in found.get("warning", []) if "servo_stiffness is 300, and second.xml has 250" in line]
+    lines = [
+        line for line in found.get("warning", []) if f"servo_stiffness is {nominal}, and second.xml has 250" in line
+    ]
     assert len(lines) == told
 
 
