@@ -12,6 +12,7 @@ from forcegrasp.measure.check_copies import is_noisy
 from forcegrasp.measure.folder import show
 from forcegrasp.measure.rounding import find_step
 from forcegrasp.measure.schema import MeasuredGrasp, MeasurementSet
+from forcegrasp.measure.white_noise import white_noise
 
 #: Noise further than this from what the readings show is warned of, or refused.
 WARN, REFUSE = 1.5, 10.0
@@ -47,8 +48,8 @@ def estimate_noise(
     sigma = np.zeros(third.shape[1])
     for kind, part in kinds.items():
         values = third[:, part].ravel()
-        robust = 1.4826 * np.median(np.abs(values)) if len(values) else 0.0
-        estimate = (robust if robust > 0 else np.sqrt(np.mean(values**2)) if len(values) else 0.0) / np.sqrt(20)
+        # where most of them are 0 all count
+        estimate = (white_noise(values) or np.sqrt(np.mean(values**2)) / np.sqrt(20)) if len(values) else 0.0
         sigma[part] = estimate if finest is None else np.maximum(estimate, finest[part])
         if not (sigma[part] > 0).all():
             raise MeasurementError(
@@ -137,4 +138,4 @@ def _stride(grasp: MeasuredGrasp) -> int:
 
 def _spread(windows: np.ndarray) -> float | None:
     """Noise that makes third differences like these, ``(n,)``; None if they are too few."""
-    return 1.4826 * float(np.median(np.abs(windows))) / np.sqrt(20) if len(windows) >= _LEAST_WINDOWS else None
+    return float(white_noise(windows)) if len(windows) >= _LEAST_WINDOWS else None

@@ -8,6 +8,7 @@ import numpy as np
 
 from forcegrasp.measure import MeasuredGrasp
 from forcegrasp.measure.rounding import find_step
+from forcegrasp.measure.white_noise import white_noise
 
 # A motor starts where its first command or the end of its range is, if measured so near to it. Share of its stroke.
 _AT_REST = 1 / 45
@@ -17,16 +18,16 @@ _MOVED, _HELD = 4.0, 6
 
 
 def encoder_noise(grasps: Sequence[MeasuredGrasp]) -> np.ndarray:
-    """Standard deviation of encoders, m or rad, ``(motors,)``: third differences of white noise have variance 20 σ².
+    """Standard deviation of encoders, m or rad, ``(motors,)``.
 
     Readings that are rounded are off by as much as rounding makes them, at least.
     """
-    third = np.abs(np.concatenate([np.diff(grasp.position_m, n=3, axis=0) for grasp in grasps]))
+    third = np.concatenate([np.diff(grasp.position_m, n=3, axis=0) for grasp in grasps])
     if not len(third):
         return np.zeros(third.shape[1])
     read = np.concatenate([grasp.position_m for grasp in grasps])
     rounding = np.array([find_step(column) for column in read.T]) / np.sqrt(12)
-    return np.maximum(1.4826 * np.median(third, axis=0) / np.sqrt(20), rounding)
+    return np.maximum(white_noise(third, axis=0), rounding)
 
 
 def start_position(grasp: MeasuredGrasp, stroke: float, noise: np.ndarray) -> np.ndarray:

@@ -41,10 +41,8 @@ def test_radii_are_put_right_beside_the_effect_that_had_hidden_them(diagnosis):
     fitted = dict(zip((entry.name for entry in diagnosis.fit.problem.entries), diagnosis.fit.values, strict=True))
     for name, off in OFF_M.items():
         assert fitted[f"radius_m of {name}"] == pytest.approx(truth[name], abs=1e-4)
-        assert (
-            f"the radius of {name} is {1e3 * truth[name]:.1f} mm, the set says {1e3 * (truth[name] + off):.1f} mm"
-            in (answer(diagnosis))
-        )
+        told = f"the radius of {name} is {1e3 * truth[name]:.1f} mm, the set says {1e3 * (truth[name] + off):.1f} mm"
+        assert told in answer(diagnosis)
 
 
 def test_radii_are_not_doubted_where_little_is_left_or_what_was_found_is_tied(diagnosis, monkeypatch):
