@@ -26,7 +26,7 @@ _AS_GOOD = 1.02
 
 
 def ask_again(
-    study: Study, steps: Sequence[Step], fit: Fit, effects: Sequence[type[Effect]] = ()
+    study: Study, steps: Sequence[Step], fit: Fit, effects: Sequence[type[Effect]] = (), at_floor: bool = False
 ) -> tuple[list[Step], Fit]:
     """The steps less those rivals that the whole model tells apart, or with one in the first one's place; and the fit.
 
@@ -38,13 +38,17 @@ def ask_again(
       steps: that found the effects.
       fit: with all effects.
       effects: that may do better than one of their family that was found when others were still missing.
+      at_floor: whether the model leaves no more than noise. Nothing does better then; but what was found at once may
+        still be of the set, where it was taken for the gripper's, or the other way round.
     """
     left, found = list(steps), steps_of(fit, steps)
     for step in found:
         if step.candidates[0].without is not None:
-            rivals = list(_in_its_place(study, step, fit, effects, of_any_family=True, most=_AS_GOOD))
+            own = fit.effect(step.effects[0]).effect
+            asked = [e for e in effects if not at_floor or e.of_set != own.of_set]
+            rivals = list(_in_its_place(study, step, fit, asked, of_any_family=True, most=_AS_GOOD))
         elif step is not found[-1]:
-            rivals = [*rivals_in(step, fit), *_in_its_place(study, step, fit, effects)]
+            rivals = [*rivals_in(step, fit), *_in_its_place(study, step, fit, () if at_floor else effects)]
         else:
             rivals = []
         if rivals:

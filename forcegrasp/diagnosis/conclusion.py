@@ -60,7 +60,7 @@ def concluded(begun: Begun, study: Study, steps: Sequence[Step], fit: Fit, in_a_
     much_left = bool(left) and error_after > MUCH * floor
     steps = settle_ties([with_close_rivals(step) for step in steps] if much_left else steps)
     if not much_left and not in_a_hurry:  # what is still missing could decide between them again
-        steps, asked = ask_again(study, steps, fit, begun.effects if error_after > floor else ())
+        steps, asked = ask_again(study, steps, fit, begun.effects, at_floor=error_after <= floor)
         if asked is not fit:
             fit = asked
             error_after, (left, noise, alone) = study.error(study.heldout(fit)), left_by_many(study, fit)

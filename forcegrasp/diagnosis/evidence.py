@@ -36,18 +36,21 @@ _FITS_WORSE = 1.5
 LEAST_LEAD = 10.0
 
 
-def is_significant(candidate: Candidate, least_gain: float, least_share: float = LEAST_SHARE) -> bool:
+def is_significant(
+    candidate: Candidate, least_gain: float, least_share: float = LEAST_SHARE, errors: float = 1.0
+) -> bool:
     """Whether noise would hardly do as well.
 
     Args:
       candidate: an effect.
       least_gain: the share by which some signal's error must fall.
       least_share: the share of the mean square beyond the noise that it must explain.
+      errors: how many of its standard errors the held-out gain must have.
     """
     return (
         candidate.p_family <= ALARM
         and candidate.is_plausible
-        and (is_beyond_chance(candidate.evidence, LEAST_RISE) or _shows_in_some(candidate))
+        and (is_beyond_chance(candidate.evidence, LEAST_RISE, errors) or _shows_in_some(candidate, errors))
         and candidate.largest_fall >= least_gain
         and candidate.share >= least_share
     )
@@ -61,14 +64,9 @@ def may_be_besides(steps: Sequence[Step]) -> Candidate | None:
     return best if not best.replaces and is_significant(best, 0.0, LEAST_SHARE_OF_MANY) else None
 
 
-def place(candidate: Candidate, least_gain: float) -> tuple[bool, float]:
-    """What candidates are ordered by: a true effect that explains too little yet must not hide one that does."""
-    return not is_significant(candidate, least_gain), -candidate.heldout_gain
-
-
-def _shows_in_some(candidate: Candidate) -> bool:
+def _shows_in_some(candidate: Candidate, errors: float) -> bool:
     """Whether the windows of some recordings are surely better with an effect, and no recording surely worse."""
-    return is_beyond_chance(candidate.gains, LEAST_RISE) and not candidate.harms
+    return is_beyond_chance(candidate.gains, LEAST_RISE, errors) and not candidate.harms
 
 
 def indistinguishable(winner: Candidate, other: Candidate) -> bool:
@@ -149,8 +147,8 @@ def _leads(winner: Candidate, other: Candidate, least: float = 0.0) -> bool:
     return is_beyond_chance(winner.evidence - other.evidence, least)
 
 
-def is_beyond_chance(gains: np.ndarray, least: float) -> bool:
-    """Whether the sum of what grasps gain, ``(G,)``, is beyond its standard error, and beyond ``least``."""
+def is_beyond_chance(gains: np.ndarray, least: float, errors: float = 1.0) -> bool:
+    """Whether the sum of what grasps gain, ``(G,)``, is beyond so many of its standard errors, and beyond ``least``."""
     gains = gains[np.isfinite(gains)]
     error = gains.std(ddof=1) * np.sqrt(len(gains)) if len(gains) > 1 else np.inf
-    return bool(gains.sum() > max(error, least))
+    return bool(gains.sum() > max(errors * error, least))

@@ -23,8 +23,9 @@ from forcegrasp.diagnosis.result import Diagnosis, Step, kept_steps
 from forcegrasp.diagnosis.screen import Screen
 from forcegrasp.diagnosis.so_far import SoFar
 from forcegrasp.diagnosis.split import split
-from forcegrasp.diagnosis.step import FAR, look_further
+from forcegrasp.diagnosis.step import look_further
 from forcegrasp.diagnosis.study import Study
+from forcegrasp.diagnosis.to_the_end import FAR
 from forcegrasp.diagnosis.verdict import EXPLAINED, EXPLAINED_FAR, MUCH, explained_share
 from forcegrasp.effects import Effect
 from forcegrasp.identify.base_fit import BaseFit

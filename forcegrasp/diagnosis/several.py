@@ -35,6 +35,8 @@ from forcegrasp.identify.side_by_side import side_by_side
 Keep = Callable[[list[Step], Fit], bool]
 # So many effects at a time, in so many rounds; each is to explain this share of the squares beyond the noise.
 _AT_ONCE, _ROUNDS, _LEAST = 5, 6, 0.02
+# One effect alone is not several: that one is looked for by itself.
+_SEVERAL = 2
 # Slopes are measured anew where a fit by those of its start came to this share of the cost there.
 _WELL_BELOW = 0.8
 # Directions whose slopes are a smaller share of the steepest one's are left alone.
@@ -119,7 +121,7 @@ def add_several(
         untried = [e for e in effects if e.name not in barred and may_join(e, known)]
         screen = straight if straight is not None and fit is before else Screen(effects, study)
         chosen = [one.setting for one in _chosen(study, fit, screen, untried, of_set=straight is not None)]
-        if not chosen:
+        if len(chosen) < (_SEVERAL if fit is before else 1):
             break
         study.progress(f"fitting together {', '.join(one.effect.name for one in chosen)}")
         further, needless = _without_needless(study, _fitted_together(chosen, study, fit), given)

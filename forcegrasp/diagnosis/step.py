@@ -13,28 +13,27 @@ from forcegrasp.diagnosis.evidence import (
     add_nothing,
     indistinguishable,
     is_significant,
-    place,
 )
 from forcegrasp.diagnosis.judge import judged
-from forcegrasp.diagnosis.look_beside import look_beside
 from forcegrasp.diagnosis.noise_check import unexpected_noise
-from forcegrasp.diagnosis.other_starts import other_starts
 from forcegrasp.diagnosis.refine import LOST_IF_FITTED, NO_BETTER, refine, refine_anyway
 from forcegrasp.diagnosis.result import Candidate, Step
 from forcegrasp.diagnosis.screen import MAX_GAIN_FACTOR, Screen
 from forcegrasp.diagnosis.signatures import Background, Score, best_effects, direction, of_best_effects
 from forcegrasp.diagnosis.study import Study
-from forcegrasp.diagnosis.verdict import EXPLAINED_FAR, LEAST_SHARE
+from forcegrasp.diagnosis.to_the_end import ALL_FITTED, to_the_end
+from forcegrasp.diagnosis.verdict import EXPLAINED_FAR, LEAST_SHARE, MUCH
 from forcegrasp.effects import Effect
 from forcegrasp.identify.base_fit import rms_error
-from forcegrasp.identify.fit import Fit, fit_exactly, fit_once
-from forcegrasp.identify.led_astray import fit_led_by_others
+from forcegrasp.identify.fit import Fit, fit_exactly
 from forcegrasp.identify.noise_floor import excess
 from forcegrasp.identify.side_by_side import side_by_side
-from forcegrasp.identify.target import Target
 
 #: An effect must lower the error of some signal in some phase by this share; by more where all is at the floor already.
 LEAST_GAIN, LEAST_GAIN_AT_FLOOR = 0.02, 0.1
+# Beside effects that leave little its gain must be so many standard errors: a few grasps whose contacts went their own
+# way may hold all that is left. What was there gained three or more, what was not 1.4 to 1.7.
+_SURE = 2.0
 # What all signatures together promise, so that effects that explain little each are tried: straight as they are, they
 # promise less than effects explain, and what a set gives may be off besides.
 _WORTH_A_TRIAL = 0.4
@@ -47,10 +46,6 @@ _FITTED_ANYWAY = 12
 _REFINED = 3
 # Fitted to the end, the cost of a rough fit falls by this share of it at most, or of what the effect gained.
 _FALLS, _GAINS_MORE = 0.2, 0.1
-# An error of so many times the noise leaves nothing to look for.
-_ALL_FITTED = 1.05
-#: Beyond so many times the noise no start of a fit will find what is left: it is not one effect.
-FAR = 10.0
 
 
 def look_further(
@@ -83,7 +78,8 @@ def look_further(
         study.progress(f"trying {len(effects)} effects")
     look = screen.look(study, fit, start.background, effects, start.noise, rng)
     if anyway:
-        candidates = start.fit_anyway(look.scores, look.null)
+        tried = start.fit_anyway(look.scores, look.null)
+        candidates = [one for one in tried if start.shows(one, LEAST_SHARE_OF_MANY)]  # signatures promised nothing
     else:
         near = [score for score in look.worth_a_fit if score.gain > _NEAR_THE_BEST * look.worth_a_fit[0].gain]
         count = max(_REFITTED, len({score.setting.effect for score in near}))
@@ -94,7 +90,7 @@ def look_further(
     for candidate in sorted(candidates, key=start.place):
         variants.setdefault(candidate.effect.name, []).append(candidate)
     ordered, redundant = start.refine_on_reference_tier(list(variants.values()), effects, look.null)
-    of_many = bool(ordered) and not is_significant(ordered[0], start.least_gain)
+    of_many = bool(ordered) and not start.shows(ordered[0])
     if not ordered or (of_many and not start.may_be_of_many(ordered[0], look.share_together, least_promise)):
         return Step((), ordered, look.scores, start.error, start.error)
     winner, later = start.simpler_first(ordered)
@@ -113,11 +109,6 @@ def look_further(
 def _least_cost(rough: Fit, without: Fit) -> float:
     """What a rough fit with an effect may come down to at the end, ``without`` being the fit without it."""
     return rough.cost - max(_FALLS * rough.cost, _GAINS_MORE * (without.cost - rough.cost))
-
-
-def _leaves_more(fit: Fit, target: Target) -> bool:
-    """Whether a fit leaves more than noise, but not so much that it is hopeless."""
-    return _ALL_FITTED < rms_error(fit, target) < FAR
 
 
 def _as_good(best: Candidate, others: Sequence[Candidate]) -> list[Candidate]:
@@ -141,14 +132,20 @@ class _Start:
         self.noise = unexpected_noise(self.held, study.numerical, study.target, fit.predicted)
         left = excess(self.held, study.numerical, study.target)
         self.least_gain = LEAST_GAIN if left else LEAST_GAIN_AT_FLOOR
+        beside_others = fit.problem.effects and self.error < MUCH and not study.target.gripper.is_servo
+        self._least_errors = _SURE if beside_others else 1.0
+
+    def shows(self, candidate: Candidate, least_share: float = LEAST_SHARE) -> bool:
+        """Whether noise, or what a few grasps hold, would hardly do as well; see :func:`.evidence.is_significant`."""
+        return is_significant(candidate, self.least_gain, least_share, self._least_errors)
 
     def place(self, candidate: Candidate) -> tuple[bool, float]:
-        """See :func:`.evidence.place`."""
-        return place(candidate, self.least_gain)
+        """What candidates are ordered by: a true effect that explains too little yet must not hide one that does."""
+        return not self.shows(candidate), -candidate.heldout_gain
 
     def may_be_of_many(self, candidate: Candidate, share_together: float, least: float) -> bool:
         """Whether an effect that explains little is worth a trial: all signatures together must promise enough."""
-        return is_significant(candidate, self.least_gain, LEAST_SHARE_OF_MANY) and share_together >= least
+        return self.shows(candidate, LEAST_SHARE_OF_MANY) and share_together >= least
 
     def refit(self, scores: Sequence[Score], null: np.ndarray) -> list[Candidate]:
         """Rough fits with one more effect, from where the best signatures put them."""
@@ -180,7 +177,7 @@ class _Start:
 
     def _may_be_a_look_alike(self, best: Candidate) -> bool:
         """Whether an effect that was found leaves more than noise."""
-        leaves_more = rms_error(best.fit, self._study.target) > _ALL_FITTED
+        leaves_more = rms_error(best.fit, self._study.target) > ALL_FITTED
         return leaves_more and not (self.place(best)[0] or best.replaces or best.effect.of_set)
 
     def simpler_first(self, ordered: Sequence[Candidate]) -> tuple[Candidate, set[str]]:
@@ -198,10 +195,10 @@ class _Start:
         """
         best, *others = ordered
         of_set = [c for c in others if c.effect.of_set]
-        if best.replaces or not of_set or rms_error(best.fit, self._study.target) <= _ALL_FITTED:
+        if best.replaces or not of_set or rms_error(best.fit, self._study.target) <= ALL_FITTED:
             return best, set()
         for simpler in others:
-            enough = families.is_richer(best.effect, simpler.effect) and is_significant(simpler, self.least_gain)
+            enough = families.is_richer(best.effect, simpler.effect) and self.shows(simpler)
             if enough and any(indistinguishable(simpler, c) for c in of_set):
                 (first,) = self._at_the_end([simpler], {simpler.effect.name: []})
                 return first, {best.effect.name}
@@ -297,6 +294,8 @@ class _Start:
             if first is None:
                 return (), redundant
             if first.effect.name not in names and not first.replaces:  # the last were fitted to the end already
+                if names and not self.shows(first, LEAST_SHARE_OF_MANY):
+                    return tuple(every), redundant  # and it is worth no more, nor is any after it
                 # fitted to the end the others are no better than this rough one: it is to be fitted, too
                 names.add(first.effect.name)
                 (every[0],) = self._at_the_end([first], alike)
@@ -351,37 +350,12 @@ class _Start:
         every = [one for c in fitted for one in (c, *alike[c.effect.name])]
         for one in every:
             self._study.progress(f"fitting {one.effect.name} {one.setting.variant} to the end")
-        ends = list(zip(side_by_side([partial(self._to_the_end, one.fit) for one in every]), every, strict=True))
+        ends = list(zip(side_by_side([partial(to_the_end, one.fit, self._study) for one in every]), every, strict=True))
         judged = {}
         for c in fitted:
             fit, best = min((end for end in ends if end[1].effect is c.effect), key=lambda end: end[0].cost)
             judged[c.effect.name] = self._judge(fit, best.p_family, best.signature)
         return [judged.get(c.effect.name, c) for c in candidates]
-
-    def _to_the_end(self, rough: Fit) -> Fit:
-        target, simulators = self._study.target, self._study.simulators
-        exact = fit_exactly(target, rough.problem, simulators, rough.vector, rough.jacobian)
-        exact = look_beside(exact, target, simulators)
-        if _leaves_more(exact, target):
-            exact = fit_led_by_others(exact, target, simulators)
-        if not _leaves_more(exact, target):
-            return exact
-        # it may have ended where an effect's size meets a step of the simulation, or in another valley
-        # few grasps tell where; slopes of all but its last effect hardly change
-        some, part = self._study.on_few(exact)
-        known = part.jacobian[..., : part.problem.first_entry(len(part.problem.effects) - 1)]
-        rough_fit = partial(fit_once, some.target, part.problem, some.simulators)
-        own, *others = side_by_side(
-            [
-                partial(rough_fit, start, part.correction, rounds=0, known_slopes=known)
-                for start in (part.vector, *other_starts(part, some))
-            ]
-        )
-        best = min(others, key=lambda fit: fit.cost, default=own)
-        if best.cost > NO_BETTER * own.cost:
-            return exact
-        again = fit_exactly(target, exact.problem, simulators, exact.moved(best.problem, best.vector))
-        return min([exact, again], key=lambda fit: fit.cost)
 
     def _judge_by_gain(self, refit: Fit, null: np.ndarray, replaces: str = "") -> Candidate:
         """The same of a fit that did not start from a signature."""

@@ -24,6 +24,8 @@ _HEAVIER = 0.1
 _CREEPS = 1e-4
 # Share of a number of the scene by which a description's may differ: it is rounded.
 _ROUNDED = 0.01
+# Times the noise of the encoders by which a coupling may give way: an effect says where a real one does.
+_GIVES_WAY = 1.0
 # Times the noise of the encoders by which fingers may run into their end stops.
 _INTO_A_STOP = 3.0
 _PAGE = "see docs/your-gripper.md"
@@ -122,6 +124,10 @@ def _grasp(gripper: Gripper) -> Iterator[Finding]:
         yield fine("stiffness", f"pads are {depths} mm in the object then: {float(f'{stiff:.3g}'):g} N/m on each side")
     if gripper.force == "sensors":
         yield from _sensors(gripper, pressed, force[-1])
+    if (apart := _apart(plant)) > _GIVES_WAY * gripper.training.position_std > 0:
+        told = f"gives way by {1e3 * apart:.2g} m{gripper.unit} under this force, and no encoder tells"
+        hard = 'solref="0.004 1" solimp="0.99 0.999 0.0001"'
+        yield warning("coupling", told, f"make the scene's equality constraints hard: {hard}, {_PAGE}")
     if (deep := _into_a_stop(gripper, plant)) > _INTO_A_STOP * gripper.training.position_std:
         told = f"fingers that open at once run {1e3 * deep:.2g} m{gripper.unit} into the joints' range, which is soft"
         yield note("end stops", f"{told}; give joints the range that your gripper's own stops leave them, {_PAGE}")
@@ -154,6 +160,17 @@ def _sensors(gripper: Gripper, pressed: np.ndarray, read: np.ndarray) -> Iterato
             yield warning("sensors", told, f"look at its site or bodies, and its sign; {_PAGE}")
         else:
             yield fine("sensors", told)
+
+
+def _apart(plant: Plant) -> float:
+    """By how much equality constraints are violated where the plant stands, m or rad; 0 if there are none."""
+    import mujoco
+    import numpy as np
+
+    model, data = plant.batch.get_model(0), plant.batch.get_data(0)
+    mujoco.mj_forward(model, data)
+    of_couplings = data.efc_type == mujoco.mjtConstraint.mjCNSTR_EQUALITY
+    return float(np.abs(data.efc_pos[of_couplings]).max(initial=0.0))
 
 
 def _heavier(plant: Plant) -> float:

@@ -121,7 +121,12 @@ def _cell_json(cell: Cell) -> dict[str, Any]:
 
 def at_floor(error: float, floor: float) -> bool:
     """Whether a model is as good as the data can tell."""
-    return error <= max(floor, 1.02) * AT_FLOOR
+    return error <= _most(floor)
+
+
+def _most(floor: float) -> float:
+    """The largest error ÷ noise of a model that is as good as the data can tell."""
+    return max(floor, 1.02) * AT_FLOOR
 
 
 def worst_cell(cells: list[Cell]) -> Cell:
@@ -147,6 +152,8 @@ def answer(comparison: Comparison) -> str:
         )
     total = f"{error}; up to {floor:.2f} is noise."
     if at_floor(value, floor):
+        if round(value, 2) > round(floor, 2):
+            total = f"{error}; up to {floor:.2f} is noise, and up to {_most(floor):.2f} next to nothing."
         return f"{total} These measurements show no failure of the model."
     return (
         f"{total} It is largest in {words(cell.phase)}, {words(cell.signal)}: {amount(cell.rms, cell.unit)},"

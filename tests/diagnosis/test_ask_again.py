@@ -12,6 +12,7 @@ import pytest
 from forcegrasp.diagnosis.ask_again import ask_again
 from forcegrasp.diagnosis.moved_set import _models, _with_rivals_that_do_as_well
 from forcegrasp.diagnosis.result import Step
+from forcegrasp.effects import get_effect
 from forcegrasp.effects.for_gripper import effect_of
 from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.identify.fit_set import fit_model
@@ -117,6 +118,26 @@ def test_what_was_found_at_once_is_asked_among_look_alikes_of_any_family(found, 
     ask_again(study, at_once, fit, alike)
     assert (FRICTION, [DEADBAND]) in asked
     assert (LAG, ["command_delay"]) in asked  # the last of them, too
+
+
+@pytest.mark.parametrize("at_once", [True, False])
+def test_where_noise_alone_is_left_only_the_set_is_asked_in_the_place_of_what_was_found_at_once(
+    found, monkeypatch, at_once
+):
+    """A gap of 0.3 mm and friction were friction and objects that are 0.15 mm smaller, without a word of the gap."""
+    study, steps, fit = tied(found, FRICTION)
+    asked = []
+
+    def in_its_place(study, step, fit, effects, **_):
+        asked.append((step.effects[0], [one.name for one in effects]))
+        return []
+
+    monkeypatch.setattr("forcegrasp.diagnosis.ask_again._in_its_place", in_its_place)
+    if at_once:
+        steps = [dataclasses.replace(s, candidates=(dataclasses.replace(s.candidates[0], without=fit),)) for s in steps]
+    others = [get_effect(name) for name in (DEADBAND, "object_size")]
+    ask_again(study, steps, fit, others, at_floor=True)
+    assert asked == ([(FRICTION, ["object_size"]), (LAG, ["object_size"])] if at_once else [(FRICTION, [])])
 
 
 # --- which models are asked whether a move of what the set gives explains what they leave ---------------------------

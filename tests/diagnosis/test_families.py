@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from forcegrasp.diagnosis import families
+from forcegrasp.diagnosis import families, step
 from forcegrasp.diagnosis.add_effect import add_effect
 from forcegrasp.diagnosis.diagnose_set import diagnose_set
 from forcegrasp.diagnosis.evidence import add_nothing
@@ -188,7 +188,7 @@ def test_what_takes_an_effects_place_does_so_though_another_seemed_better_at_fir
     nothing = (np.zeros_like(made_up.base.fit.residual),) * 2
     study = Study(made_up.target, Simulators(made_up.base.fit.problem), (), nothing)
     start = _Start(study, made_up.base.fit)
-    monkeypatch.setattr(start, "_to_the_end", lambda rough: rough)
+    monkeypatch.setattr(step, "to_the_end", lambda rough, _: rough)
     monkeypatch.setattr(start, "_judge", lambda *_: dataclasses.replace(other, gains=np.full(8, 10.0)))
     ordered, _ = start.refine_on_reference_tier([[other], [richer]], [], np.zeros(1))
     assert [(c.effect.name, c.replaces) for c in ordered] == [("back_emf", "force_limit"), ("rate_limit", "")]
@@ -209,11 +209,11 @@ def test_variants_that_rough_fits_cannot_tell_apart_are_all_fitted_to_the_end(ma
     nothing = (np.zeros_like(fit.residual),) * 2
     start, ended = _Start(Study(made_up.target, Simulators(fit.problem), (), nothing), fit), []
 
-    def to_the_end(rough):
+    def to_the_end(rough, _):
         ended.append(rough)
         return dataclasses.replace(rough, residual=0.5 * rough.residual) if rough is play.fit else rough
 
-    monkeypatch.setattr(start, "_to_the_end", to_the_end)
+    monkeypatch.setattr(step, "to_the_end", to_the_end)
     monkeypatch.setattr(start, "_judge", lambda fit, *_: dataclasses.replace(loose, fit=fit))
     ordered, _ = start.refine_on_reference_tier([[loose, play, command]], [], np.zeros(1))
     assert [any(one is rough for one in ended) for rough in (loose.fit, play.fit, command.fit)] == [True, True, False]

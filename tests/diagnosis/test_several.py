@@ -155,9 +155,18 @@ def test_effects_that_add_up_are_found_at_once(small, monkeypatch):
         assert diagnosis.fit.effect(name).values == pytest.approx(true, rel=0.15), name
 
 
+def test_one_effect_alone_is_not_several(small, monkeypatch):
+    """It was looked for by itself before."""
+    study, base = small
+    monkeypatch.setattr(several, "_AT_ONCE", 1)
+    monkeypatch.setattr(several, "_fitted_together", lambda *_: pytest.fail("fitted one alone"))
+    assert add_several(study, base.fit, (), CATALOGUE, 0, np.random.default_rng(0), kept_by_nobody) is None
+
+
 def test_rounds_end_where_one_leaves_little(small, monkeypatch):
     study, base = small
     monkeypatch.setattr(several, "_AT_ONCE", 1)
+    monkeypatch.setattr(several, "_SEVERAL", 1)
     rounds = []
 
     def keep(steps, fit):

@@ -119,6 +119,43 @@ def test_a_rough_fit_that_gained_nearly_as_much_is_held_against_what_leaves_more
     assert start._rivals(simple, [rough], set()) == []
 
 
+@pytest.mark.parametrize(("known", "times", "errors"), [(False, 1.3, 1.0), (True, 1.3, 2.0), (True, 1.6, 1.0)])
+def test_where_effects_leave_little_a_gain_is_to_be_two_standard_errors(creeping, alike, known, times, errors):
+    """Of a backlash's 24 grasps two held what was left, whose contacts had gone another way: a compliance was found."""
+    study, base = creeping
+    fit = alike.candidates[0].fit if known else base.fit
+    noise = np.random.default_rng(2).standard_normal(fit.residual.shape) * study.target.mask[..., None]
+    start = _Start(study, dataclasses.replace(fit, residual=times * noise))
+    assert start.error == pytest.approx(times, rel=0.05)
+    count = len(study.target.grasps)
+    even = 10.0 * np.sqrt(count / (count - 1)) * np.resize([-1.0, 1.0], count)  # their standard deviation is 10
+    for gain in (0.99 * errors, 1.01 * errors):
+        gains = even - even.mean() + gain * even.std(ddof=1) / np.sqrt(count)
+        candidate = dataclasses.replace(alike.candidates[0], gains=gains + 0, p_family=0.002)
+        assert start.shows(candidate) == (gain > errors)
+
+
+def test_what_is_worth_no_fit_roughly_is_not_fitted_to_the_end_where_others_were(creeping, alike, monkeypatch):
+    study, base = creeping
+    best, other = alike.candidates[:2]
+    nothing = dataclasses.replace(best, gains=0 * best.gains)
+    fitted: list[str] = []
+    monkeypatch.setattr(
+        _Start, "_at_the_end", lambda _, some, __: fitted.extend(c.effect.name for c in some) or [nothing for _ in some]
+    )
+    for gains in (other.gains, 0 * other.gains + 0.01):
+        fitted.clear()
+        start = _Start(study, base.fit)
+        start.refine_on_reference_tier([[best], [dataclasses.replace(other, gains=gains)]], [], np.zeros(1))
+        assert (other.effect.name in fitted) == (gains.sum() > 1)
+
+
+def test_signatures_that_promise_nothing_ask_for_no_fit_to_the_end_where_rough_fits_show_nothing(creeping, monkeypatch):
+    monkeypatch.setattr(_Start, "_at_the_end", lambda _, some, __: pytest.fail("fitted to the end") if some else [])
+    monkeypatch.setattr(_Start, "shows", lambda *_: False)
+    assert looked(creeping, [SMOOTH, DELAY], anyway=True).effects == ()
+
+
 def test_where_noise_alone_is_left_no_look_alike_is_fitted(creeping, monkeypatch):
     monkeypatch.setattr("forcegrasp.diagnosis.step.refine_anyway", lambda *_: pytest.fail("fitted another"))
     assert looked(creeping, [PRESLIDING, SMOOTH], "smooth_friction").effects == ("smooth_friction",)
@@ -273,10 +310,10 @@ def test_what_an_effect_contains_comes_first_where_the_set_may_be_wrong_instead(
     """Encoders that are off, and objects that are smaller than the set says, are backlash that differs by finger."""
     monkeypatch.setattr(step_module, "rms_error", lambda *_: left)
     monkeypatch.setattr(step_module, "indistinguishable", lambda *_: alike)
-    monkeypatch.setattr(step_module, "is_significant", lambda one, least: least < 0.1)
+    monkeypatch.setattr(step_module, "is_significant", lambda one, least, *_: least < 0.1)
     monkeypatch.setattr(_Start, "_at_the_end", lambda _, some, __: some)
     start = object.__new__(_Start)
-    start._study, start.least_gain = SimpleNamespace(target=None), 0.02
+    start._study, start.least_gain, start._least_errors = SimpleNamespace(target=None), 0.02, 1.0
     names = ("backlash_asymmetry", "backlash", "object_size" if of_set else "encoder_bias")
     ordered = [SimpleNamespace(effect=effect_of(n, light_gripper()), replaces="", fit=None) for n in names]
     winner, later = start.simpler_first(ordered)

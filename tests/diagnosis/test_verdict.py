@@ -14,11 +14,11 @@ from forcegrasp.diagnosis.evidence import (
     LEAST_SHARE_OF_MANY,
     indistinguishable,
     is_significant,
-    place,
     with_close_rivals,
 )
 from forcegrasp.diagnosis.result import Diagnosis, Step, settle_ties
 from forcegrasp.diagnosis.signatures import Score, _single, of_best_effects, share_together
+from forcegrasp.diagnosis.step import _Start
 from forcegrasp.diagnosis.verdict import conclude, explained_share
 from forcegrasp.effects import get_effect
 from forcegrasp.effects.setting import EffectSetting
@@ -88,6 +88,12 @@ def test_what_convinces(made_up, changed, taken):
     assert is_significant(candidate(made_up, **changed), 0.02) == taken
 
 
+def test_a_gain_may_have_to_be_several_of_its_standard_errors(made_up):
+    gains = np.array([0.0, 0.0, 10.0, 10.0]) * np.sqrt(3) - 5 * np.sqrt(3) + 10.1  # a sum of 40.4, uncertain by 20
+    assert is_significant(candidate(made_up, gains=gains), 0.02, errors=2.0)
+    assert not is_significant(candidate(made_up, gains=gains), 0.02, errors=2.1)
+
+
 @pytest.mark.parametrize(("ahead", "equal"), [(4.9, True), (5.1, False)])
 def test_a_lead_within_its_standard_error_decides_nothing(made_up, ahead, equal):
     """Leads of four grasps with standard deviation 10: their sum is uncertain by 20."""
@@ -139,7 +145,9 @@ def test_what_explains_too_little_yet_hides_nothing_that_explains_enough(made_up
     ahead = candidate(made_up, gains=np.full(4, 110.0), share=0.2)
     enough = candidate(made_up, gains=np.full(4, 100.0), share=0.6)
     less = candidate(made_up, gains=np.full(4, 50.0), share=0.6)
-    assert sorted([ahead, less, enough], key=lambda c: place(c, 0.02)) == [enough, less, ahead]
+    start = object.__new__(_Start)
+    start.least_gain, start._least_errors = 0.02, 1.0
+    assert sorted([ahead, less, enough], key=start.place) == [enough, less, ahead]
 
 
 def test_one_of_many_may_explain_less(made_up):

@@ -24,6 +24,7 @@ from forcegrasp.cli.options import SCHEMAS
 from forcegrasp.cli.verbs import VERBS
 from forcegrasp.config import ObservationConfig, PhysicsConfig
 from forcegrasp.deploy import Contract, controller
+from forcegrasp.doctor.gripper import check_gripper
 from forcegrasp.env import build_env
 from forcegrasp.errors import ConfigError
 from forcegrasp.observation import PARTS, Part
@@ -156,6 +157,18 @@ def test_gripper_of_the_page_does_what_the_page_says(page):
     assert gripper.stroke == 0.04
 
 
+def complete(name: str) -> None:
+    """Sections of an example take the place of those of the whole scene and description."""
+    scene = ElementTree.parse("my_gripper.xml").getroot()
+    for section in ElementTree.parse(f"{name}.xml").getroot():
+        for other in scene.findall(section.tag):
+            scene.remove(other)
+        scene.append(section)
+    Path(f"{name}.xml").write_bytes(ElementTree.tostring(scene))
+    description = yaml.safe_load(Path("my_gripper.yaml").read_text()) | yaml.safe_load(Path(f"{name}.yaml").read_text())
+    Path(f"{name}.yaml").write_text(yaml.safe_dump(description))
+
+
 @pytest.mark.parametrize(
     ("name", "columns"),
     [
@@ -167,16 +180,8 @@ def test_gripper_of_the_page_does_what_the_page_says(page):
     ],
 )
 def test_other_mechanisms_of_the_page_grasp(page, name, columns):
-    """Sections of an example take the place of those of the whole scene and description."""
     code = page("docs/your-gripper.md")
-    scene = ElementTree.parse("my_gripper.xml").getroot()
-    for section in ElementTree.parse(f"{name}.xml").getroot():
-        for other in scene.findall(section.tag):
-            scene.remove(other)
-        scene.append(section)
-    Path(f"{name}.xml").write_bytes(ElementTree.tostring(scene))
-    description = yaml.safe_load(Path("my_gripper.yaml").read_text()) | yaml.safe_load(Path(f"{name}.yaml").read_text())
-    Path(f"{name}.yaml").write_text(yaml.safe_dump(description))
+    complete(name)
     gripper = load_gripper(f"./{name}.yaml")
     assert " ".join(c.column for c in (*gripper.positions, *gripper.commands, *gripper.forces)) == columns
     plant = Plant(gripper, n=1)
@@ -187,6 +192,20 @@ def test_other_mechanisms_of_the_page_grasp(page, name, columns):
     if name == "coupled_slides":  # the page's own check is for one motor, too
         mpl.use("Agg")
         run("docs/your-gripper.md", code.replace("my_gripper.yaml", f"{name}.yaml"))
+
+
+HARD = ' solref="0.004 1" solimp="0.99 0.999 0.0001"'
+
+
+@pytest.mark.parametrize("name", ["coupled_slides", "coupled_hinges", "motor_effort"])
+def test_doctor_warns_of_couplings_without_the_lines_that_make_them_hard(page, name):
+    page("docs/your-gripper.md")
+    for line in (HARD, ""):
+        scene = Path(f"{name}.xml")
+        scene.write_text(scene.read_text().replace(HARD, line))
+        complete(name)
+        told = [finding for finding in check_gripper(f"./{name}.yaml") if finding.about == "coupling"]
+        assert [finding.level for finding in told] == ([] if line else ["warning"])
 
 
 SIDES = "left: {joint: left, force_sensor: left}\n  right: {joint: right, force_sensor: right}"

@@ -89,6 +89,13 @@ def test_compare_without_failure_says_so(made_up):
     assert not any("goes with" in line for line in comparison_report.details(comparison))
 
 
+def test_compare_says_of_an_error_a_little_beyond_the_noise_that_it_is_next_to_nothing(made_up):
+    calm = 1.03 * np.random.default_rng(3).standard_normal(made_up.comparison.residual.shape)
+    comparison = dataclasses.replace(made_up.comparison, residual=calm, heldout=calm.copy(), floor=1.0)
+    told = comparison_report.answer(comparison)
+    assert "up to 1.00 is noise, and up to 1.05 next to nothing. These measurements show no failure" in told
+
+
 def test_compare_can_not_tell_where_numerical_error_is_large(made_up):
     one_and_a_half = 1.5 * np.random.default_rng(3).standard_normal(made_up.comparison.residual.shape)
     comparison = dataclasses.replace(made_up.comparison, residual=one_and_a_half, heldout=one_and_a_half, floor=2.5)
