@@ -123,7 +123,7 @@ def _add_effects(so_far: SoFar, begun: Begun, rng: np.random.Generator, may_be_g
         much = much and not (may_be_given is not None and may_be_given(study.target, fit))
         if much and untried and screened is not fit:  # beside what was found since, others may do something else
             screen, screened = Screen(effects, study), fit
-            step = look_further(study, fit, screen, untried, rng)
+            step = look_further(study, fit, screen, untried, rng, before=step)
         much = much and not leaves_forms(study, fit, begun.error, begun.floor)
         if much and not step.effects:
             worth_it = untried and not tried_anyway and step.error_before < FAR

@@ -58,6 +58,7 @@ def look_further(
     most: float = np.inf,
     anyway: bool = False,
     least_promise: float = _WORTH_A_TRIAL,
+    before: Step | None = None,
 ) -> Step:
     """Looks for one more effect.
 
@@ -72,6 +73,7 @@ def look_further(
       anyway: whether effects are fitted whose signatures promise too little: where parameters are far from where the
         effect would have them, slopes tell little of what it gains.
       least_promise: share that all signatures together must promise for an effect that explains little to be tried.
+      before: what another screen has found for this fit, if it was nothing: what was fitted for it is not fitted again.
     """
     start = _Start(study, fit)
     if effects:
@@ -83,13 +85,18 @@ def look_further(
     else:
         near = [score for score in look.worth_a_fit if score.gain > _NEAR_THE_BEST * look.worth_a_fit[0].gain]
         count = max(_REFITTED, len({score.setting.effect for score in near}))
-        candidates = start.refit(of_best_effects(look.worth_a_fit, count), look.null)
+        fitted = {candidate.effect for candidate in before.candidates} if before else set()
+        best = of_best_effects(look.worth_a_fit, count)
+        candidates = start.refit([score for score in best if score.setting.effect not in fitted], look.null)
     candidates = [one for one in candidates if _least_cost(one.fit, fit) < most]
     candidates += start.refit_richer(richer, look.null)
     variants: dict[str, list[Candidate]] = {}
     for candidate in sorted(candidates, key=start.place):
         variants.setdefault(candidate.effect.name, []).append(candidate)
     ordered, redundant = start.refine_on_reference_tier(list(variants.values()), effects, look.null)
+    if before and before.candidates:
+        both = (ordered, before.candidates) if ordered else (before.candidates,)
+        ordered = tuple(c for some in sorted(both, key=lambda some: start.place(some[0])) for c in some)
     of_many = bool(ordered) and not start.shows(ordered[0])
     if not ordered or (of_many and not start.may_be_of_many(ordered[0], look.share_together, least_promise)):
         return Step((), ordered, look.scores, start.error, start.error)
@@ -221,12 +228,16 @@ class _Start:
         least = LOST_IF_FITTED * (self._fit.cost - best.fit.cost)
         return [c for c in rough if self._fit.cost - c.fit.cost > least]
 
-    def _leads_further(self, rough: Candidate, best: Candidate) -> bool:
-        """Whether a rough fit comes to less than one that was fitted to the end, on few grasps."""
-        some, part = self._study.on_few(best.fit)
+    def _leads_further(self, rough: Candidate, fit: Fit, name: str) -> bool:
+        """Whether a rough fit comes to less than another model, on few grasps."""
+        some, part = self._study.on_few(fit)
         own = self._study.on_few(rough.fit)[1]
-        self._study.progress(f"holding {rough.effect.name} against {best.effect.name} on few grasps")
+        self._study.progress(f"holding {rough.effect.name} against {name} on few grasps")
         return fit_exactly(some.target, own.problem, some.simulators, own.vector).cost < NO_BETTER * part.cost
+
+    def _gains_at_all(self, rough: Candidate) -> bool:
+        """Whether few grasps let an effect gain that leaves more than the model without it, roughly."""
+        return rough.replaces != "" or self._leads_further(rough, self._fit, "the model without it")
 
     def _better_look_alikes(
         self, best: Candidate, effects: Sequence[type[Effect]], null: np.ndarray
@@ -276,6 +287,8 @@ class _Start:
         simpler = [c for c in ordered if c.effect.name in contained and c not in near]
         least = min((c.fit.cost for c in near), default=np.inf)
         near += [c for c in simpler if _least_cost(c.fit, self._fit) < least]  # others can't do for what contains them
+        hopeless = {c.effect.name for c in near if c.fit.cost > self._fit.cost and not self._gains_at_all(c)}
+        near = [c for c in near if c.effect.name not in hopeless]
         rough = {c.effect.name: c.fit for c in near}
         simple = [c for c in near if c.effect.name in contained]
         refined = self._at_the_end(simple, alike)
@@ -286,6 +299,7 @@ class _Start:
         refined = self._compare_with_contained(refined)
         names = {c.effect.name for c in refined}
         every = [*refined, *(c for c in ordered if c.effect.name not in names)]
+        names |= hopeless
         families_tried: set[str] = set()
         while True:
             redundant = add_nothing(every)
@@ -301,7 +315,9 @@ class _Start:
                 (every[0],) = self._at_the_end([first], alike)
             elif self._may_be_a_look_alike(first) and (rivals := self._rivals(first, every, names)):
                 names.update(c.effect.name for c in rivals)
-                nearer = self._at_the_end([c for c in rivals if self._leads_further(c, first)], alike)
+                nearer = self._at_the_end(
+                    [c for c in rivals if self._leads_further(c, first.fit, first.effect.name)], alike
+                )
                 fitted = {c.effect.name: c for c in nearer}
                 every = [fitted.get(c.effect.name, c) for c in every]
             elif first.effect.family not in families_tried and self._may_be_a_look_alike(first):

@@ -113,7 +113,7 @@ def test_a_rough_fit_that_gained_nearly_as_much_is_held_against_what_leaves_more
     assert start._rivals(ahead, [rough], set()) == [rough]
     assert start._rivals(ahead, [rough], {"smooth_friction"}) == []
     assert start._rivals(ahead, [dataclasses.replace(rough, fit=base.fit)], set()) == []
-    assert not start._leads_further(ahead, truth)
+    assert not start._leads_further(ahead, truth.fit, "it")
     # what contains the best one takes its place in the next step, if it earns that
     simple = dataclasses.replace(ahead, setting=EffectSetting.typical(effect_of("coulomb_friction", light_gripper())))
     assert start._rivals(simple, [rough], set()) == []
@@ -133,6 +133,39 @@ def test_where_effects_leave_little_a_gain_is_to_be_two_standard_errors(creeping
         gains = even - even.mean() + gain * even.std(ddof=1) / np.sqrt(count)
         candidate = dataclasses.replace(alike.candidates[0], gains=gains + 0, p_family=0.002)
         assert start.shows(candidate) == (gain > errors)
+
+
+@pytest.mark.parametrize("leads", [False, True])
+def test_what_leaves_more_than_the_model_without_it_is_fitted_to_the_end_only_if_few_grasps_ask(
+    creeping, alike, monkeypatch, leads
+):
+    study, base = creeping
+    (best, *_), fitted = alike.candidates, []
+    worse = dataclasses.replace(best, fit=dataclasses.replace(best.fit, residual=1.01 * base.fit.residual))
+    monkeypatch.setattr(_Start, "_leads_further", lambda *_: leads)
+    monkeypatch.setattr(_Start, "_at_the_end", lambda _, some, __: fitted.extend(some) or some)
+    start = _Start(study, base.fit)
+    ordered, _ = start.refine_on_reference_tier([[dataclasses.replace(worse, gains=-best.gains)]], [], np.zeros(1))
+    assert bool(fitted) == leads
+    assert [one.effect for one in ordered] == [best.effect]
+
+
+def test_what_was_fitted_for_another_screen_is_not_fitted_again(creeping, alike, monkeypatch):
+    """A screen that is simulated anew promises other things, and what was fitted stays as it was."""
+    study, base = creeping
+    screen = promising("presliding", "smooth_friction")([PRESLIDING, SMOOTH], study)
+    rng, refitted = np.random.default_rng(0), []
+    monkeypatch.setattr(
+        _Start, "refit", lambda self, scores, null: refitted.extend(s.setting.effect for s in scores) or []
+    )
+    nothing = [dataclasses.replace(c, gains=0 * c.gains, share=0.0) for c in alike.candidates if c.effect is PRESLIDING]
+    before = dataclasses.replace(alike, effects=(), candidates=tuple(nothing))
+    step = look_further(study, base.fit, screen, [PRESLIDING, SMOOTH], rng, before=before)
+    assert set(refitted) == {SMOOTH}
+    assert step.effects == ()
+    assert step.candidates == before.candidates
+    found = dataclasses.replace(alike, effects=(), candidates=alike.candidates[:1])
+    assert look_further(study, base.fit, screen, [PRESLIDING], rng, before=found).effects == alike.effects[:1]
 
 
 def test_what_is_worth_no_fit_roughly_is_not_fitted_to_the_end_where_others_were(creeping, alike, monkeypatch):
