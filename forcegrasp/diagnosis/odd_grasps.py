@@ -79,7 +79,9 @@ def odd_grasps(target: Target, fit: Fit) -> tuple[OddGrasp, ...]:
     best: dict[int, tuple[float, str]] = {}
     for name in objects:
         pattern = next(grasp for i, grasp in enumerate(target.grasps) if grasp.object == name and i not in suspects)
-        relabelled = [dataclasses.replace(g, object=name, radius_m=pattern.radius_m) for g in alone]
+        relabelled = [
+            dataclasses.replace(g, object=name, radius_m=pattern.radius_m, mass_kg=pattern.mass_kg) for g in alone
+        ]
         for k, error in enumerate(errors_as(target, suspects, relabelled, problem, vector)):
             if name != alone[k].object and error < best.get(k, (np.inf, ""))[0]:
                 best[k] = (float(error), name)

@@ -44,6 +44,8 @@ def _readings(measured: MeasurementSet, gripper: Gripper) -> Iterator[Finding]:
     apart = 1e3 * np.median(np.concatenate([np.diff(grasp.time_s) for grasp in measured.grasps]))
     sessions = counted(len({grasp.session for grasp in measured.grasps}), "session")
     yield fine("rows", f"{rows} in {sessions}, {apart:.3g} ms apart; columns {', '.join(measured.columns.signals)}")
+    if masses := [grasp.mass_kg for grasp in measured.grasps if grasp.mass_kg is not None]:
+        yield fine("masses", f"of objects are given in {len(masses)} grasps: {min(masses):.3g} to {max(masses):.3g} kg")
     for name, value, channels in (
         ("positions", measured.position_std_m, gripper.positions),
         ("forces", measured.force_std_n, gripper.forces),

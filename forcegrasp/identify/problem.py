@@ -11,7 +11,7 @@ import numpy as np
 from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.identify.predict import Case
 from forcegrasp.measure.schema import MeasuredGrasp
-from forcegrasp.physics.gripper import FORCE_SKEW, SKEW, Gripper
+from forcegrasp.physics.gripper import FORCE_SKEW, MASS, SKEW, Gripper
 from forcegrasp.short_repr import ShortRepr
 
 
@@ -75,6 +75,9 @@ class Problem:
                 FORCE_SKEW: np.array([g.late_s[1] for g in grasps]),
             }
         )
+        masses = np.array([np.nan if g.mass_kg is None else g.mass_kg for g in grasps])
+        if np.isfinite(masses).any():
+            self._given[MASS] = masses
         #: what a recording's settings multiply a base parameter with, each ``(G,)``
         self._factors = {
             p.name: np.array([g.settings[p.times] for g in grasps]) for p in gripper.parameters.values() if p.times

@@ -14,6 +14,8 @@ from forcegrasp.measure.schema import OBJECT, MeasuredGrasp, MeasurementSet
 
 #: Beyond this many times the gripper's range, a length is in another unit.
 _OTHER_UNIT = 10
+# Nor does one hold an object as heavy as this.
+_HEAVY_KG = 50.0
 #: How the lengths and angles of other units are told, by the unit that they should have.
 _MISTAKEN = {"m": "looks like millimetres, divide by 1000", "rad": "looks like degrees, multiply by π/180"}
 _REACHES = {
@@ -80,6 +82,11 @@ def _check_object(measured: MeasurementSet, grasp: MeasuredGrasp, half_opening_m
                 f"{show(measured.path / 'grasps.csv')}: grasp {show(grasp.name)}, column {name}: {value:g} where the"
                 f" gripper opens {half_opening_m:g} m: {_MISTAKEN['m']}"
             )
+    if (grasp.mass_kg or 0) > _HEAVY_KG:
+        raise MeasurementError(
+            f"{show(measured.path / 'grasps.csv')}: grasp {show(grasp.name)}, column object_mass_kg: {grasp.mass_kg:g}"
+            " is more than a gripper holds: looks like grams, divide by 1000"
+        )
     if grasp.object_m is not None:
         _check_size(measured, grasp, OBJECT, half_opening_m, _OTHER_UNIT * half_opening_m, "m")
 

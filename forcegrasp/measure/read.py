@@ -61,9 +61,9 @@ class Meta(TextRecord):
 
 _GRASPS = FileColumns(
     text=("grasp", "object", "session", "split"),
-    numbers=("object_radius_m", "object_offset_m"),
-    optional=("object_offset_m", "split"),
-    blank=("object_radius_m", "object_offset_m", "split"),
+    numbers=("object_radius_m", "object_offset_m", "object_mass_kg"),
+    optional=("object_offset_m", "object_mass_kg", "split"),
+    blank=("object_radius_m", "object_offset_m", "object_mass_kg", "split"),
 )
 _FINAL = FileColumns(text=("object", "session"), numbers=("delta_q_m", "final_force_n"), optional=("session",))
 
@@ -139,12 +139,13 @@ def _refuse_files(folder: Path, kind: str, names: tuple[str, ...]) -> None:
 
 
 def _check_grasps(table: Table) -> None:
-    """Raises MeasurementError about a name that is there twice, a radius that is none, or an unknown split."""
+    """Raises MeasurementError about a name that is there twice, a size that is none, or an unknown split."""
     frame = table.frame
     check_names(table, "grasp")
-    for index, radius in enumerate(frame["object_radius_m"]):
-        if radius is not None and radius <= 0:
-            raise table.refuse(index, "object_radius_m", f"{radius:g} must be positive; leave it empty if not known")
+    for column in ("object_radius_m", "object_mass_kg"):
+        for index, size in enumerate(frame[column] if column in frame.columns else ()):
+            if size is not None and size <= 0:
+                raise table.refuse(index, column, f"{size:g} must be positive; leave it empty if not known")
     check_splits(table)
 
 
@@ -180,4 +181,5 @@ def _grasp(samples: Table, facts: dict[str, Any], part: pl.DataFrame, columns: C
         object_m=seen,
         rows=part["row"].to_numpy().astype(np.int64),
         columns=columns,
+        mass_kg=facts.get("object_mass_kg"),
     )

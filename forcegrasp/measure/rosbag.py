@@ -11,7 +11,8 @@ signals:
   q_l_m: {topic: /joint_states, field: "position[name=gripper_left]", scale: 1, offset: 0}  # scale × field + offset
   ...
 grasps:                    # times in seconds since the first message of the bag
-  - {grasp: 1, object: sponge, session: a, start_s: 0.5, end_s: 4.5, object_radius_m: 0.025}  # object_offset_m, split
+  - {grasp: 1, object: sponge, session: a, start_s: 0.5, end_s: 4.5, object_radius_m: 0.025}
+                           # object_offset_m, object_mass_kg, split
 ```
 Every other signal gives its newest reading at or before that time. Nothing is interpolated.
 """
@@ -95,6 +96,7 @@ class _Cut(TextRecord):
     end_s: Number
     object_radius_m: Positive | None = None
     object_offset_m: Number | None = None
+    object_mass_kg: Positive | None = None
     split: Literal["fit", "check"] | None = None
 
     @model_validator(mode="after")
@@ -233,4 +235,5 @@ def _cut(entry: _Cut, place: str, clock: str, readings: dict[str, np.ndarray], c
         force_n=side_by_side(cut, columns.force),
         object_m=cut.get(OBJECT),
         columns=columns,
+        mass_kg=entry.object_mass_kg,
     )

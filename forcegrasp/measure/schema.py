@@ -109,6 +109,7 @@ class MeasuredGrasp(ShortRepr):
     before: tuple[np.ndarray, np.ndarray, np.ndarray] | None = field(default=None, compare=False)
     #: How much later than ``time_s`` positions and forces were read; not in any file, but found within a tolerance.
     late_s: tuple[float, float] = field(default=(0.0, 0.0), compare=False)
+    mass_kg: float | None = None  #: of the object; the scene's if not given
 
     def summary(self) -> str:
         return f"{cut(self.name)} on {cut(self.object)}, {counted(len(self.time_s), 'sample')}"
@@ -201,6 +202,8 @@ def fingerprint_of_set(
         digest.facts("time", *of_time)
     for grasp in sorted(grasps, key=lambda grasp: grasp.name):
         digest.facts(grasp.name, grasp.object, grasp.session, grasp.radius_m, grasp.offset_m, grasp.split)
+        if grasp.mass_kg is not None:
+            digest.facts("mass", grasp.mass_kg)
         for name in sorted(grasp.settings):
             digest.facts(name, grasp.settings[name])
         for name, values in grasp.signals().items():

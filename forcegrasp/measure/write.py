@@ -39,18 +39,20 @@ def write_set(measured: MeasurementSet, folder: str | Path, samples: str = "csv"
     for grasp in measured.grasps:
         check_samples(measured.path, grasp)
     index = pl.DataFrame(
-        [(g.name, g.object, g.session, g.radius_m, g.offset_m, g.split) for g in measured.grasps],
+        [(g.name, g.object, g.session, g.radius_m, g.offset_m, g.mass_kg, g.split) for g in measured.grasps],
         schema={
             "grasp": pl.String,
             "object": pl.String,
             "session": pl.String,
             "object_radius_m": pl.Float64,
             "object_offset_m": pl.Float64,
+            "object_mass_kg": pl.Float64,
             "split": pl.String,
         },
         orient="row",
     )
-    index = index.drop([name for name in ("object_offset_m", "split") if index[name].null_count() == index.height])
+    may_be_empty = ("object_offset_m", "object_mass_kg", "split")
+    index = index.drop([name for name in may_be_empty if index[name].null_count() == index.height])
     frame = pl.concat([_frame(grasp.name, grasp.signals()) for grasp in measured.grasps], how="diagonal")
     meta = _meta(measured, "grasps") | {"position_std_m": measured.position_std_m}
     meta |= {key: std for key, (name, usual) in TOLERANCES.items() if (std := float(getattr(measured, name))) != usual}

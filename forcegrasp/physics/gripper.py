@@ -33,6 +33,8 @@ FORCE_SKEW = "force_skew_s"
 EFFORT_SCALE = "effort_scale"
 #: Parameter of a mechanism with one motor: how much faster it moves at a window's start than it was read, unit per s.
 START_VELOCITY = "start_velocity"
+#: What a set may give of its objects, and no description has: their mass, kg. NaN where it is not given.
+MASS = "mass_kg"
 #: Parameters that change what is read, and nothing that happens.
 OF_READINGS = ("force_scale", EFFORT_SCALE, SKEW, FORCE_SKEW)
 #: Parameters of a mechanism that need no `writes`.

@@ -125,6 +125,14 @@ class ModelFields(SceneLayout):
         for field, where, values in self._radius_fields(ids, radius_m):
             self._write_base(field, where, values)
 
+    def write_mass(self, ids: np.ndarray, mass_kg: np.ndarray) -> None:
+        """Gives objects a mass, kg, ``(len(ids),)``, spread over them as in the scene; NaN leaves them as they are."""
+        given, body = np.isfinite(mass_kg), self._object_body
+        ids, mass_kg = ids[given], mass_kg[given]
+        times = mass_kg / self.base("body_mass")[ids, body]
+        self._write_base("body_inertia", (ids, body), times[:, None] * self.base("body_inertia")[ids, body])
+        self._write_base("body_mass", (ids, body), mass_kg)
+
     def change_radius(self, ids: np.ndarray, change_m: np.ndarray) -> None:
         """Makes objects larger than base parameters say, until the next reset; a tenth of the radius is left at least.
 
@@ -150,6 +158,8 @@ class ModelFields(SceneLayout):
         as_in_scene = inertia_of_radius(model, self.gripper, geom.size[column : column + 1])
         if np.allclose(as_in_scene, model.body_inertia[self._object_body], rtol=1e-9):
             inertia = inertia_of_radius(model, self.gripper, radius_m)
+            if "body_mass" in self._base:  # they may have masses of their own
+                inertia *= self._base["body_mass"][ids, self._object_body, None] / model.body_mass[self._object_body]
             fields.append(("body_inertia", (ids, self._object_body), inertia))
         return fields
 

@@ -10,7 +10,7 @@ import numpy as np
 from forcegrasp.physics.attached_effects import AttachedEffects
 from forcegrasp.physics.contact_law import contact_numbers
 from forcegrasp.physics.contributed_fields import ContributedFields
-from forcegrasp.physics.gripper import OF_READINGS, START_VELOCITY, Gripper
+from forcegrasp.physics.gripper import MASS, OF_READINGS, START_VELOCITY, Gripper
 from forcegrasp.physics.protocols import PlantEffect
 
 # What motor_force and outside_force are made of.
@@ -375,6 +375,8 @@ def write_base(plant: Plant, ids: np.ndarray, values: Mapping[str, np.ndarray]) 
             plant.force_scale[ids] = value
         elif name == "radius_m":
             plant.write_radius(ids, value)
+        elif name == MASS:
+            plant.write_mass(ids, value)
         elif name not in ("offset_m", START_VELOCITY, *OF_READINGS):
             given = plant.gripper.settings.get(name)
             plant.write(plant.gripper.parameters[name].writes if given is None else given, ids, value)

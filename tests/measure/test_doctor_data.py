@@ -29,6 +29,14 @@ def test_what_a_set_holds(measured, folder, capsys):
     assert f"of forces is given: {measured.force_std_n:.3g} N" in lines
 
 
+def test_masses_of_objects(measured, tmp_path, capsys):
+    grasps = [dataclasses.replace(g, mass_kg=None if i == 0 else 0.1 + 0.05 * i) for i, g in enumerate(measured.grasps)]
+    write_set(dataclasses.replace(measured, grasps=tuple(grasps)), tmp_path / "set")
+    _, found = said(capsys, tmp_path / "set")
+    most = 0.1 + 0.05 * (len(grasps) - 1)
+    assert any(f"in {len(grasps) - 1} grasps: 0.15 to {most:.3g} kg" in line for line in found["fine"])
+
+
 def test_noise_that_is_not_given(measured, tmp_path, capsys):
     write_set(dataclasses.replace(measured, force_std_n=None), tmp_path / "set")
     status, found = said(capsys, tmp_path / "set")

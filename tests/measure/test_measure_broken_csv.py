@@ -65,6 +65,16 @@ def test_radius(folder, radius):
     refuse(folder, "grasps.csv", "row 3", "object_radius_m", "positive")
 
 
+@pytest.mark.parametrize("mass", ["0", "-0.2"])
+def test_mass(folder, mass):
+    path = folder / "grasps.csv"
+    head, *rows = path.read_text().strip().split("\n")
+    path.write_text("\n".join([f"{head},object_mass_kg", *(f"{row},0.3" for row in rows)]) + "\n")
+    assert {grasp.mass_kg for grasp in read_set(folder).grasps} == {0.3}
+    edit(path, 3, "object_mass_kg", mass)
+    refuse(folder, "grasps.csv", "row 3", "object_mass_kg", "positive")
+
+
 BAD_NAMES = {
     "empty": "",
     "quoted empty": '""',

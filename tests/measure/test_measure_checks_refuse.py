@@ -56,6 +56,7 @@ CASES = {
     "one grasp in mm": (_last(position_m=lambda g: 1e3 * g.position_m), [MM, "'g5'"]),
     "radius in mm": (_each(radius_m=lambda g: 1e3 * g.radius_m), [MM, "object_radius_m"]),
     "one radius in mm": (_last(radius_m=lambda g: 1e3 * g.radius_m), [MM, "'g5'", "object_radius_m"]),
+    "masses in grams": (_each(mass_kg=lambda g: 250.0), ["grasps.csv", "'g0'", "object_mass_kg", "250", "grams"]),
     "offset in mm": (_each(offset_m=lambda g: 1e3 * g.offset_m), [MM, "object_offset_m"]),
     "object in mm": (_each(object_m=lambda g: 1e3 * g.object_m + 5), [MM, "column o_y_m"]),
     "micrometres": (_each(position_m=lambda g: 1e6 * g.position_m), ["looks like"]),

@@ -89,7 +89,8 @@ signals:
   f_r_n: {{topic: /force/right, field: wrench.force.z, scale: -1}}
 grasps:
   - {{grasp: 007, object: wood, session: a, start_s: 0, end_s: 5, object_radius_m: 0.025, split: fit}}
-  - {{grasp: two, object: wood, session: a, start_s: 10, end_s: 16, object_radius_m: 0.025, object_offset_m: 0.01}}
+  - {{grasp: two, object: wood, session: a, start_s: 10, end_s: 16, object_radius_m: 0.025, object_offset_m: 0.01,
+     object_mass_kg: 0.3}}
 """
 
 

@@ -24,7 +24,7 @@ def _same(a: MeasurementSet, b: MeasurementSet) -> None:
     for name, _ in TOLERANCES.values():
         assert getattr(a, name) == getattr(b, name)
     for one, two in zip(a.grasps, b.grasps, strict=True):
-        for name in ("name", "object", "session", "radius_m", "offset_m", "split"):
+        for name in ("name", "object", "session", "radius_m", "offset_m", "mass_kg", "split"):
             assert getattr(one, name) == getattr(two, name)
         for name, values in one.signals().items():
             np.testing.assert_array_equal(values.view(np.int64), two.signals()[name].view(np.int64), name)
@@ -54,6 +54,7 @@ def test_every_float(grasps, tmp_path, samples):
     [
         {"radius_m": None},
         {"offset_m": None},
+        {"mass_kg": 0.25},
         {"split": None},
         {"radius_m": None, "offset_m": None, "split": None},
         {"object_m": None},
@@ -139,6 +140,13 @@ def test_fingerprint_of_every_format(folder, measured, valid_files):
             spoilt = spoilt.sort("t_s", maintain_order=True)
         spoilt.write_parquet(folder / "samples.parquet")
         assert read_set(folder).fingerprint == measured.fingerprint
+
+
+def test_masses_are_another_set_and_are_not_written_where_none_is_given(measured, folder, tmp_path):
+    assert "object_mass_kg" not in (folder / "grasps.csv").read_text()
+    heavy = make_set([change(grasp, mass_kg=0.2 + 0.1 * i) for i, grasp in enumerate(measured.grasps)])
+    assert "object_mass_kg" in (write_set(heavy, tmp_path / "heavy") / "grasps.csv").read_text()
+    assert heavy.fingerprint != measured.fingerprint
 
 
 def test_fingerprint_follows_every_number(measured, folder, any_gripper):

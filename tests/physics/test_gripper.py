@@ -123,6 +123,31 @@ def test_radius_writes_are_the_compilers(tmp_path, kind, free, tier):
     np.testing.assert_array_equal(_close(written)[:, 1], _close(compiled)[:, 0])
 
 
+@pytest.mark.parametrize("names", [("radius_m", "mass_kg"), ("mass_kg", "radius_m")])
+def test_mass_is_as_if_the_scene_had_been_compiled_with_it(tmp_path, names):
+    """Whichever is written first; an effect on their radii keeps it, and what is not given is the scene's."""
+    values = {"radius_m": np.array([0.02, 0.025]), "mass_kg": np.array([np.nan, 0.9])}
+    plant, ids = Plant(load_gripper(str(_copy(tmp_path))), 2, threads=1), np.arange(2)
+    for _ in range(2):  # to write it again changes nothing
+        write_base(plant, ids, {name: values[name] for name in names})
+    plant.reset(ids, np.zeros(2))
+    scene = (tmp_path / "second.xml").read_text()
+    mass = plant.model.body_mass[plant.model.body("thing").id]
+    assert f'mass="{mass:g}"' in scene
+    (tmp_path / "other").mkdir()
+    swap = {f'mass="{mass:g}"': 'mass="0.9"', "0.02 0.03 0.03": "0.025 0.03 0.03"}
+    other = Plant(load_gripper(str(_copy(tmp_path / "other", swap=swap))), 1, threads=1)
+    other.reset(np.arange(1), np.zeros(1))
+    heavy, compiled = plant.batch.get_model(1), other.batch.get_model(0)
+    for name in ("body_mass", "body_inertia", "body_invweight0", "dof_M0"):
+        np.testing.assert_allclose(getattr(heavy, name), getattr(compiled, name), rtol=1e-12)
+    assert plant.batch.get_model(0).body_mass[plant.model.body("thing").id] == mass
+    plant.change_radius(ids, np.array([0.0, 0.005]))
+    plant.derive_fields(ids)
+    light, heavy = (plant.batch.get_model(i).body_inertia[plant.model.body("thing").id, 0] for i in ids)
+    assert heavy / light == pytest.approx(0.9 / mass)  # about the axis of the grasp
+
+
 def test_radius_leaves_an_inertia_of_its_own_alone(tmp_path):
     own = '<inertial pos="0 0 0" mass="0.6" diaginertia="1e-3 2e-3 2.5e-3"/>'
     gripper = load_gripper(str(_copy(tmp_path, swap={RAIL: own + RAIL})))
