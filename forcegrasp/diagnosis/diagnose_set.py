@@ -23,6 +23,7 @@ from forcegrasp.diagnosis.moved_set import (
 from forcegrasp.diagnosis.radii_besides import Fitted, with_radii_put_right
 from forcegrasp.diagnosis.result import Diagnosis, Step
 from forcegrasp.diagnosis.search import MayBeGiven, diagnose
+from forcegrasp.diagnosis.verdict import EXPLAINED_FAR, explained_share
 from forcegrasp.effects import Effect
 from forcegrasp.effects.for_gripper import effect_of, effects_of
 from forcegrasp.errors import MeasurementError
@@ -42,6 +43,8 @@ from forcegrasp.physics.gripper import Gripper
 
 #: A diagnosis needs so many grasps: with fewer, nothing can be held out.
 LEAST_GRASPS = 6
+# An effect does not do as well as a set put right if it leaves more than so many times the squares.
+_AS_WELL = 2.0
 #: A diagnosis, and what simulates its grasps.
 Found = tuple[Diagnosis, Simulators]
 
@@ -108,10 +111,11 @@ class _Ways:
         base: BaseFit,
         start: tuple[Fit, Sequence[Step]] | None = None,
         may_be_given: MayBeGiven | None = None,
+        most: float = np.inf,
     ) -> Diagnosis:
         """See :func:`.search.diagnose`."""
         rng = np.random.default_rng(self.seed + 1)
-        return diagnose(target, base, simulators, self.effects, rng, self.progress, start, may_be_given)
+        return diagnose(target, base, simulators, self.effects, rng, self.progress, start, may_be_given, most)
 
     def moved(self, found: Diagnosis, loaded: Loaded[MeasurementSet]) -> Found | None:
         """The diagnosis with what the set gives moved within its tolerance; None if nothing asks for that."""
@@ -211,8 +215,10 @@ def _put_right_or_as_said(ways: _Ways, loaded: Loaded[MeasurementSet], said: Fit
         of_most = fault.of_most and not fault.is_of_few(further.fit)
         certain = likely.verdict is Verdict.DATA and not (likely.left or fault.moved or of_most)
         if not (certain or likely.stopped):  # effects may do as well without it
-            # where nothing is left what does as well would show; what promises little need not be fitted, too
-            as_it_is = ways.search(*said, may_be_given=None if likely.left else _it_is)
+            # where next to nothing is left what does as well would show at once
+            left = explained_share(likely.error_before, likely.error_after, noise=likely.floor) < EXPLAINED_FAR
+            most = np.inf if left else _AS_WELL * further.fit.cost
+            as_it_is = ways.search(*said, may_be_given=None if left and likely.left else _it_is, most=most)
             likely = dataclasses.replace(more_likely(likely, as_it_is), stopped=as_it_is.stopped)
         return likely, right[1] if likely.target.grasps is right[0].grasps else said[1]
     found, further = ways.search_and_move(loaded, said)

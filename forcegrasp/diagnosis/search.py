@@ -53,6 +53,7 @@ def diagnose(
     progress: Progress = silent,
     start: tuple[Fit, Sequence[Step]] | None = None,
     may_be_given: MayBeGiven | None = None,
+    most: float = np.inf,
 ) -> Diagnosis:
     """Adds effects to a fitted base model for as long as the evidence holds.
 
@@ -66,6 +67,7 @@ def diagnose(
       start: a fit with the effects that steps have found before, to go on from; the base model by default.
       may_be_given: whether what the set gives, moved within its tolerance, may explain what a fit leaves: then effects
         that promise too little are not fitted.
+      most: cost that the first effect must come down to; one that is too far from it is not looked for.
 
     Ctrl-C, or the end of a time limit, ends the search with what was found by then.
     """
@@ -89,7 +91,7 @@ def diagnose(
     so_far = SoFar((study, steps, first))
     try:
         if start is None or is_worth_looking(study, first):
-            _add_effects(so_far, begun, rng, may_be_given)
+            _add_effects(so_far, begun, rng, may_be_given, most)
         _tidy_up(so_far, begun)
         return _believed(so_far, begun)
     except REASONS as reason:
@@ -97,7 +99,9 @@ def diagnose(
         return dataclasses.replace(concluded(begun, *so_far.sure, in_a_hurry=True), stopped=stopped)
 
 
-def _add_effects(so_far: SoFar, begun: Begun, rng: np.random.Generator, may_be_given: MayBeGiven | None) -> None:
+def _add_effects(
+    so_far: SoFar, begun: Begun, rng: np.random.Generator, may_be_given: MayBeGiven | None, most: float
+) -> None:
     """Adds one effect after the other."""
     effects = begun.effects
     study, steps, fit = so_far.all
@@ -116,7 +120,7 @@ def _add_effects(so_far: SoFar, begun: Begun, rng: np.random.Generator, may_be_g
         ):
             _, steps, fit = so_far.all
             continue
-        step = look_further(study, fit, screen, untried, rng, richer)
+        step = look_further(study, fit, screen, untried, rng, richer, most if fit is begun.fit else np.inf)
         # what is on trial has no look-alikes that are worth the time, and what was found together takes too long
         much = not step.effects and so_far.believed is None and not several.done
         much = much and step.error_before > AS_GOOD_AS_NOTHING * begun.floor

@@ -13,6 +13,7 @@ import pytest
 from forcegrasp.diagnosis import doubt
 from forcegrasp.diagnosis import odd_grasps as odd_grasps_module
 from forcegrasp.diagnosis.diagnose_set import diagnose_set
+from forcegrasp.diagnosis.doubt import with_fault
 from forcegrasp.diagnosis.faults import suspects
 from forcegrasp.diagnosis.felt_sizes import doubtful_radii
 from forcegrasp.diagnosis.moved_set import go_on_with_moved, within_tolerance_after_all
@@ -21,6 +22,7 @@ from forcegrasp.diagnosis.result import Diagnosis
 from forcegrasp.diagnosis.search import diagnose
 from forcegrasp.diagnosis.tolerance import move_given, wanted_moves
 from forcegrasp.effects import get_effect
+from forcegrasp.effects.for_gripper import effect_of
 from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.identify.fit_set import apply_model, fit_model
 from forcegrasp.identify.fitted_model import model_of
@@ -111,6 +113,41 @@ def test_one_wrong_radius_is_told_and_fitted(sound, refitted):
     assert fitted["radius_m of thing_1"] == pytest.approx(true, abs=1e-4)
     target, _, right = refitted
     assert not doubtful_radii(target, right.fit, loaded.measured.radius_std_m)
+
+
+@pytest.mark.parametrize(("after", "limited"), [(1.2, True), (2.0, False)])
+def test_in_place_of_a_fault_that_leaves_next_to_nothing_an_effect_must_do_as_well_at_once(
+    sound, monkeypatch, after, limited
+):
+    """Else each that gains anything was fitted to the end, for ten minutes, and none came near."""
+    loaded, _ = sound
+    wrong = changed(loaded, lambda g: dataclasses.replace(g, radius_m=g.radius_m + 0.002 * (g.object == "thing_1")))
+    searched, module = [], importlib.import_module("forcegrasp.diagnosis.diagnose_set")
+
+    def with_some_left(found, fault, said):
+        told = with_fault(found, fault, said)
+        return dataclasses.replace(told, left="something", error_before=4.0, error_after=after, floor=1.0)
+
+    monkeypatch.setattr(module, "with_fault", with_some_left)
+    monkeypatch.setattr(module, "diagnose", lambda *asked: searched.append(asked) or diagnose(*asked))
+    diagnose_set(wrong, None, ["backlash"], 0, silent)
+    (right, *_, unlimited), *_, (said, *_, may_be_given, most) = searched
+    assert [None in {g.radius_m for g in target.grasps} for target in (right, said)] == [True, False]
+    assert unlimited == np.inf
+    assert (may_be_given is not None) == limited
+    assert (most < np.inf) == limited
+
+
+def test_the_first_effect_must_come_down_to_what_is_asked_for(sound):
+    loaded, model = sound
+    late = changed(loaded, lambda g: dataclasses.replace(g, command_m=np.roll(g.command_m, -1, axis=0)))
+    target, simulators, base = apply_model(late, model, silent, refit=True)
+    delays = [effect_of("command_delay", loaded.gripper)]
+    found = [
+        diagnose(target, base, simulators, delays, np.random.default_rng(0), silent, None, lambda *_: True, most)
+        for most in (np.inf, -np.inf)
+    ]
+    assert [one.effects for one in found] == [("command_delay",), ()]
 
 
 def test_radii_that_a_ruler_gave_are_doubted_where_no_effect_would_do(sound):

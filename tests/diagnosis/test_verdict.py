@@ -424,6 +424,14 @@ def test_where_the_base_fit_stopped_short_what_explains_most_is_an_answer(made_u
         assert found_by(Step(("force_bias",), (candidate,), (), 2.0, 1.6), converged=False).verdict == verdict
 
 
+@pytest.mark.parametrize(("left", "verdict"), [("", "explained"), ("1.3 × noise", "not_fitted")])
+def test_a_base_fit_that_stopped_short_and_leaves_nothing_is_good_enough(found_by, monkeypatch, left, verdict):
+    """Contacts are rough: with a wrong radius put right one start had ended at 1.00 × noise, and others elsewhere."""
+    monkeypatch.setattr(conclusion, "left_by_many", lambda *_: (left, None, ""))
+    monkeypatch.setattr(search, "is_worth_looking", lambda *_: False)
+    assert found_by(converged=False).verdict == verdict
+
+
 @pytest.mark.parametrize(("verdict", "told"), [("effect", True), ("unknown", False)])
 def test_what_is_left_may_be_the_form_only_of_what_is_named(made_up, found_by, monkeypatch, verdict, told):
     bias, drift = made_up.diagnosis("one_of").steps[0].candidates
