@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -23,12 +23,13 @@ from forcegrasp.diagnosis.result import Diagnosis, Step, kept_steps
 from forcegrasp.diagnosis.screen import Screen
 from forcegrasp.diagnosis.so_far import SoFar
 from forcegrasp.diagnosis.split import split
+from forcegrasp.diagnosis.stalled_base import better_without
 from forcegrasp.diagnosis.step import look_further
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.diagnosis.to_the_end import FAR
 from forcegrasp.diagnosis.verdict import EXPLAINED, EXPLAINED_FAR, MUCH, explained_share
 from forcegrasp.effects import Effect
-from forcegrasp.identify.base_fit import BaseFit
+from forcegrasp.identify.base_fit import BaseFit, rms_error
 from forcegrasp.identify.cross_validation import evidence_folds, make_folds
 from forcegrasp.identify.fit import Fit
 from forcegrasp.identify.noise_floor import beyond_fit, numerical_error, numerical_floor
@@ -91,18 +92,22 @@ def diagnose(
     so_far = SoFar((study, steps, first))
     try:
         if start is None or is_worth_looking(study, first):
-            _add_effects(so_far, begun, rng, may_be_given, most)
+            better = _add_effects(so_far, begun, rng, may_be_given, most)
+            if better is not None:
+                progress(f"without it the model fits as well from there: {rms_error(better, target):.2f} × noise")
+                base, start = (replace(base, fit=better), None) if start is None else (base, (better, before))
+                return diagnose(target, base, simulators, effects, rng, progress, start, may_be_given, most)
         _tidy_up(so_far, begun)
         return _believed(so_far, begun)
     except REASONS as reason:
         stopped = cut_short(reason, progress)
-        return dataclasses.replace(concluded(begun, *so_far.sure, in_a_hurry=True), stopped=stopped)
+        return replace(concluded(begun, *so_far.sure, in_a_hurry=True), stopped=stopped)
 
 
 def _add_effects(
     so_far: SoFar, begun: Begun, rng: np.random.Generator, may_be_given: MayBeGiven | None, most: float
-) -> None:
-    """Adds one effect after the other."""
+) -> Fit | None:
+    """Adds one effect after the other; or returns a better fit without any, where the one to begin with had stalled."""
     effects = begun.effects
     study, steps, fit = so_far.all
     screen, screened, tried_anyway, several = Screen(effects, study), fit, False, AtOnce(so_far, begun, rng)
@@ -143,19 +148,27 @@ def _add_effects(
             so_far.all = study, [*steps, step], fit
             break
         if step.of_many and so_far.believed is None:
-            nothing = dataclasses.replace(step, effects=(), error_after=step.error_before)
+            nothing = replace(step, effects=(), error_after=step.error_before)
             so_far.believed = study, [*steps, nothing], fit
+        best = step.candidates[0]
+        if (
+            fit is begun.fit
+            and not best.replaces
+            and (better := better_without(best.effect.name, best.fit, fit, study))
+        ):
+            return better
         study.progress(
             f"found {step.effects[0]}: held-out error {step.error_before:.2f} → {step.error_after:.2f} × noise"
         )
-        target, fit = reweigh(study.target, step.candidates[0].fit, study.simulators)
+        target, fit = reweigh(study.target, best.fit, study.simulators)
         if target is not study.target:
-            study = dataclasses.replace(study, target=target)
+            study = replace(study, target=target)
         step, fit = drop_needless(study, step, fit, begun.given)
         steps = [*steps, step]
         so_far.all = study, steps, fit
         if not is_worth_looking(study, fit) or leaves_little(study, fit, begun.error, begun.floor):
             break
+    return None
 
 
 def _tidy_up(so_far: SoFar, begun: Begun) -> None:
@@ -178,7 +191,7 @@ def _believed(so_far: SoFar, begun: Begun) -> Diagnosis:
     before, _, fewer = so_far.believed
     if _convincing(before, fewer, study, fit):
         return found
-    return dataclasses.replace(concluded(begun, *so_far.believed), bolder=found)
+    return replace(concluded(begun, *so_far.believed), bolder=found)
 
 
 def _fitted_anyway(

@@ -14,9 +14,10 @@ from forcegrasp.diagnosis.families import look_alike
 from forcegrasp.diagnosis.few import with_few
 from forcegrasp.diagnosis.left_over import leaves_forms, leaves_little
 from forcegrasp.diagnosis.odd_grasps import OddGrasp
-from forcegrasp.diagnosis.refine import refine_anyway
+from forcegrasp.diagnosis.refine import fit_with, refine_anyway
 from forcegrasp.diagnosis.result import Step, kept_steps
 from forcegrasp.diagnosis.screen import Screen
+from forcegrasp.diagnosis.stalled_base import better_without
 from forcegrasp.diagnosis.step import _Start, look_further
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.effects import catalogue
@@ -223,6 +224,39 @@ def test_of_rough_fits_those_that_gain_much_less_than_the_best_one_are_left_out(
     assert [fit.problem.effects[-1].effect for fit in fits] == [SMOOTH]
     assert len(fits[0].residual) == len(base.fit.residual)
     assert refine_anyway([DELAY], study, fits[0], "smooth_friction") == []
+
+
+def test_a_fit_that_had_stalled_goes_on_without_the_effect_that_led_it_on(creeping, alike):
+    """Any parameter more leads on where a fit had stopped short: its effect is not what was missing."""
+    study, base = creeping
+    friction = alike.candidates[0].fit  # right, and the base for another effect here
+    delayed = fit_with([EffectSetting.typical(DELAY)], friction.vector, study, friction)
+    null = np.r_[friction.vector, DELAY.parameters[0].null]
+    nothing = dataclasses.replace(delayed, vector=null)
+    stalled = dataclasses.replace(friction, residual=1.1 * friction.residual)
+    better = better_without("command_delay", nothing, stalled, study)
+    assert better is not None
+    assert [one.effect.name for one in better.problem.effects] == ["smooth_friction"]
+    assert better.cost == pytest.approx(friction.cost, rel=1e-3)
+    assert better_without("command_delay", nothing, friction, study) is None
+    assert better_without("smooth_friction", friction, base.fit, study) is None  # which was missing
+
+
+def test_a_search_begins_anew_from_a_better_base(creeping, alike, monkeypatch):
+    study, base = creeping
+    stalled, fits = dataclasses.replace(base, fit=dataclasses.replace(base.fit, residual=1.1 * base.fit.residual)), []
+
+    def step(study, fit, *_, **__):
+        fits.append(fit)
+        return alike
+
+    monkeypatch.setattr(search, "look_further", step)
+    monkeypatch.setattr(search, "better_without", lambda *_: base.fit if len(fits) == 1 else None)
+    monkeypatch.setattr(at_once.AtOnce, "that_add_up", lambda *_: False)
+    found = search.diagnose(study.target, stalled, study.simulators, [SMOOTH, DELAY], np.random.default_rng(0))
+    assert [one is fit for one, fit in zip(fits, (stalled.fit, base.fit), strict=False)] == [True, True]
+    assert found.base.fit is base.fit
+    assert found.error_before == pytest.approx(study.error(study.heldout(base.fit)))
 
 
 @pytest.mark.parametrize("error", [2.0, 11.0])

@@ -388,6 +388,7 @@ def found_by(made_up, monkeypatch):
         base = made_up.base.fit
         monkeypatch.setattr(search, "look_further", lambda *a: next(following))
         monkeypatch.setattr(search, "_fitted_anyway", lambda *a: None)
+        monkeypatch.setattr(search, "better_without", lambda *a: None)
         for module in (search, conclusion):
             monkeypatch.setattr(module, "numerical_error", lambda fit, target: (0 * fit.residual + 0.1,) * 2)
         monkeypatch.setattr(search, "Screen", lambda *a: None)
