@@ -151,11 +151,8 @@ def _add_effects(
             nothing = replace(step, effects=(), error_after=step.error_before)
             so_far.believed = study, [*steps, nothing], fit
         best = step.candidates[0]
-        if (
-            fit is begun.fit
-            and not best.replaces
-            and (better := better_without(best.effect.name, best.fit, fit, study))
-        ):
+        of_base = fit is begun.fit and not best.replaces
+        if of_base and (better := better_without(best.effect.name, best.fit, fit, study)) is not None:
             return better
         study.progress(
             f"found {step.effects[0]}: held-out error {step.error_before:.2f} → {step.error_after:.2f} × noise"
