@@ -15,8 +15,7 @@ def better_without(name: str, found: Fit, fit: Fit, study: Study) -> Fit | None:
     """A fit without an effect from where one with it has led, if that leaves less than before; None if it does not.
 
     A model is nested in the one that has an effect besides. Contacts are rough, and where a fit had stopped short, one
-    more parameter of any kind may lead on: radii that were wrong by a quarter of a micrometre "explained" three
-    quarters of what was left.
+    more parameter of any kind may lead on, by however little it is moved itself.
 
     Args:
       name: of the effect.
