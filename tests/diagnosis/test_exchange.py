@@ -142,9 +142,9 @@ def test_the_search_goes_on_where_noise_seems_to_be_stronger_than_said(rubbing, 
     monkeypatch.setattr("forcegrasp.diagnosis.left_over.left_over", lambda *_: ("", noise))
     looked = []
 
-    def recorded(*arguments, anyway: bool = False) -> Step:
+    def recorded(*arguments, anyway: bool = False, **more) -> Step:
         looked.extend([] if anyway else [arguments])
-        return look_further(*arguments, anyway=anyway)
+        return look_further(*arguments, anyway=anyway, **more)
 
     monkeypatch.setattr("forcegrasp.diagnosis.search.look_further", recorded)
     chosen = [effect_of(name, target.gripper) for name in ("coulomb_friction", "motor_offset")]
