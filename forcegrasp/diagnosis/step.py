@@ -308,8 +308,9 @@ class _Start:
             if first is None:
                 return (), redundant
             if first.effect.name not in names and not first.replaces:  # the last were fitted to the end already
-                if names and not self.shows(first, LEAST_SHARE_OF_MANY):
-                    return tuple(every), redundant  # and it is worth no more, nor is any after it
+                rough_ones = [c for c in every if c.effect.name not in names and not c.replaces]
+                if names and not any(self.shows(c, LEAST_SHARE_OF_MANY) for c in rough_ones):
+                    return tuple(every), redundant  # and no rough fit is worth more
                 # fitted to the end the others are no better than this rough one: it is to be fitted, too
                 names.add(first.effect.name)
                 (every[0],) = self._at_the_end([first], alike)
