@@ -68,8 +68,8 @@ def concluded(begun: Begun, study: Study, steps: Sequence[Step], fit: Fit, in_a_
     only_of_set = all(s.candidates and s.candidates[0].effect.of_set for s in found)
     share = study.explained(target.before_rounding(study.heldout(base.fit)), study.heldout(fit))
     # a missing effect makes the error rough, and the base fit stop short: then what leaves more may be a look-alike
-    leaves_more = bool(left) and error_after > AS_GOOD_AS_NOTHING * floor and share < EXPLAINED_FAR
-    if not base.converged and ((left and not found) or leaves_more):
+    leaves_more = error_after > AS_GOOD_AS_NOTHING * floor and share < EXPLAINED_FAR
+    if left and not base.converged and (not found or leaves_more):
         return Diagnosis(
             Verdict.NOT_FITTED, (), (), base, base.fit, target, begun.folds, error_before, error_before, odd=begun.odd
         )

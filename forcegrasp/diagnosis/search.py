@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -95,13 +95,16 @@ def diagnose(
             better = _add_effects(so_far, begun, rng, may_be_given, most)
             if better is not None:
                 progress(f"without it the model fits as well from there: {rms_error(better, target):.2f} × noise")
-                base, start = (replace(base, fit=better), None) if start is None else (base, (better, before))
+                if start is None:
+                    base = dataclasses.replace(base, fit=better)
+                else:
+                    start = better, before
                 return diagnose(target, base, simulators, effects, rng, progress, start, may_be_given, most)
         _tidy_up(so_far, begun)
         return _believed(so_far, begun)
     except REASONS as reason:
         stopped = cut_short(reason, progress)
-        return replace(concluded(begun, *so_far.sure, in_a_hurry=True), stopped=stopped)
+        return dataclasses.replace(concluded(begun, *so_far.sure, in_a_hurry=True), stopped=stopped)
 
 
 def _add_effects(
@@ -132,7 +135,7 @@ def _add_effects(
         much = much and not (may_be_given is not None and may_be_given(study.target, fit))
         if much and untried and screened is not fit:  # beside what was found since, others may do something else
             screen, screened = Screen(effects, study), fit
-            step = look_further(study, fit, screen, untried, rng, before=step)
+            step = look_further(study, fit, screen, untried, rng, before=step.candidates)
         much = much and not leaves_forms(study, fit, begun.error, begun.floor)
         if much and not step.effects:
             worth_it = untried and not tried_anyway and step.error_before < FAR
@@ -148,7 +151,7 @@ def _add_effects(
             so_far.all = study, [*steps, step], fit
             break
         if step.of_many and so_far.believed is None:
-            nothing = replace(step, effects=(), error_after=step.error_before)
+            nothing = dataclasses.replace(step, effects=(), error_after=step.error_before)
             so_far.believed = study, [*steps, nothing], fit
         best = step.candidates[0]
         of_base = fit is begun.fit and not best.replaces
@@ -159,7 +162,7 @@ def _add_effects(
         )
         target, fit = reweigh(study.target, best.fit, study.simulators)
         if target is not study.target:
-            study = replace(study, target=target)
+            study = dataclasses.replace(study, target=target)
         step, fit = drop_needless(study, step, fit, begun.given)
         steps = [*steps, step]
         so_far.all = study, steps, fit
@@ -188,7 +191,7 @@ def _believed(so_far: SoFar, begun: Begun) -> Diagnosis:
     before, _, fewer = so_far.believed
     if _convincing(before, fewer, study, fit):
         return found
-    return replace(concluded(begun, *so_far.believed), bolder=found)
+    return dataclasses.replace(concluded(begun, *so_far.believed), bolder=found)
 
 
 def _fitted_anyway(

@@ -32,7 +32,7 @@ from forcegrasp.identify.side_by_side import side_by_side
 #: An effect must lower the error of some signal in some phase by this share; by more where all is at the floor already.
 LEAST_GAIN, LEAST_GAIN_AT_FLOOR = 0.02, 0.1
 # Beside effects that leave little its gain must be so many standard errors: a few grasps whose contacts went their own
-# way may hold all that is left. What was there gained three or more, what was not 1.4 to 1.7.
+# way may hold all that is left. What was there gained three or more, what was not 1.4 to 2.0.
 _SURE = 2.0
 # What all signatures together promise, so that effects that explain little each are tried: straight as they are, they
 # promise less than effects explain, and what a set gives may be off besides.
@@ -58,7 +58,7 @@ def look_further(
     most: float = np.inf,
     anyway: bool = False,
     least_promise: float = _WORTH_A_TRIAL,
-    before: Step | None = None,
+    before: Sequence[Candidate] = (),
 ) -> Step:
     """Looks for one more effect.
 
@@ -73,7 +73,7 @@ def look_further(
       anyway: whether effects are fitted whose signatures promise too little: where parameters are far from where the
         effect would have them, slopes tell little of what it gains.
       least_promise: share that all signatures together must promise for an effect that explains little to be tried.
-      before: what another screen has found for this fit, if it was nothing: what was fitted for it is not fitted again.
+      before: what was fitted for another screen of this fit, best first: it is not fitted again.
     """
     start = _Start(study, fit)
     if effects:
@@ -85,7 +85,7 @@ def look_further(
     else:
         near = [score for score in look.worth_a_fit if score.gain > _NEAR_THE_BEST * look.worth_a_fit[0].gain]
         count = max(_REFITTED, len({score.setting.effect for score in near}))
-        fitted = {candidate.effect for candidate in before.candidates} if before else set()
+        fitted = {candidate.effect for candidate in before}
         best = of_best_effects(look.worth_a_fit, count)
         candidates = start.refit([score for score in best if score.setting.effect not in fitted], look.null)
     candidates = [one for one in candidates if _least_cost(one.fit, fit) < most]
@@ -94,9 +94,8 @@ def look_further(
     for candidate in sorted(candidates, key=start.place):
         variants.setdefault(candidate.effect.name, []).append(candidate)
     ordered, redundant = start.refine_on_reference_tier(list(variants.values()), effects, look.null)
-    if before and before.candidates:
-        both = (ordered, before.candidates) if ordered else (before.candidates,)
-        ordered = tuple(c for some in sorted(both, key=lambda some: start.place(some[0])) for c in some)
+    screens = sorted([some for some in (ordered, before) if some], key=lambda some: start.place(some[0]))
+    ordered = tuple(candidate for some in screens for candidate in some)
     of_many = bool(ordered) and not start.shows(ordered[0])
     if not ordered or (of_many and not start.may_be_of_many(ordered[0], look.share_together, least_promise)):
         return Step((), ordered, look.scores, start.error, start.error)
@@ -235,10 +234,6 @@ class _Start:
         self._study.progress(f"holding {rough.effect.name} against {name} on few grasps")
         return fit_exactly(some.target, own.problem, some.simulators, own.vector).cost < NO_BETTER * part.cost
 
-    def _gains_at_all(self, rough: Candidate) -> bool:
-        """Whether few grasps let an effect gain that leaves more than the model without it, roughly."""
-        return rough.replaces != "" or self._leads_further(rough, self._fit, "the model without it")
-
     def _better_look_alikes(
         self, best: Candidate, effects: Sequence[type[Effect]], null: np.ndarray
     ) -> list[Candidate]:
@@ -287,7 +282,9 @@ class _Start:
         simpler = [c for c in ordered if c.effect.name in contained and c not in near]
         least = min((c.fit.cost for c in near), default=np.inf)
         near += [c for c in simpler if _least_cost(c.fit, self._fit) < least]  # others can't do for what contains them
-        hopeless = {c.effect.name for c in near if c.fit.cost > self._fit.cost and not self._gains_at_all(c)}
+        # what leaves more than the model without it, roughly, is held against that on few grasps first
+        doubted = [c for c in near if c.fit.cost > self._fit.cost and not c.replaces]
+        hopeless = {c.effect.name for c in doubted if not self._leads_further(c, self._fit, "the model without it")}
         near = [c for c in near if c.effect.name not in hopeless]
         rough = {c.effect.name: c.fit for c in near}
         simple = [c for c in near if c.effect.name in contained]

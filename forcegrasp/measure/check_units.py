@@ -14,7 +14,7 @@ from forcegrasp.measure.schema import OBJECT, MeasuredGrasp, MeasurementSet
 
 #: Beyond this many times the gripper's range, a length is in another unit.
 _OTHER_UNIT = 10
-# Nor does one hold an object as heavy as this.
+#: Beyond this, an object is heavier than any that a gripper holds.
 _HEAVY_KG = 50.0
 #: How the lengths and angles of other units are told, by the unit that they should have.
 _MISTAKEN = {"m": "looks like millimetres, divide by 1000", "rad": "looks like degrees, multiply by π/180"}

@@ -161,12 +161,14 @@ def test_what_was_fitted_for_another_screen_is_not_fitted_again(creeping, alike,
     )
     nothing = [dataclasses.replace(c, gains=0 * c.gains, share=0.0) for c in alike.candidates if c.effect is PRESLIDING]
     before = dataclasses.replace(alike, effects=(), candidates=tuple(nothing))
-    step = look_further(study, base.fit, screen, [PRESLIDING, SMOOTH], rng, before=before)
+    step = look_further(study, base.fit, screen, [PRESLIDING, SMOOTH], rng, before=before.candidates)
     assert set(refitted) == {SMOOTH}
     assert step.effects == ()
     assert step.candidates == before.candidates
     found = dataclasses.replace(alike, effects=(), candidates=alike.candidates[:1])
-    assert look_further(study, base.fit, screen, [PRESLIDING], rng, before=found).effects == alike.effects[:1]
+    assert (
+        look_further(study, base.fit, screen, [PRESLIDING], rng, before=found.candidates).effects == alike.effects[:1]
+    )
 
 
 def test_what_is_worth_no_fit_roughly_is_not_fitted_to_the_end_where_others_were(creeping, alike, monkeypatch):
