@@ -331,7 +331,9 @@ def index() -> str:
         "# Effects",
         "",
         "What a simulator of a gripper may lack, in the order in which it acts. Each page has a picture of the symptom:"
-        " the same grasp without and with the effect. `forcegrasp effects NAME` says the same in the terminal.",
+        " the same grasp without and with the effect. `forcegrasp effects NAME` says the same in the terminal. Sizes"
+        " are those of the paper's gripper: with `gripper=` they are in proportion to that one's, in radians and N·m of"
+        " a motor that turns.",
         "",
         "These pages are made by `python tools/effect_pages.py`.",
     ]

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 _NOISE = 0.5
 # Share by which a reading may differ from what presses: the paper's sensors add tangential forces, 2 % here.
 _MISSED = 0.1
+# Share by which one side's contacts may be stiffer than the other's; a set shows as much.
+_UNLIKE = 0.03
 # Share of their inertia that motors may get from the integrator.
 _HEAVIER = 0.1
 # Speed at which half of its dry friction may let an object creep, m/s: 0.1 mm in a second.
@@ -86,15 +88,23 @@ def _sizes(gripper: Gripper) -> Iterator[Finding]:
 
 def _nominals(gripper: Gripper) -> Iterator[Finding]:
     """Whether parameters start where the scene has them: fits begin at the one, trainings take the other."""
+    import numpy as np
+
     from forcegrasp.physics.gripper_checks import compile_scene, scene_values
 
     model = compile_scene(gripper.model)
     for parameter in gripper.parameters.values():
         for write in parameter.writes:
             values = scene_values(gripper, model, write)
+            column = "" if write.column is None else f" {write.column}"
+            if len(values) and np.ptp(values) > _ROUNDED * abs(parameter.nominal) and not write.joint:
+                told = f"{parameter.name} gives each joint the same {write.field}{column}, and {gripper.model.name} has"
+                told += f" {' and '.join(dict.fromkeys(f'{value:g}' for value in values))}"
+                own = f"{'-' if write.sign < 0 else ''}{write.field}@{gripper.motors[0].joint}{column}"
+                yield warning("nominal", told, f"write one parameter for each motor, {own} and so on; {_PAGE}")
+                break
             other = values[abs(values - parameter.nominal) > _ROUNDED * abs(parameter.nominal)]
             if len(other):
-                column = "" if write.column is None else f" {write.column}"
                 told = f"{parameter.name} is {parameter.nominal:g}, and {gripper.model.name} has {other[0]:g}"
                 told += f" ({write.field}{column}): fits start from the first, trainings take the other"
                 yield warning("nominal", told, "give the scene's own value as nominal")
@@ -118,10 +128,7 @@ def _grasp(gripper: Gripper) -> Iterator[Finding]:
         return
     forces = " and ".join(f"{newtons:.3g}" for newtons in pressed)
     yield fine("grasp", f"an object of {radius:.3g} mm radius is pressed with {forces} N by full steps for 5 s")
-    deep = -1e3 * plant.clearance(np.arange(1))[0].min(axis=1)
-    if deep.min() > 0:
-        depths, stiff = " and ".join(f"{mm:.3g}" for mm in deep), 1e3 * pressed.mean() / deep.mean()
-        yield fine("stiffness", f"pads are {depths} mm in the object then: {float(f'{stiff:.3g}'):g} N/m on each side")
+    yield from _stiffness(plant, pressed)
     if gripper.force == "sensors":
         yield from _sensors(gripper, pressed, force[-1])
     if (apart := _apart(plant)) > _GIVES_WAY * gripper.training.position_std > 0:
@@ -150,6 +157,24 @@ def _grasp(gripper: Gripper) -> Iterator[Finding]:
         yield fine("contacts", f"both of MuJoCo's collision codes give the same grasp, to {differs:.2g} × the noise")
 
 
+def _stiffness(plant: Plant, pressed: np.ndarray) -> Iterator[Finding]:
+    """How stiff and how damped contacts are where each side presses with so many newtons, and whether alike."""
+    import numpy as np
+
+    deep = -plant.clearance(np.arange(1))[0].min(axis=1)
+    if deep.min() <= 0:
+        return
+    stiff, unlike = pressed / deep, np.ptp(pressed / deep) > _UNLIKE * np.min(pressed / deep)
+    depths = " and ".join(f"{1e3 * depth:.3g}" for depth in deep)
+    told = " and ".join(f"{float(f'{newtons:.3g}'):g}" for newtons in (stiff if unlike else [stiff.mean()]))
+    damping = f"damped by {stiff.mean() * _damping_per_stiffness(plant):.3g} N·s/m"
+    yield fine("stiffness", f"pads are {depths} mm in the object then: {told} N/m on each side, {damping}")
+    if unlike:
+        told = f"one object is {100 * (stiff.max() / stiff.min() - 1):.0f} % stiffer on one side than on the other"
+        alike = "MuJoCo scales contacts by the inertia of what touches: make that of both sides' bodies alike"
+        yield note("stiffness", f"{told}, which no real one is; {alike}, {_PAGE}")
+
+
 def _sensors(gripper: Gripper, pressed: np.ndarray, read: np.ndarray) -> Iterator[Finding]:
     """Whether sensors feel what presses."""
     with_sensor = [index for index, (_, finger) in enumerate(gripper.sides) if finger.force_sensor]
@@ -160,6 +185,22 @@ def _sensors(gripper: Gripper, pressed: np.ndarray, read: np.ndarray) -> Iterato
             yield warning("sensors", told, f"look at its site or bodies, and its sign; {_PAGE}")
         else:
             yield fine("sensors", told)
+
+
+def _damping_per_stiffness(plant: Plant) -> float:
+    """Damping of the contacts with the object over their stiffness, where the plant stands, s; their mean.
+
+    MuJoCo's documentation, Computation, "Constraint model": a reference acceleration of −b v − k d r.
+    """
+    import mujoco
+    import numpy as np
+
+    model, data = plant.batch.get_model(0), plant.batch.get_data(0)
+    mujoco.mj_forward(model, data)
+    pads, things = set(plant.pad_geoms.tolist()), set(plant.object_geoms.tolist())
+    touching = [c.efc_address for c in data.contact if {*c.geom} & pads and {*c.geom} & things and c.efc_address >= 0]
+    stiffness, damping, impedance, _ = data.efc_KBIP[touching].T
+    return float(np.mean(damping / (stiffness * impedance)))
 
 
 def _apart(plant: Plant) -> float:
@@ -182,7 +223,7 @@ def _heavier(plant: Plant) -> float:
     import numpy as np
 
     model = plant.model
-    resists = model.dof_damping[plant.motor_dofs].copy()
+    resists = plant.gearing**2 @ model.dof_damping
     of_joints = model.actuator_trntype[plant.actuators] == mujoco.mjtTrn.mjTRN_JOINT
     if model.opt.integrator in (mujoco.mjtIntegrator.mjINT_IMPLICIT, mujoco.mjtIntegrator.mjINT_IMPLICITFAST):
         per_speed = -model.actuator_biasprm[plant.actuators, 2] * model.actuator_gear[plant.actuators, 0] ** 2

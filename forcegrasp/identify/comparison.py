@@ -47,6 +47,8 @@ class Comparison(ShortRepr):
     heldout: np.ndarray  #: the same for grasps held out of the fit; NaN where there are none
     floor: float  #: error ÷ noise that a perfect model would leave
     between: BetweenSets | None = None  #: of several sets, which parameters differ from one to the next
+    #: rms ÷ noise by which the model moves with half its physics step, and with MuJoCo's other collision code
+    numerical: tuple[float, float] = (0.0, 0.0)
 
     def summary(self) -> str:
         return f"error {self.floor_ratio():.2f} × noise, a perfect model {self.floor:.2f}"
@@ -62,6 +64,13 @@ class Comparison(ShortRepr):
                     bias = float(inside.mean() * sigma)
                     found.append(Cell(signal, phase, len(inside), ratio * sigma, ratio, bias, unit))
         return found
+
+    def without_worst(self) -> tuple[str, float]:
+        """The grasp with the largest error, and what :meth:`floor_ratio` is without it; NaN if there is no other."""
+        held = self.heldout if np.isfinite(self.heldout).any() else self.residual
+        worst = int(np.nanargmax(rms_of_grasps(held, self.target)))
+        others = np.arange(len(held)) != worst
+        return self.target.grasps[worst].label, rms(held, self.target, others[:, None, None])
 
     def by_grasp(self) -> np.ndarray:
         """rms residual ÷ noise of each grasp, ``(G,)``."""
@@ -149,10 +158,12 @@ def compare(
     # a model that has not seen this set is tested on all of it
     held = heldout_residual(fit, target, make_folds(target.grasps)) if same else fit.residual
     numerical = numerical_error(fit, target)
-    floor = numerical_floor(beyond_fit(fit, numerical), target)
+    beyond = beyond_fit(fit, numerical)
+    floor = numerical_floor(beyond, target)
     used = model or model_of(fit, target, loaded, numerical)
     between = compare_sets(loaded.parts, used, progress) if loaded.parts else None
-    return Comparison(target, fit.predicted, fit.residual, held, floor, between), used, notes
+    half, other = (rms(one, target) for one in beyond)
+    return Comparison(target, fit.predicted, fit.residual, held, floor, between, (half, other)), used, notes
 
 
 def of_width(values: np.ndarray, width: int) -> np.ndarray:

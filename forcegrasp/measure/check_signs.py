@@ -22,6 +22,10 @@ _APART, _CROSSED = 0.05, 0.3
 # What positions and commands change in so many rows is compared this many rows apart, either way; and what is clearly
 # less than something else is so by this share.
 _WINDOW, _ROWS, _CLEARLY = 4, 8, 0.7
+# Share of the stroke by which no motor comes to stand past closed.
+_PAST_CLOSED = 0.1
+# Seconds by which one finger is felt before the other if it touches first, where nothing but this tells so.
+_LEAD_S = 0.3
 
 
 def check_signs(
@@ -42,7 +46,7 @@ def check_signs(
     if len(measured.columns.position) == len(measured.columns.command) == 2:
         _check_own_commands(measured, abs(reach))
     if measured.columns.read_effort:
-        _check_effort(measured)
+        _check_effort(measured, closed_m, reach)
     for channel in range(0 if measured.columns.read_effort else len(measured.columns.force)):
         _check_presses(measured, channel, closed_m, reach)
     if pads_at is None or measured.columns.read_effort:  # which is of no finger, and felt in free air
@@ -121,19 +125,27 @@ def _check_own_commands(measured: MeasurementSet, reach: float) -> None:
         )
 
 
-def _check_effort(measured: MeasurementSet) -> None:
+def _check_effort(measured: MeasurementSet, closed_m: float, reach: float) -> None:
     """A motor's effort must close while it is commanded to close further than it is, moving or not.
 
-    The command of its own row acts after it was read, that of the row before until then.
+    The command of its own row acts after it was read, that of the row before until then. Motors that come to stand
+    beyond where they are closed give away that positions and commands are counted the other way round.
     """
     efforts = np.concatenate([g.force_n[1:, 0] for g in measured.grasps])
     own = np.concatenate([(g.position_m[1:] - g.command_m[1:])[:, 0] for g in measured.grasps])
     before = np.concatenate([(g.position_m[1:] - g.command_m[:-1])[:, 0] for g in measured.grasps])
     found = [correlation(efforts, behind) for behind in (own, before)]
     if min(found) < -0.5 and max(found) < 0.5:
-        where = place(measured.path, measured.grasps[0], 0, measured.columns.force[0])
+        columns, first = measured.columns, measured.grasps[0]
+        closest = min(float(((grasp.position_m[:, 0] - closed_m) / reach).min()) for grasp in measured.grasps)
+        if closest < -_PAST_CLOSED:
+            raise MeasurementError(
+                f"{place(measured.path, first, 0, columns.position[0])}: positions go {-closest:.0%} of the stroke past"
+                f" closed; they and {columns.command[0]} must be 0 when closed and grow when opening"
+            )
         raise MeasurementError(
-            f"{where}: opens while the command is to close; f ≥ 0 presses, multiply them by -1; or q = 0 must be closed"
+            f"{place(measured.path, first, 0, columns.force[0])}: opens while the command is to close; f ≥ 0 presses,"
+            " multiply them by -1; or q = 0 must be closed"
         )
 
 
@@ -212,14 +224,12 @@ def _check_fingers(measured: MeasurementSet, pads: list[np.ndarray], reach: floa
         left_at, right_at = (np.inf if onset is None else grasp.time_s[onset] for onset in onsets)
         unlike = np.ptp(grasp.command_m[: first + 1], axis=1).max() > 0.02 * reach
         unlike |= np.ptp(places[first]) > 0.05 * reach
-        lead = 0.1 + 2 * float(np.median(np.diff(grasp.time_s)))
-        if unlike or abs(left_at - right_at) < lead:
+        lead, rows = abs(left_at - right_at), 2 * float(np.median(np.diff(grasp.time_s)))
+        if unlike or lead < rows:
             continue
         if (left_at < right_at) == (offset < 0):
             right.append(grasp)
-        elif _too_open_for_both(grasp, places[first], reach) or (
-            grasp.radius_m is None and abs(left_at - right_at) > 3 * lead
-        ):
+        elif _too_open_for_both(grasp, places[first], reach) or (grasp.radius_m is None and lead > _LEAD_S + 3 * rows):
             wrong.append(grasp)
     if len(wrong) > 1 and len(wrong) >= 0.8 * len(wrong + right):
         raise MeasurementError(

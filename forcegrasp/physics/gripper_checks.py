@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import mujoco
@@ -62,7 +62,7 @@ def check_gripper(gripper: Gripper, names: Mapping[str, str]) -> None:
     for parameter in gripper.parameters.values():
         for write in parameter.writes:
             where = f"{gripper.path}: parameters.{parameter.name}.writes: {write.field}"
-            check_write(where, model, write)
+            check_write(where, model, write, [motor.joint for motor in gripper.motors])
             _check_sign(where, gripper, model, parameter, write)
     try:
         _ = gripper.opening
@@ -173,6 +173,10 @@ def scene_values(gripper: Gripper, model: mujoco.MjModel, write: FieldWrite) -> 
         "dof": np.flatnonzero(np.asarray(model.dof_jntid) != model.joint(gripper.object_joint).id),
         "geom": [model.geom(gripper.object_geom).id],
     }
+    if write.joint:
+        own = [motor.joint == write.joint for motor in gripper.motors]
+        rows["actuator"] = list(np.compress(own, rows["actuator"]))
+        rows["dof"] = model.joint(write.joint).dofadr
     values = np.asarray(getattr(model, write.field))[rows.get(write.field.split("_")[0], [])]
     return write.sign * (values if write.column is None else values[:, write.column])
 
@@ -192,8 +196,19 @@ def _check_sign(
         )
 
 
-def check_write(where: str, model: mujoco.MjModel, write: FieldWrite) -> None:
-    """Raises ConfigError where a parameter writes what is no field of numbers, or no column of it."""
+def check_write(where: str, model: mujoco.MjModel, write: FieldWrite, joints: Sequence[str]) -> None:
+    """Raises ConfigError where a parameter writes what is no field of numbers, no column of it, or of no motor.
+
+    Args:
+      where: the file and the key, for messages.
+      model: the scene.
+      write: what is written.
+      joints: of the motors.
+    """
+    if write.joint and write.field.startswith("geom_"):
+        raise ConfigError(f"{where}@{write.joint}: geometries are the object's, of no joint; leave @{write.joint} out")
+    if write.joint and write.joint not in joints:
+        raise ConfigError(f"{where}@{write.joint}: is no motor's joint{closest(write.joint, joints)}")
     field: np.ndarray | None = getattr(model, write.field, None) if write.field in MODEL_FIELDS else None
     if field is None or not np.issubdtype(np.asarray(field).dtype, np.floating):
         known = [name for name in MODEL_FIELDS if name.startswith(("actuator_", "body_", "dof_", "geom_"))]

@@ -9,7 +9,7 @@ from typing import Any
 
 import mujoco
 
-from forcegrasp.errors import ConfigError, closest
+from forcegrasp.errors import closest
 from forcegrasp.files.validate import refusal, validate
 from forcegrasp.physics.gripper import START_VELOCITY, Gripper
 from forcegrasp.physics.gripper_checks import check_write, compile_scene
@@ -80,9 +80,7 @@ def _in_scene(mechanism: Gripper) -> Gripper:
     for key, writes in written.items():
         for write in writes:
             where = f"{mechanism.path}: {key}: {write.field}"
-            check_write(where, model, write)
-            if write.joint and write.joint not in joints:
-                raise ConfigError(f"{where}@{write.joint}: is no motor's joint{closest(write.joint, joints)}")
+            check_write(where, model, write, joints)
     if START_VELOCITY in mechanism.parameters and len(joints) > 1:
         raise refusal(mechanism.path, f"parameters.{START_VELOCITY}", "is for mechanisms with one motor; leave it out")
     turns = {model.joint(joint).type[0] == mujoco.mjtJoint.mjJNT_HINGE for joint in joints}

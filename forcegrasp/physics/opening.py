@@ -97,7 +97,9 @@ def measure_opening(
     # where pads meet, the motor presses on and they stay where they are
     first = max(int((opening > opening.min() + _MEET_M).argmax()) - 1, 0)
     if not ((np.diff(opening[first:]) > 0).all() and (np.diff(position[first:]) > 0).all()):
-        raise ValueError("the pads must come nearer all the way from open to closed")
+        backwards = opening[-1] < opening[0]
+        told = "; they go apart: are closed and open swapped?" if backwards else ""
+        raise ValueError(f"the pads must come nearer all the way from open to closed{told}")
     travel = np.array([left[first] - left[-1], right[-1] - right[first]]) / (position[-1] - position[first])
     half = object_half_width(model, object_geom, axis)
     return OpeningLaw(position[first:], opening[first:], travel, (faces[0] + half, faces[1] + half), table[first:, 4:])

@@ -67,13 +67,13 @@ class Plant(ContributedFields):
 
     @property
     def inertia(self) -> np.ndarray:
-        """Inertia that each motor moves where the scene puts it, kg or kg·m², ``(n, motors)``."""
-        return self.batch.expand("dof_M0")[:, self._motor_v]
+        """Inertia that each motor moves, all that is coupled to it included, kg or kg·m², ``(n, motors)``."""
+        return self.batch.expand("dof_M0") @ (self.gearing**2).T + self._shared_inertia
 
     @property
     def rotor_inertia(self) -> np.ndarray:
         """What of it is the motor's own, without what it moves, kg or kg·m², ``(n, motors)``."""
-        return self.base("dof_armature")[:, self._motor_v]
+        return self.base("dof_armature") @ (self.gearing**2).T
 
     @property
     def motor_force(self) -> np.ndarray:
@@ -141,9 +141,9 @@ class Plant(ContributedFields):
         That of both, one against the other, where a motor that moves both sides is held by both; the object's alone on
         a side that stands still.
         """
-        inertia, work = self.batch.expand("dof_M0")[rows], self.travel**2
+        work, thing = self.travel**2, self.batch.expand("dof_M0")[rows, self.object_dof, None]
         shared = np.array([work[self._mover == mover].sum() for mover in self._mover]) * (work > 0)
-        return 1 / (shared / inertia[:, self._motor_v][:, self._mover] + 1 / inertia[:, self.object_dof, None])
+        return 1 / (shared / self.inertia[rows][:, self._mover] + 1 / thing)
 
     def attach(self, effects: Sequence[tuple[PlantEffect, np.ndarray]]) -> None:
         """Puts effects into the plant, each on its own rows, in the order of their stages; replaces earlier ones."""
@@ -202,8 +202,7 @@ class Plant(ContributedFields):
         law = self.gripper.opening
         for dof in self.gripper_dofs if law.qpos.size else ():
             address = self.model.jnt_qposadr[self.model.dof_jntid[dof]]
-            mover = self._mover[1] if dof in self._dofs_of_right else self._mover[0]
-            self._qpos[ids, address] = np.interp(position[:, mover], law.position, law.qpos[:, address])
+            self._qpos[ids, address] = np.interp(position[:, self.mover_of(dof)], law.position, law.qpos[:, address])
         self._qpos[ids[:, None], self._motor_qpos] = position * self._signs + self._origins
 
     # --- time ----------------------------------------------------------------------------------------------------

@@ -140,6 +140,29 @@ class SceneLayout:
         return np.stack([work[:, self._moved_by(motor)].sum(axis=1) for motor in range(self.motors)], axis=1)
 
     @functools.cached_property
+    def gearing(self) -> np.ndarray:
+        """How far each joint goes per unit of each motor, on average, ``(motors, degrees of freedom)``."""
+        found, law = np.zeros((self.motors, self.model.nv)), self.gripper.opening
+        found[np.arange(self.motors), self.motor_dofs] = 1
+        for dof in self.gripper_dofs if law.qpos.size else ():
+            way = law.qpos[[0, -1], self.model.jnt_qposadr[self.model.dof_jntid[dof]]]
+            found[self.mover_of(dof), dof] = np.diff(way)[0] / (law.position[-1] - law.position[0])
+        return found
+
+    @functools.cached_property
+    def _shared_inertia(self) -> np.ndarray:
+        """What joints on the same bodies add to the inertia that each motor moves, beside their own, ``(motors,)``."""
+        data, inertia = mujoco.MjData(self.model), np.zeros((self.model.nv, self.model.nv))
+        mujoco.mj_forward(self.model, data)
+        mujoco.mj_fullM(self.model, data, inertia)
+        np.fill_diagonal(inertia, 0.0)
+        return np.einsum("mi,ij,mj->m", self.gearing, inertia, self.gearing)
+
+    def mover_of(self, dof: int) -> int:
+        """Index of the motor that moves a joint of the gripper."""
+        return int(self._mover[1] if dof in self._dofs_of_right else self._mover[0])
+
+    @functools.cached_property
     def _dofs_of_right(self) -> set[int]:
         """Degrees of freedom between the world and the right side's pads."""
         found: set[int] = set()

@@ -21,6 +21,8 @@ from forcegrasp.reports.view import view_section
 AT_FLOOR = 1.03
 # Beyond it an error below the floor is excused by the simulation's numerical error, and not by noise.
 _MOST_NOISE = 1.2
+# Floor ÷ noise from which on the simulation's numerical error is a good part of it.
+_ALL_NOISE = 1.1
 # Error ÷ noise beyond which a cell is marked.
 _MARKED = 2.0
 # What the residual is drawn against.
@@ -145,19 +147,24 @@ def answer(comparison: Comparison) -> str:
     else:
         where = f"on the {comparison.target.part}s that it was fitted to (too few to hold any out)"
     error = f"The model's error {where} is {value:.2f} × the sensor noise"
+    half, other = comparison.numerical
+    cure = "a smaller timestep" if 2 * half > other else "<flag multiccd='disable'/> or rounder pads"
     if at_floor(value, floor) and not at_floor(value, _MOST_NOISE):
         return (
             f"{error}, and up to {floor:.2f} × may be the simulation's own numerical error: this can't tell whether an"
-            " effect is missing. In the gripper's scene, try <flag multiccd='disable'/> or a smaller timestep."
+            f" effect is missing. In the gripper's scene, try {cure}."
         )
-    total = f"{error}; up to {floor:.2f} is noise."
+    noise = "noise" if floor < _ALL_NOISE else f"noise and the simulation's own error, for which {cure} would be better"
+    total = f"{error}; up to {floor:.2f} is {noise}."
     if at_floor(value, floor):
         if round(value, 2) > round(floor, 2):
-            total = f"{error}; up to {floor:.2f} is noise, and up to {_most(floor):.2f} next to nothing."
+            total = f"{error}; up to {floor:.2f} is {noise}, and up to {_most(floor):.2f} next to nothing."
         return f"{total} These measurements show no failure of the model."
+    label, less = comparison.without_worst()
+    alone = f" Without {comparison.target.part} {label} it would be {less:.2f}." if at_floor(less, floor) else ""
     return (
         f"{total} It is largest in {words(cell.phase)}, {words(cell.signal)}: {amount(cell.rms, cell.unit)},"
-        f" {cell.ratio:.1f} × noise."
+        f" {cell.ratio:.1f} × noise.{alone}"
     )
 
 
@@ -173,7 +180,7 @@ def printed(comparison: Comparison) -> Printed:
     table = Printed("phase", box=box.SIMPLE_HEAD, padding=(0, 1))
     names, units = comparison.target.axis.names, comparison.target.axis.units
     for signal in names:
-        table.add_column(words(signal), no_wrap=True)
+        table.add_column(words(signal))
     cells = {(cell.phase, cell.signal): cell for cell in comparison.cells()}
     for phase in comparison.target.phases:
         row = [cells.get((phase, signal)) for signal in names]

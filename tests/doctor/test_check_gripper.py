@@ -13,7 +13,7 @@ import pytest
 from forcegrasp.cli.main import main
 from forcegrasp.doctor.gripper import _creep, _heavier, check_gripper
 from forcegrasp.physics import load_gripper, shipped_grippers
-from forcegrasp.physics.plant import Plant
+from forcegrasp.physics.plant import Plant, write_base
 
 SECOND = Path(__file__).parents[1] / "grippers"
 Changed = Callable[..., str]
@@ -100,7 +100,14 @@ def test_a_contact_of_one_impedance_is_as_stiff_as_its_solref_says(changed):
         )
         (line,) = (line for line in said(path)["fine"] if "N/m on each side" in line)
         found.append(float(line.split(" N/m")[0].split()[-1]))
+        damping = float(line.split(" N·s/m")[0].split()[-1])
+        assert damping / found[-1] == pytest.approx(60 / stiffness, rel=0.01)
     assert found[1] / found[0] == pytest.approx(5.0, rel=0.02)
+
+
+def test_sides_of_other_masses_make_one_object_stiffer_on_one_side(changed):
+    heavy = {'<joint name="west"/>': '<joint name="west"/><geom size="0.001" mass="0.3" contype="0" conaffinity="0"/>'}
+    assert "stiffer on one side" in " ".join(said(changed(xml=heavy))["note"])
 
 
 @pytest.mark.parametrize("more", [0.0, 0.005])
@@ -123,6 +130,26 @@ def test_a_nominal_that_is_not_the_scenes(changed, nominal, told):
         line for line in found.get("warning", []) if f"servo_stiffness is {nominal}, and second.xml has 250" in line
     ]
     assert len(lines) == told
+
+
+def test_motors_that_differ_are_told_to_have_a_parameter_each(changed):
+    """One parameter would give both the same: a set with nothing hidden then shows motors that are unlike."""
+    line = 'name="drive_east" joint="east"'
+    scene = {line: line + ' kp="240"'}
+    (warned,) = said(changed(xml=scene))["warning"]
+    assert "gives each joint the same actuator_gainprm 0, and second.xml has 250 and 240" in warned
+    assert "actuator_gainprm@west 0" in warned
+    both = "servo_stiffness: {nominal: 250, low: 100, high: 800, unit: N/m, scope: gripper, writes: "
+    old = both + "[actuator_gainprm 0, -actuator_biasprm 1]}"
+    each = [
+        f"  {side}_{both}[actuator_gainprm@{side} 0, -actuator_biasprm@{side} 1]}}".replace("250", nominal)
+        for side, nominal in (("west", "250"), ("east", "240"))
+    ]
+    path = changed(xml=scene, yaml={"  " + old: "\n".join(each)})
+    assert "warning" not in said(path)
+    plant, ids = Plant(load_gripper(path), 1, threads=1), np.arange(1)
+    write_base(plant, ids, {"east_servo_stiffness": np.array([300.0])})
+    assert plant.field("actuator_gainprm")[0, :, 0].tolist() == [250, 300]
 
 
 def test_what_follows_from_the_description_is_told_in_users_units():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 
+import numpy as np
 import pytest
 
 from forcegrasp.cli.main import main
@@ -61,3 +62,16 @@ def test_what_cannot_be_right_is_to_be_mended(named, folder, capsys):
     status, found = said(capsys, folder if named else folder / "nowhere")
     assert (status, set(found)) == (1, {"mend"})
     assert ("did you mean q_l_m?" if named else "no such measurement set") in found["mend"][0]
+
+
+def test_stamps_that_scatter(measured, tmp_path, capsys):
+    rng = np.random.default_rng(2)
+    grasps = [
+        dataclasses.replace(g, time_s=g.time_s + 0.002 * rng.standard_normal(len(g.time_s))) for g in measured.grasps
+    ]
+    write_set(dataclasses.replace(measured, grasps=tuple(grasps)), tmp_path / "set")
+    status, found = said(capsys, tmp_path / "set")
+    assert status == 0
+    (line,) = found["note"]
+    assert "ms apart (from 3" in line
+    assert "uneven stamps" in line

@@ -280,6 +280,8 @@ BROKEN_VALUES = [
     ),
     (f"{_DAMPING}.writes", ["geom_solimp"], "geom_solimp needs a column from 0 to 4"),
     (f"{_DAMPING}.writes", ["geom_solimp 5"], "geom_solimp needs a column from 0 to 4"),
+    (f"{_DAMPING}.writes", ["dof_damping@wrist"], "dof_damping@wrist: is no motor's joint"),
+    (f"{_DAMPING}.writes", ["geom_solref@west 0"], "geometries are the object's, of no joint; leave @west out"),
     ("parameters.radius_m.writes", ["geom_size 0"], "parameters.radius_m.writes: must be []"),
     ("parameters.radius_m.low", -0.01, "parameters.radius_m.low: must be positive"),
 ]
@@ -346,6 +348,16 @@ def test_broken_value_of_the_second_format(tmp_path, key, value, expected):
     path = tmp_path / "mine.yaml"
     path.write_text(yaml.safe_dump(description))
     assert expected in _refusal(path)
+
+
+def test_closed_and_open_swapped_of_one_motor_is_told(tmp_path):
+    shipped = load_gripper("robotiq_2f85").path
+    (tmp_path / "robotiq_2f85.xml").write_text(shipped.with_suffix(".xml").read_text())
+    description = yaml.safe_load(shipped.read_text())
+    description["motors"][0] |= {"closed": 0.0, "open": 0.8}
+    path = tmp_path / "mine.yaml"
+    path.write_text(yaml.safe_dump(description))
+    assert "from open to closed; they go apart: are closed and open swapped?" in _refusal(path)
 
 
 def test_several_wrong_keys_are_told_at_once(tmp_path):

@@ -12,6 +12,7 @@ from forcegrasp.errors import ConfigError
 from forcegrasp.physics import GraspSimulator
 from forcegrasp.physics.fast import compile_fast
 from forcegrasp.physics.gripper_file import load_gripper
+from forcegrasp.physics.plant import Plant
 
 TIERS = ("reference", "fast")
 TIAGO = load_gripper("tiago")
@@ -95,3 +96,16 @@ def test_pads_are_where_they_were_measured(tier):
 def test_unknown_tier_is_refused():
     with pytest.raises(ConfigError, match=r"physics\.tier=exact: must be reference or fast"):
         GraspSimulator(1, "exact")
+
+
+@pytest.mark.parametrize("name", ["tiago", "franka_hand", "robotiq_2f85"])
+def test_the_inertia_that_a_motor_moves_is_what_a_push_shows(name):
+    """Of both fingers where they are coupled. In a step so short that nothing else acts yet."""
+    plant, push = Plant(load_gripper(name), 1, threads=1, step_factor=0.02), 0.02
+    speeds = []
+    for load in (0.0, -push):
+        plant.reset(np.arange(1), np.zeros(1))
+        plant.disturb(np.full(1, load), np.ones(1, bool))
+        plant.advance(plant.position.copy())
+        speeds.append(plant.velocity[0])
+    np.testing.assert_allclose(push * plant.dt / (speeds[0] - speeds[1]), plant.inertia[0], rtol=0.01)

@@ -99,9 +99,23 @@ def test_compare_says_of_an_error_a_little_beyond_the_noise_that_it_is_next_to_n
 def test_compare_can_not_tell_where_numerical_error_is_large(made_up):
     one_and_a_half = 1.5 * np.random.default_rng(3).standard_normal(made_up.comparison.residual.shape)
     comparison = dataclasses.replace(made_up.comparison, residual=one_and_a_half, heldout=one_and_a_half, floor=2.5)
-    answer = comparison_report.answer(comparison)
+    answer = comparison_report.answer(dataclasses.replace(comparison, numerical=(1.0, 0.0)))
     assert "can't tell" in answer
     assert "no failure" not in answer
+    assert "try a smaller timestep" in answer
+    assert "multiccd" in comparison_report.answer(dataclasses.replace(comparison, numerical=(0.1, 2.0)))
+    fine = dataclasses.replace(comparison, residual=one_and_a_half / 1.5, heldout=one_and_a_half / 1.5, floor=1.5)
+    assert "up to 1.50 is noise and the simulation's own error" in comparison_report.answer(fine)
+
+
+def test_compare_says_where_one_grasp_makes_all_of_the_error(made_up):
+    calm = np.random.default_rng(3).standard_normal(made_up.comparison.residual.shape)
+    calm[2] *= 3
+    comparison = dataclasses.replace(made_up.comparison, residual=calm, heldout=calm.copy())
+    label = made_up.target.grasps[2].label
+    assert f"Without grasp {label} it would be 1.0" in comparison_report.answer(comparison)
+    comparison.heldout[1] *= 3
+    assert "Without" not in comparison_report.answer(comparison)
 
 
 def test_an_estimated_noise_is_called_a_lower_bound(made_up):
