@@ -106,6 +106,10 @@ _PLANS = {
         "fast ramps, opening and closing, in free air; a squeeze and a release",
         ((25.6, 0.02, 0.4), (27.4, 0.02, 0.4), (25.6, 0.02, 0.4), (22, 0.02, 0.3), (27, 0.02, 0.4)),
     ),
+    "viscous_friction": Show(
+        "fast and slow ramps in free air; a squeeze and a release",
+        ((25.6, 0.02, 0.4), (27.4, 0.02, 0.4), (26.4, 0.004, 0.4), (22, 0.02, 0.3), (27, 0.02, 0.4)),
+    ),
     "readout_skew": _STEPS,
     "elastic_transmission": Show("steps of a servo's jaw", ()),
     "velocity_lag": Show("steps of a servo's jaw", ()),

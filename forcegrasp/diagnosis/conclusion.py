@@ -16,7 +16,7 @@ from forcegrasp.diagnosis.result import Diagnosis, Step, kept_steps, settle_ties
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.diagnosis.verdict import EXPLAINED_FAR, MUCH, conclude
 from forcegrasp.effects import Effect
-from forcegrasp.identify.base_fit import BaseFit
+from forcegrasp.identify.base_fit import BaseFit, check_gradient
 from forcegrasp.identify.fit import Fit
 from forcegrasp.identify.noise_floor import numerical_error
 from forcegrasp.identify.verdict import Verdict
@@ -67,9 +67,11 @@ def concluded(begun: Begun, study: Study, steps: Sequence[Step], fit: Fit, in_a_
     found = kept_steps(steps)
     only_of_set = all(s.candidates and s.candidates[0].effect.of_set for s in found)
     share = study.explained(target.before_rounding(study.heldout(base.fit)), study.heldout(fit))
-    # a missing effect makes the error rough, and the base fit stop short: then what leaves more may be a look-alike
+    # a missing effect makes the error rough, and the base fit stop short: then what leaves more may be a look-alike,
+    # unless with it the fit came to an end
     leaves_more = error_after > AS_GOOD_AS_NOTHING * floor and share < EXPLAINED_FAR
-    if left and not base.converged and (not found or leaves_more):
+    led_on = bool(found) and check_gradient(fit, target).converged
+    if left and not base.converged and not led_on and (not found or leaves_more):
         return Diagnosis(
             Verdict.NOT_FITTED, (), (), base, base.fit, target, begun.folds, error_before, error_before, odd=begun.odd
         )

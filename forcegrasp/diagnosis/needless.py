@@ -18,6 +18,7 @@ from forcegrasp.diagnosis.families import (
     roughly_without,
     simpler,
 )
+from forcegrasp.diagnosis.judge import LEAST_GAIN_AT_FLOOR, largest_fall
 from forcegrasp.diagnosis.result import Step
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.diagnosis.verdict import LEAST_SHARE
@@ -184,6 +185,14 @@ def _without_needless(study: Study, fit: Fit, names: Sequence[str]) -> tuple[str
         study.progress(f"fitting without {name}")
     fits = side_by_side([partial(refit_without, name, fit, study) for name in doubted])
     for name, less in zip(doubted, fits, strict=True):
-        if not is_beyond_chance(study.gains(study.heldout(less), held), LEAST_RISE):
+        if not _is_asked_for(study, study.heldout(less), held):
             without[name] = less
     return min(without.items(), key=lambda item: item[1].cost) if without else None
+
+
+def _is_asked_for(study: Study, without: np.ndarray, held: np.ndarray) -> bool:
+    """Whether held-out residuals without an effect ask for it: it would be looked for, and found, beside the others."""
+    if not is_beyond_chance(study.gains(without, held), LEAST_RISE):
+        return False
+    leaves_more = excess(without, study.numerical, study.target)
+    return bool(leaves_more) or largest_fall(study.target, without, held) >= LEAST_GAIN_AT_FLOOR

@@ -130,7 +130,7 @@ def _add_effects(
             continue
         step = look_further(study, fit, screen, untried, rng, richer, most if fit is begun.fit else np.inf)
         # what is on trial has no look-alikes that are worth the time, and what was found together takes too long
-        much = not step.effects and so_far.believed is None and not several.done
+        much = (step.of_many or not step.effects) and so_far.believed is None and not several.done
         much = much and step.error_before > AS_GOOD_AS_NOTHING * begun.floor
         much = much and not (may_be_given is not None and may_be_given(study.target, fit))
         if much and untried and screened is not fit:  # beside what was found since, others may do something else

@@ -14,7 +14,7 @@ from forcegrasp.diagnosis.evidence import (
     indistinguishable,
     is_significant,
 )
-from forcegrasp.diagnosis.judge import judged
+from forcegrasp.diagnosis.judge import LEAST_GAIN, LEAST_GAIN_AT_FLOOR, judged
 from forcegrasp.diagnosis.noise_check import unexpected_noise
 from forcegrasp.diagnosis.refine import LOST_IF_FITTED, NO_BETTER, refine, refine_anyway
 from forcegrasp.diagnosis.result import Candidate, Step
@@ -29,8 +29,6 @@ from forcegrasp.identify.fit import Fit, fit_exactly
 from forcegrasp.identify.noise_floor import excess
 from forcegrasp.identify.side_by_side import side_by_side
 
-#: An effect must lower the error of some signal in some phase by this share; by more where all is at the floor already.
-LEAST_GAIN, LEAST_GAIN_AT_FLOOR = 0.02, 0.1
 # Beside effects that leave little its gain must be so many standard errors: a few grasps whose contacts went their own
 # way may hold all that is left. What was there gained three or more, what was not 1.4 to 2.0.
 _SURE = 2.0

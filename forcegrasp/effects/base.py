@@ -77,7 +77,8 @@ class Effect:
     parameters: ClassVar[tuple[Parameter, ...]]
     #: Ways in which the effect is known to occur; a diagnosis tries each under the one name.
     variants: ClassVar[tuple[str, ...]] = ("",)
-    #: What a variant needs, if it is "pads", or "position loop" where efforts may be commanded; see for_gripper.
+    #: What a variant needs, if it is "pads", "position loop" where efforts may be commanded, or "stiffness of objects"
+    #: where a base parameter gives each object one; see for_gripper.
     variant_needs: ClassVar[Mapping[str, str]] = {}
     #: Position among the effects of the same stage; smaller acts first.
     order: ClassVar[int] = 0
@@ -104,6 +105,7 @@ class Effect:
     least_size: ClassVar[float] = -np.inf  #: of its first parameter: what comes out smaller is something else
     least_steps: ClassVar[float] = 0.0  #: of its first parameter, a time, fewer physics steps are the integrator's own
     base_parameter: ClassVar[str] = ""  #: one that says the same; where a gripper has it, the effect is left out
+    repeats_damping: ClassVar[bool] = False  #: does what a base parameter of damping does, beside which it is left out
     least_channels: ClassVar[int] = 0  #: force readings that the gripper must have for it to make a difference
     least_motors: ClassVar[int] = 1  #: that move fingers of their own
     # of the gripper, see for_gripper

@@ -20,7 +20,7 @@ class DirectionFriction(Effect):
     symptom = "fast motion lags more in one direction than in the other; where it rests is right"
     formula = "F = −d v while opening if d > 0, F = −|d| v while closing if d < 0"
     source = "direction-dependent viscous friction of gears and seals: Armstrong-Hélouvry et al. (1994)"
-    look_alikes = ("motor_offset", "coulomb_friction", "back_emf")
+    look_alikes = ("motor_offset", "coulomb_friction", "viscous_friction", "back_emf")
     separates = "slow motion and rest, where an offset of the motor's force stays as large and this one vanishes"
     parameters = (
         Parameter(

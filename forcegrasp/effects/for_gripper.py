@@ -27,6 +27,7 @@ class _Traits:
     position: float  #: factors of sizes, see :class:`~forcegrasp.physics.gripper.Gripper`
     effort: float
     force: float
+    own_stiffness: bool = False  #: contacts of each object have a stiffness of their own
 
     @classmethod
     def of(cls, gripper: Gripper) -> _Traits:
@@ -36,7 +37,11 @@ class _Traits:
         effort = force * (float(sum(travel)) if travel and not gripper.is_direct else 1.0)
         motors, channels = len(gripper.motors), len(gripper.forces)
         kind = not gripper.is_servo, gripper.command != "position", turns
-        return cls(motors, channels, *kind, gripper.position_scale, effort, force)
+        return cls(motors, channels, *kind, gripper.position_scale, effort, force, gripper.has_own_stiffness)
+
+
+#: Those that the catalogue is written for.
+_AS_WRITTEN = _Traits(2, 2, True, False, False, 1.0, 1.0, 1.0)
 
 
 def effects_of(gripper: Gripper) -> dict[str, type[Effect]]:
@@ -63,6 +68,8 @@ def why_left_out(effect: type[Effect], gripper: Gripper) -> str:
         return f"needs servos that act on their velocity; those of {gripper.name} have no `kv`"
     if effect.base_parameter in gripper.parameters:
         return f"is the base parameter {effect.base_parameter} of {gripper.name}"
+    if effect.repeats_damping and gripper.fits_damping:
+        return f"is damping, which a base parameter of {gripper.name} has"
     if effect.least_channels > len(gripper.forces):
         return f"needs {effect.least_channels} force readings; {gripper.name} has {len(gripper.forces)}"
     if effect.least_motors > (1 if gripper.is_servo else len(gripper.motors)):
@@ -88,13 +95,19 @@ def effect_of(name: str, gripper: Gripper) -> type[Effect]:
 
 def _variants(effect: type[Effect], traits: _Traits) -> tuple[str, ...]:
     """The variants that can show."""
-    there = {"": True, "pads": traits.pads, "position loop": not traits.commands_effort}
+    there = {
+        "": True,
+        "pads": traits.pads,
+        "position loop": not traits.commands_effort,
+        "stiffness of objects": traits.own_stiffness,
+    }
     return tuple(v for v in effect.variants if there[effect.variant_needs.get(v, "")])
 
 
 @functools.cache
 def _adapt(effect: type[Effect], traits: _Traits) -> type[Effect]:
-    if traits == _Traits(2, 2, True, False, False, 1.0, 1.0, 1.0):
+    as_written = dataclasses.replace(traits, own_stiffness=False) == _AS_WRITTEN
+    if as_written and _variants(effect, traits) == effect.variants:
         return effect
     each = {"motor": traits.motors, "channel": traits.channels}
     if not traits.pads:  # joints of a mechanism have no left and right: what an effect does to them is alike

@@ -71,6 +71,7 @@ _SHIPPED = (
     "two_mass_backlash",
     "velocity_lag",
     "viscoelastic_contact",
+    "viscous_friction",
 )
 
 

@@ -18,7 +18,7 @@ class SmoothFriction(CreepingFriction):
     symptom = "it lags as with dry friction while it moves, and then creeps to its command instead of stopping short"
     formula = "F = −F_c tanh(v / v_c)"
     source = "Andersson, Söderberg and Björklund (2007), smooth Coulomb friction"
-    look_alikes = ("coulomb_friction", "presliding", "stiction", "viscoelastic_contact")
+    look_alikes = ("coulomb_friction", "presliding", "stiction", "viscous_friction", "viscoelastic_contact")
     separates = "long pauses in free air after a motion: it creeps on where dry friction rests"
     parameters = (
         Parameter("force_n", "friction F_c", "N", 0.0, 0.5, 0.03, trials=(0.02, 0.06), follows="effort"),

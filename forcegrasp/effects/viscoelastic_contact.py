@@ -12,7 +12,9 @@ class ViscoelasticContact(Effect):
     """A Maxwell branch beside the elastic contact, which only pushes: a standard linear solid at the pad.
 
     ``recovering``: what has yielded comes back as slowly, also once nothing presses. ``following``: what the branch
-    would hold back comes along at once, so that a touch finds it as the first one did.
+    would hold back comes along at once, so that a touch finds it as the first one did. ``recovering_by_object``,
+    ``following_by_object``: the same, and the branch goes with the stiffness of each object's contact: k is that on
+    one as stiff as the scene's.
     """
 
     name = "viscoelastic_contact"
@@ -21,7 +23,8 @@ class ViscoelasticContact(Effect):
     needs_object = True
     symptom = "force decays during a hold while the finger creeps inward; the peak depends on speed"
     formula = (
-        "F = F_contact + max(0, k (δ − x)), τ dx/dt = δ − x, δ the depth of the pad in the object; x ≤ δ (following)"
+        "F = F_contact + max(0, k (δ − x)), τ dx/dt = δ − x, δ the depth of the pad in the object; x ≤ δ (following);"
+        " k times an object's stiffness ÷ the scene's (by_object)"
     )
     source = "standard linear solid, Zener's form (Fung 1965)"
     look_alikes = ("finger_compliance", "finger_creep", "force_drift", "force_lag")
@@ -42,19 +45,23 @@ class ViscoelasticContact(Effect):
             trials=(0.1, 0.4, 1.5),
         ),
     )
-    variants = ("recovering", "following")
+    variants = ("recovering", "following", "recovering_by_object", "following_by_object")
+    variant_needs = dict.fromkeys(variants[2:], "stiffness of objects")
     order = 1
 
     def init(self, which: np.ndarray) -> State:
         relaxed, push = np.zeros((2, len(which), 2))
-        return {"surface": untouched(which), "relaxed": relaxed, "push": push}
+        firm = np.ones((len(which), 1))
+        if self.variant.endswith("by_object"):
+            firm = self.plant.contact_factors(self.rows[which])[:, 1:]
+        return {"surface": untouched(which), "relaxed": relaxed, "push": push, "firm": firm}
 
     def act(self) -> Contribution:
         depth, before = np.maximum(depth_in_object(self, self.pad_force), 0.0), self.state["relaxed"]
         relaxed = before + first_order_weight(self.dt, self["time_constant_s"]) * (depth - before)
-        if self.variant == "following":
+        if self.variant.startswith("following"):
             relaxed = np.minimum(relaxed, depth)
-        push = self["stiffness_n_m"] * np.maximum(depth - relaxed, 0.0)
+        push = self["stiffness_n_m"] * self.state["firm"] * np.maximum(depth - relaxed, 0.0)
         self.state.update(relaxed=relaxed, push=push)
         return contact_push(push)
 

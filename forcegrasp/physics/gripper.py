@@ -239,6 +239,22 @@ class Gripper(ShortRepr):
         return ("actuator_biasprm", 2) in written or any(gains)
 
     @functools.cached_property
+    def has_own_stiffness(self) -> bool:
+        """Whether a base parameter gives contacts of each object a stiffness of their own: the first of `solref`."""
+        written = [w for p in self.parameters.values() if p.scope == "object" for w in p.writes]
+        return any((write.field, write.column) == ("geom_solref", 0) for write in written)
+
+    @functools.cached_property
+    def fits_damping(self) -> bool:
+        """Whether a base parameter damps the motors: their joints, or by the servos' gain on the velocity.
+
+        The latter is a part of an effort that is read, which damping of the joints is not.
+        """
+        written = {(w.field, w.column) for p in self.parameters.values() for w in p.writes}
+        by_servo = ("actuator_biasprm", 2) in written and self.force != "motor"
+        return ("dof_damping", None) in written or by_servo
+
+    @functools.cached_property
     def has_rotors(self) -> bool:
         """Whether positions are commanded to motors that slide a finger each and have inertia of their own besides.
 

@@ -130,9 +130,11 @@ def test_extremes_are_simulated_without_a_warning(effect, variant):
 
 def test_variants_differ():
     for effect in catalogue().values():
-        if len(effect.variants) == 1:
+        # objects of this gripper have no stiffness of their own
+        variants = [v for v in effect.variants if effect.variant_needs.get(v) != "stiffness of objects"]
+        if len(variants) == 1:
             continue
-        traces = [rollout(1, [(effect, effect.typical_values(), v, [0])]) for v in effect.variants]
+        traces = [rollout(1, [(effect, effect.typical_values(), v, [0])]) for v in variants]
         rows = [trace.row(0) for trace in traces]
         assert all(rows[i] != rows[j] for i in range(len(rows)) for j in range(i)), effect.name
 

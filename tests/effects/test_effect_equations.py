@@ -144,6 +144,7 @@ class Pads:
     pad_shift_m = np.zeros((1, 2))
     object_geoms = np.array([0])
     width_m = 0.004  # of the object's contact
+    factors = (1.0, 1.0)  # damping and stiffness of the object's contact ÷ the scene's
 
     def __init__(self, distance: np.ndarray, force: np.ndarray | float, centre: float = 0.0) -> None:
         pads = np.array([-1, 1]) * distance + centre  # the left one stands on the negative side
@@ -160,7 +161,7 @@ class Pads:
         return np.full((len(rows), 2), np.inf)
 
     def contact_factors(self, rows: np.ndarray) -> np.ndarray:
-        return np.ones((len(rows), 2))
+        return np.tile(self.factors, (len(rows), 1))
 
     def field(self, name: str) -> np.ndarray:
         return {"geom_solimp": np.array([[[0.0, 0.99, self.width_m, 0.5, 2.0]]])}[name]
@@ -218,6 +219,18 @@ def test_following_viscoelastic_contact_holds_nothing_back():
         expected[now] = np.maximum(keep * (expected[now - 1] + 100.0 * further), 0.0)
     assert (expected[depth > 0] == 0).any()
     assert added == pytest.approx(expected, abs=1e-9)
+
+
+@pytest.mark.parametrize("kind", ["recovering", "following"])
+def test_the_branch_of_an_object_goes_with_its_stiffness(kind, monkeypatch):
+    distance, force, _ = depth_of((1.0, 0.4))
+    monkeypatch.setattr(Pads, "factors", (5.0, 2.5))
+    own, scenes = (
+        press(make("viscoelastic_contact", 100.0, 0.2, variant=variant), distance, force, 0 * T)
+        for variant in (f"{kind}_by_object", kind)
+    )
+    assert scenes.max() > 0.02
+    assert own == pytest.approx(2.5 * scenes, rel=1e-9)
 
 
 def test_viscoelastic_force_of_a_sudden_squeeze_is_an_exponential():

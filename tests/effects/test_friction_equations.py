@@ -201,6 +201,15 @@ def test_direction_friction_lags_in_one_direction(excess):
         assert GAIN * side * (command - plant.position[0]) == pytest.approx([damping * speed] * 2, rel=0.03)
 
 
+@pytest.mark.parametrize(("damping", "speed"), [(5.0, 0.004), (5.0, 0.008), (12.0, 0.004)])
+def test_viscous_friction_lags_in_proportion_to_speed(damping, speed):
+    """On a ramp the servo's spring holds damping (9 + 1 N s/m, and that besides) times speed."""
+    plant = settle("viscous_friction", (damping,), 0.035)
+    for command in 0.035 - speed * np.arange(1, round(0.008 / speed / plant.dt)) * plant.dt:
+        plant.advance(np.full((1, 2), command))
+    assert GAIN * (plant.position[0] - command) == pytest.approx([(10 + damping) * speed] * 2, rel=0.03)
+
+
 @pytest.mark.parametrize("speed", [3e-4, 2e-3, 8e-3])
 def test_smooth_stiction_is_the_stribeck_curve_over_speed(speed):
     """On a ramp the servo's spring holds the friction of its speed, and the damping of 10 N s/m."""

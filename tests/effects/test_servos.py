@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -73,6 +75,26 @@ def test_a_late_velocity_needs_a_servo_that_acts_on_it(tmp_path):
         assert ("velocity_lag" in effects_of(load_gripper(str(tmp_path / "jaw.yaml")))) == known
     with pytest.raises(ConfigError, match=r"velocity_lag: needs servos that act on their velocity; .* have no `kv`"):
         effect_of("velocity_lag", load_gripper(str(tmp_path / "jaw.yaml")))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "known"),
+    [("", "", False), ("dof_damping", "dof_armature", True), ("dof_damping", "-actuator_biasprm 2", True)],
+)
+def test_damping_is_an_effect_where_no_base_parameter_has_it(tmp_path, old, new, known):
+    """Nor the servo's gain on the velocity, unless its effort is read."""
+    gripper = load_gripper("so101_gripper")
+    (tmp_path / "so101_gripper.xml").write_text(gripper.model.read_text())
+    (tmp_path / "mine.yaml").write_text(gripper.path.read_text().replace(old, new))
+    assert gripper.force == "motor"
+    assert ("viscous_friction" in effects_of(load_gripper(str(tmp_path / "mine.yaml")))) == known
+    assert "viscous_friction" not in effects_of(load_gripper("tiago"))
+
+
+def test_a_branch_goes_with_the_stiffness_of_objects_that_have_one():
+    second = load_gripper(str(Path(__file__).parents[1] / "grippers" / "second.yaml"))
+    assert "recovering_by_object" in effect_of("viscoelastic_contact", second).variants
+    assert effect_of("viscoelastic_contact", load_gripper("tiago")).variants == ("recovering", "following")
 
 
 @pytest.mark.parametrize(
