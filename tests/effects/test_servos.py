@@ -93,8 +93,8 @@ def test_damping_is_an_effect_where_no_base_parameter_has_it(tmp_path, old, new,
 
 def test_a_branch_goes_with_the_stiffness_of_objects_that_have_one():
     second = load_gripper(str(Path(__file__).parents[1] / "grippers" / "second.yaml"))
-    assert "recovering_by_object" in effect_of("viscoelastic_contact", second).variants
-    assert effect_of("viscoelastic_contact", load_gripper("tiago")).variants == ("recovering", "following")
+    assert "solid_by_object" in effect_of("viscoelastic_contact", second).variants
+    assert effect_of("viscoelastic_contact", load_gripper("tiago")).variants == ("recovering", "following", "solid")
 
 
 @pytest.mark.parametrize(
