@@ -8,6 +8,7 @@ import functools
 import numpy as np
 import pytest
 
+from forcegrasp.diagnosis import needless
 from forcegrasp.diagnosis.needless import drop_all_needless, drop_needless, simplify
 from forcegrasp.diagnosis.result import Candidate, Step, kept_steps
 from forcegrasp.diagnosis.study import Study
@@ -86,6 +87,19 @@ def test_all_that_is_no_longer_needed_goes_and_its_step_with_it(found):
     assert steps == [step]
     assert [one.effect.name for one in less.problem.effects] == ["coulomb_friction"]
     assert drop_all_needless(study, [first, step], fit, 2) == ([first, step], fit)  # they were given
+
+
+@pytest.mark.parametrize(
+    ("beyond_chance", "left", "worse", "asked"),
+    [(True, "", 1.02, False), (True, "", 1.3, True), (True, "1.1 × noise", 1.02, True), (False, "", 1.3, False)],
+)
+def test_what_the_search_would_not_look_for_is_not_asked_for(found, monkeypatch, beyond_chance, left, worse, asked):
+    """Where noise alone is left, an effect must lower the error of some signal in some phase by a tenth."""
+    study, _, fit = found("coulomb_friction")
+    held = study.heldout(fit)
+    monkeypatch.setattr(needless, "is_beyond_chance", lambda *_: beyond_chance)
+    monkeypatch.setattr(needless, "excess", lambda *_: left)
+    assert needless._is_asked_for(study, worse * held, held) == asked
 
 
 def test_a_step_takes_the_place_of_one_effect_at_most(found):

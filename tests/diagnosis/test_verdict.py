@@ -386,7 +386,7 @@ def found_by(made_up, monkeypatch):
     def run(*steps: Step, converged: bool = True, forms: bool = False) -> Diagnosis:
         following = iter((*steps, Step((), (), (), 1.0, 1.0)))
         base = made_up.base.fit
-        monkeypatch.setattr(search, "look_further", lambda *a: next(following))
+        monkeypatch.setattr(search, "look_further", lambda *a, **k: next(following))
         monkeypatch.setattr(search, "_fitted_anyway", lambda *a: None)
         monkeypatch.setattr(search, "better_without", lambda *a: None)
         for module in (search, conclusion):
@@ -420,9 +420,30 @@ def test_effects_lists_what_was_found_and_then_the_rivals(made_up, found_by):
 def test_where_the_base_fit_stopped_short_what_explains_most_is_an_answer(made_up, found_by, monkeypatch):
     bias, drift = made_up.diagnosis("one_of").steps[0].candidates
     half = dataclasses.replace(bias, fit=drift.fit)
+    end = dataclasses.replace(made_up.base, converged=False)
+    monkeypatch.setattr(conclusion, "check_gradient", lambda *_: end)
     for candidate, most, verdict in ((bias, 0.9, "effect"), (half, 0.9, "not_fitted"), (half, 0.5, "effect")):
         monkeypatch.setattr(conclusion, "EXPLAINED_FAR", most)
         assert found_by(Step(("force_bias",), (candidate,), (), 2.0, 1.6), converged=False).verdict == verdict
+
+
+def test_where_the_base_fit_stopped_short_what_led_a_fit_to_its_end_is_an_answer(made_up, found_by, monkeypatch):
+    bias, drift = made_up.diagnosis("one_of").steps[0].candidates
+    half = dataclasses.replace(bias, fit=drift.fit)
+    for converged, verdict in ((False, "not_fitted"), (True, "effect")):
+        end = dataclasses.replace(made_up.base, converged=converged)
+        monkeypatch.setattr(conclusion, "check_gradient", lambda *_, end=end: end)
+        assert found_by(Step(("force_bias",), (half,), (), 2.0, 1.6), converged=False).verdict == verdict
+
+
+def test_an_effect_that_explains_little_is_not_believed_before_a_fresh_look(made_up, found_by):
+    """Beside what was found since, signatures of others may be other than they were."""
+    bias, drift = made_up.diagnosis("one_of").steps[0].candidates
+    half = dataclasses.replace(bias, fit=drift.fit)
+    little = Step(("force_drift",), (drift,), (), 1.6, 1.5, of_many=True)
+    more = Step(("backlash",), (drift,), (), 1.6, 1.0)
+    diagnosis = found_by(Step(("force_bias",), (half,), (), 2.0, 1.6), little, more)
+    assert diagnosis.effects == ("force_bias", "backlash")
 
 
 @pytest.mark.parametrize(("left", "verdict"), [("", "explained"), ("1.3 × noise", "not_fitted")])
