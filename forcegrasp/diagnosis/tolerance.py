@@ -22,6 +22,8 @@ from forcegrasp.replay.replay import Replay
 MOST = 3.0
 # What is nearer than so many is not told.
 _TOLD = 1.0
+# Radii whose mean is so many of its standard deviations below 0 may all be too large, or pads may stand further out.
+_ALIKE = 1.5
 # All moves together are no surprise if one of so many standard deviations would be as likely.
 _NO_SURPRISE = 2.0
 #: It is worth a fit if it takes this share off the squares that a fit leaves beyond the noise.
@@ -99,6 +101,14 @@ class Moved:
         sizes = {n.owner: move for n, move in zip(self.numbers, self.deviations, strict=True) if n.kind == "radius_m"}
         alike = not sizes or max(sizes.values()) - min(sizes.values()) < MOST
         return [] if alike else [name for name, move in sizes.items() if abs(move) >= MOST]
+
+    @property
+    def smaller_m(self) -> float:
+        """By how much radii were moved down on average, metres, where chance would hardly do it to all; else 0."""
+        radii = [(n.std, move) for n, move in zip(self.numbers, self.deviations, strict=True) if n.kind == "radius_m"]
+        stds, moves = np.array(radii).reshape(-1, 2).T
+        alike = len(radii) > 1 and moves.sum() < -_ALIKE * np.sqrt(len(radii))
+        return float(-np.mean(stds * moves)) if alike else 0.0
 
     @property
     def is_no_surprise(self) -> bool:

@@ -99,6 +99,8 @@ def fault_words(diagnosis: Diagnosis) -> str:
     named = _named(diagnosis.fault)
     if diagnosis.fault.moved is not None and diagnosis.fault.name not in diagnosis.effects:
         moved = f"What the set gives was moved within its tolerance: {diagnosis.fault.words}"
+        if smaller := diagnosis.fault.moved.smaller_m:
+            moved += f" (objects are {1e3 * smaller:.2g} mm smaller on average so, as backlash would have them look)"
         if diagnosis.error_moved is None:
             return f"{moved}; as given the error is {diagnosis.error_before:.2f} × noise."
         if diagnosis.error_moved > _SHOWS * diagnosis.error_before:

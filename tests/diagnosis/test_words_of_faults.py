@@ -89,6 +89,18 @@ def test_a_move_that_lowers_no_error_alone_is_not_said_to(made_up, fault, error_
     assert told in answer(dataclasses.replace(found, fault=fault, error_moved=error_moved * found.error_before))
 
 
+@pytest.mark.parametrize(
+    ("moves", "told"), [((-1.9, 0.0, -2.0), True), ((-1.9,), False), ((1.9, 2.0), False), ((-1.9, 1.8, 0.1), False)]
+)
+def test_radii_that_are_smaller_on_average_may_be_backlash(made_up, fault, moves, told):
+    """A gap lets fingers come nearer before they press, on every object alike; other errors of radii do not."""
+    found = made_up.diagnosis("effect")
+    radii = tuple(_Number("radius_m", f"object {i}", 3e-4, np.ones(2, bool)) for i in range(len(moves)))
+    fault = dataclasses.replace(fault, moved=Moved(radii, np.array(moves)))
+    said = answer(dataclasses.replace(found, fault=fault, error_moved=0.8 * found.error_before))
+    assert ("0.39 mm smaller on average so, as backlash would have them look" in said) == told
+
+
 @pytest.mark.parametrize(("delay_s", "told"), [(0.04, "1 row"), (0.0802, "2 rows"), (0.06, ""), (0.003, "")])
 def test_a_delay_of_whole_rows_may_be_the_log(made_up, delay_s, told):
     found = made_up.diagnosis("effect")
