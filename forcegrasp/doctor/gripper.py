@@ -9,6 +9,7 @@ from forcegrasp.doctor.finding import Finding, fine, mend, note, warning
 from forcegrasp.errors import ConfigError, PhysicsError
 
 if TYPE_CHECKING:
+    import mujoco
     import numpy as np
 
     from forcegrasp.physics import Gripper
@@ -192,15 +193,22 @@ def _damping_per_stiffness(plant: Plant) -> float:
 
     MuJoCo's documentation, Computation, "Constraint model": a reference acceleration of −b v − k d r.
     """
-    import mujoco
     import numpy as np
 
-    model, data = plant.batch.get_model(0), plant.batch.get_data(0)
-    mujoco.mj_forward(model, data)
+    data = _as_it_stands(plant)
     pads, things = set(plant.pad_geoms.tolist()), set(plant.object_geoms.tolist())
     touching = [c.efc_address for c in data.contact if {*c.geom} & pads and {*c.geom} & things and c.efc_address >= 0]
     stiffness, damping, impedance, _ = data.efc_KBIP[touching].T
     return float(np.mean(damping / (stiffness * impedance)))
+
+
+def _as_it_stands(plant: Plant) -> mujoco.MjData:
+    """The scene of the first row with its contacts and constraints where it stands."""
+    import mujoco
+
+    model, data = plant.batch.get_model(0), plant.batch.get_data(0)
+    mujoco.mj_forward(model, data)
+    return data
 
 
 def _apart(plant: Plant) -> float:
@@ -208,8 +216,7 @@ def _apart(plant: Plant) -> float:
     import mujoco
     import numpy as np
 
-    model, data = plant.batch.get_model(0), plant.batch.get_data(0)
-    mujoco.mj_forward(model, data)
+    data = _as_it_stands(plant)
     of_couplings = data.efc_type == mujoco.mjtConstraint.mjCNSTR_EQUALITY
     return float(np.abs(data.efc_pos[of_couplings]).max(initial=0.0))
 
@@ -279,8 +286,7 @@ def _normal_forces(gripper: Gripper, plant: Plant) -> np.ndarray:
     import mujoco
     import numpy as np
 
-    model, data = plant.batch.get_model(0), plant.batch.get_data(0)
-    mujoco.mj_forward(model, data)
+    model, data = plant.batch.get_model(0), _as_it_stands(plant)
     bodies, found, of_contact = [model.body(finger.body).id for finger in gripper.fingers], np.zeros(2), np.zeros(6)
     for index, contact in enumerate(data.contact):
         geoms = set(contact.geom.tolist())

@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 _PAGE = "see docs/compare-your-data.md"
 # Share of their distance by which rows scatter before that is told.
 _UNEVEN = 0.05
-_UNEVEN_TOO = "look whether rows are stamped when they are read, and not when they are written"
 
 
 def check_data(path: str) -> Iterator[Finding]:
@@ -49,7 +48,11 @@ def _readings(measured: MeasurementSet, gripper: Gripper) -> Iterator[Finding]:
     uneven = f" (from {least:.3g} to {most:.3g})" if most - least > _UNEVEN * apart else ""
     sessions = counted(len({grasp.session for grasp in measured.grasps}), "session")
     told = f"{rows} in {sessions}, {apart:.3g} ms apart{uneven}; columns {', '.join(measured.columns.signals)}"
-    yield note("rows", f"{told}; uneven stamps: {_UNEVEN_TOO}") if uneven else fine("rows", told)
+    if uneven:
+        remedy = "look whether rows are stamped when they are read, and not when they are written"
+        yield note("rows", f"{told}; uneven stamps", remedy)
+    else:
+        yield fine("rows", told)
     if masses := [grasp.mass_kg for grasp in measured.grasps if grasp.mass_kg is not None]:
         yield fine("masses", f"of objects are given in {len(masses)} grasps: {min(masses):.3g} to {max(masses):.3g} kg")
     for name, value, channels in (

@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import functools
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib.resources import files
 from pathlib import Path
@@ -15,7 +15,7 @@ import numpy as np
 
 from forcegrasp.errors import ConfigError
 from forcegrasp.physics.fast import compile_fast, with_larger_steps
-from forcegrasp.physics.gripper_parts import BaseParameter, Channel, FieldWrite, Finger, Motor, Training
+from forcegrasp.physics.gripper_parts import SCOPES, BaseParameter, Channel, FieldWrite, Finger, Motor, Training
 from forcegrasp.physics.guard import silence_log
 from forcegrasp.physics.opening import OpeningLaw, ground_geoms, measure_opening, straight_law
 from forcegrasp.physics.scene_file import check_scene
@@ -233,16 +233,14 @@ class Gripper(ShortRepr):
     @functools.cached_property
     def has_velocity_gain(self) -> bool:
         """Whether its servos act on their velocity: MuJoCo's `kv`, in the scene or as a base parameter."""
-        written = [(w.field, w.column) for p in self.parameters.values() for w in p.writes]
         model = self.compile()
         gains = [model.actuator(motor.actuator).biasprm[2] for motor in self.motors]
-        return ("actuator_biasprm", 2) in written or any(gains)
+        return self._fits("actuator_biasprm", 2) or any(gains)
 
     @functools.cached_property
     def has_own_stiffness(self) -> bool:
         """Whether a base parameter gives contacts of each object a stiffness of their own: the first of `solref`."""
-        written = [w for p in self.parameters.values() if p.scope == "object" for w in p.writes]
-        return any((write.field, write.column) == ("geom_solref", 0) for write in written)
+        return self._fits("geom_solref", 0, scopes=("object",))
 
     @functools.cached_property
     def fits_damping(self) -> bool:
@@ -250,9 +248,12 @@ class Gripper(ShortRepr):
 
         The latter is a part of an effort that is read, which damping of the joints is not.
         """
-        written = {(w.field, w.column) for p in self.parameters.values() for w in p.writes}
-        by_servo = ("actuator_biasprm", 2) in written and self.force != "motor"
-        return ("dof_damping", None) in written or by_servo
+        return self._fits("dof_damping") or (self.force != "motor" and self._fits("actuator_biasprm", 2))
+
+    def _fits(self, field: str, column: int | None = None, scopes: Sequence[str] = SCOPES) -> bool:
+        """Whether a base parameter of one of these scopes writes a column of a field of MuJoCo's model."""
+        parameters = [parameter for parameter in self.parameters.values() if parameter.scope in scopes]
+        return any((write.field, write.column) == (field, column) for p in parameters for write in p.writes)
 
     @functools.cached_property
     def has_rotors(self) -> bool:

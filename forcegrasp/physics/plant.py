@@ -68,12 +68,12 @@ class Plant(ContributedFields):
     @property
     def inertia(self) -> np.ndarray:
         """Inertia that each motor moves, all that is coupled to it included, kg or kg·m², ``(n, motors)``."""
-        return self.batch.expand("dof_M0") @ (self.gearing**2).T + self._shared_inertia
+        return self.batch.expand("dof_M0") @ self._gearing_squared + self._shared_inertia
 
     @property
     def rotor_inertia(self) -> np.ndarray:
         """What of it is the motor's own, without what it moves, kg or kg·m², ``(n, motors)``."""
-        return self.base("dof_armature") @ (self.gearing**2).T
+        return self.base("dof_armature") @ self._gearing_squared
 
     @property
     def motor_force(self) -> np.ndarray:

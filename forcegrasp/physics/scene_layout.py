@@ -150,6 +150,11 @@ class SceneLayout:
         return found
 
     @functools.cached_property
+    def _gearing_squared(self) -> np.ndarray:
+        """What of a joint's inertia each motor moves, ``(degrees of freedom, motors)``."""
+        return (self.gearing**2).T
+
+    @functools.cached_property
     def _shared_inertia(self) -> np.ndarray:
         """What joints on the same bodies add to the inertia that each motor moves, beside their own, ``(motors,)``."""
         data, inertia = mujoco.MjData(self.model), np.zeros((self.model.nv, self.model.nv))
