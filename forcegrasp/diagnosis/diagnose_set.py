@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -117,18 +118,26 @@ class _Ways:
         rng = np.random.default_rng(self.seed + 1)
         return diagnose(target, base, simulators, self.effects, rng, self.progress, start, may_be_given, most)
 
-    def moved(self, found: Diagnosis, loaded: Loaded[MeasurementSet]) -> Found | None:
-        """The diagnosis with what the set gives moved within its tolerance; None if nothing asks for that."""
-        further = go_on_with_moved(found, loaded, self._search_on, self.progress)
+    def moved(self, found: Diagnosis, loaded: Loaded[MeasurementSet], briefly: bool = False) -> Found | None:
+        """The diagnosis with what the set gives moved within its tolerance; None if nothing asks for that.
+
+        Args:
+          found: of the set as it is.
+          loaded: the set.
+          briefly: effects that promise too little are not fitted again: all were, and the move changes little.
+        """
+        search_on = partial(self._search_on, may_be_given=_it_is if briefly else None)
+        further = go_on_with_moved(found, loaded, search_on, self.progress, self.effects)
         if further is None and found.bolder is not None:
-            further = go_on_with_moved(found.bolder, loaded, self._search_on, self.progress)
+            further = go_on_with_moved(found.bolder, loaded, search_on, self.progress, self.effects)
             return further if further is not None and not further[0].left else None
         return further
 
     def _search_on(
-        self, target: Target, simulators: Simulators, base: BaseFit, fit: Fit, steps: Sequence[Step]
-    ) -> Diagnosis:
-        return self.search(target, simulators, base, (fit, steps))
+        self, target: Target, simulators: Simulators, base: BaseFit, fit: Fit, steps: Sequence[Step],
+        may_be_given: MayBeGiven | None = None,
+    ) -> Diagnosis:  # fmt: skip
+        return self.search(target, simulators, base, (fit, steps), may_be_given)
 
     def search_and_move(self, loaded: Loaded[MeasurementSet], fitted: Fitted) -> tuple[Diagnosis, Found | None]:
         """The diagnosis of a set; and that with moves within its tolerance, or without some grasps, if it wants any."""
@@ -142,7 +151,7 @@ class _Ways:
         if found.stopped:
             return found, None
         try:
-            further = self.moved(found, loaded)
+            further = self.moved(found, loaded, briefly=moves is not None and not (moves.asked or leave_out.names))
             if further is None and leave_out.names:
                 rest = self.without_missed(loaded, fitted[0], leave_out.names)
                 if rest[0].stopped and not is_answer(rest[0]):
@@ -152,7 +161,7 @@ class _Ways:
                 again = self.search(*fitted)
                 if again.stopped:
                     return dataclasses.replace(found, stopped=again.stopped), None
-                found, further = again, self.moved(again, loaded)
+                found, further = again, self.moved(again, loaded, briefly=True)
         except REASONS as reason:
             return dataclasses.replace(found, stopped=cut_short(reason, self.progress)), None
         return found, further

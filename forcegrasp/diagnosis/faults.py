@@ -183,7 +183,9 @@ def _most_radii(loaded: Loaded[MeasurementSet], apart: Sequence[str]) -> Fault |
     return dataclasses.replace(most, least_m=MOST * measured.radius_std_m)
 
 
-def within_tolerance(loaded: Loaded[MeasurementSet], target: Target, fit: Fit, worth: float = WORTH) -> Fault | None:
+def within_tolerance(
+    loaded: Loaded[MeasurementSet], target: Target, fit: Fit, worth: float = WORTH, start: Moved | None = None
+) -> Fault | None:
     """What was moved within the tolerance of what is given, if that explains this share of what a fit leaves.
 
     Args:
@@ -191,8 +193,9 @@ def within_tolerance(loaded: Loaded[MeasurementSet], target: Target, fit: Fit, w
       target: the same, lined up.
       fit: of the model.
       worth: least share of the squares beyond the noise.
+      start: moves from which the fit started already.
     """
-    moved = move_given(loaded.measured, target, fit, worth)
+    moved = move_given(loaded.measured, target, fit, worth, start)
     return None if moved is None else _moved(loaded, moved)
 
 

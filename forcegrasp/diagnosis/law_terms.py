@@ -9,15 +9,17 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from forcegrasp.effects.each_finger import SIDES
 from forcegrasp.effects.for_gripper import effects_of
-from forcegrasp.effects.law import Formula, Law, Size, make_law
+from forcegrasp.effects.law import Formula, Law, Size, has_sides, make_law
 from forcegrasp.effects.motor_offset import MotorOffset
 from forcegrasp.errors import ConfigError
 from forcegrasp.identify.comparison import of_width
 from forcegrasp.identify.fit import Fit
 from forcegrasp.identify.target import Target
 
-# {e} is what drives the motor: command − position, or the effort that is commanded. {v} is a slow speed.
+# {e} is what drives the motor: command − position, or the effort that is commanded. {v} is a slow speed. {side} is by
+# how much the phases of two fingers' waves are apart, if there are two.
 # Units: L of a position, T of time, F of a force, E of {e}.
 _MOTOR = (
     ("1", ""), ("position", "L"), ("position**2", "L²"),
@@ -29,6 +31,7 @@ _MOTOR = (
     ("abs({e})", "E"), ("{e} * abs({e})", "E²"), ("{e} * position", "E·L"), ("{e} * memory(abs({e}), tau)", "E²"),
     ("sign(force) * {e}", "E"), ("memory(velocity, tau)", "L/T"),
     ("velocity * exp(-((position - centre) / width)**2)", "L/T"),
+    ("sin(6.28319 * position / period + phase{side})", ""),
 )  # fmt: skip
 _FORCE = (
     ("sign(force)", ""), ("force * abs(force)", "F²"), ("force**3", "F³"), ("force * position", "F·L"),
@@ -40,13 +43,18 @@ _POSITION = (
     ("position", "L"), ("position**2", "L²"), ("position**3", "L³"), ("velocity", "L/T"), ("force", "F"),
     ("force * abs(force)", "F²"), ("sign(force)", ""), ("force * position", "F·L"), ("memory(force, tau)", "F"),
     ("time", "T"), ("time**2", "T²"), ("time_since_contact", "T"),
+    ("sin(6.28319 * position / period + phase{side})", ""),
 )  # fmt: skip
 #: Terms by the place where they act. A shift of a commanded position is a force on the motor, but for its limits.
 LIBRARY = {"motor": _MOTOR, "force": _FORCE, "position": _POSITION}
 # Numbers inside terms: those that are tried, and between what a fit may choose. Time constants, s; of a place on the
-# way of a motor, the shares of that way at which it may be, and how wide it is.
+# way of a motor, the shares of that way at which it may be, and how wide it is; phases of a wave, rad.
 _LAGS, _SHORTEST, _LONGEST = (0.1, 0.5, 2.0), 0.02, 10.0
 _PLACES, _WIDTHS, _NARROWEST = (0.1, 0.25, 0.4, 0.55, 0.7, 0.85), (0.12,), 0.02
+_PHASES, _APART, _ROUND = (0.0, 1.5708), (0.0, 0.7854, -0.7854, 1.5708), 6.28319
+# Waves on the way of a motor, their shortest period as a share of it, and how many of the likeliest are tried; what is
+# smooth along the way, a polynomial of so many coefficients, is none.
+_SLOWEST_WAVE, _WAVE_STEP, _PERIOD, _MOST_PERIODS, _SMOOTH = 0.75, 0.2, 1 / 40, 2, 3
 # A term of a reading is tried so large that it is so many times the noise; and between what a fit stays. Its size is
 # that of its largest values: a feedback must not run away.
 _READING, _RANGE, _NEARLY_LARGEST = 3.0, 50.0, 0.98
@@ -72,7 +80,8 @@ def terms(fit: Fit, target: Target) -> Iterator[type[Law]]:
     for place, library in LIBRARY.items():
         amount, unit = amounts[place]
         for text, of_term in library:
-            term = text.format(e=f"({drive})", v=slow)
+            apart = " + apart * side" if has_sides(place, gripper) else ""
+            term = text.format(e=f"({drive})", v=slow, side=apart)
             expression = ast.unparse(ast.parse("c1" if text == "1" else f"c1 * {term}"))  # without spare parentheses
             per = of_term.translate(str.maketrans(units))
             divided = f"({per})" if "·" in per or "/" in per else per
@@ -113,11 +122,40 @@ def _inner(fit: Fit, target: Target) -> dict[str, tuple[Size, tuple[float, ...]]
     places, widths = (tuple(float(f"{x:.2g}") for x in some) for some in (
         [low + share * way for share in _PLACES], [share * way for share in _WIDTHS]
     ))  # fmt: skip
+    periods = tuple(float(f"{period:.4g}") for period in likely_periods(fit, target))
     return {
+        "period": (Size(value=periods[0], low=_PERIOD / 2 * way, high=2 * way, unit=unit), periods),
+        "phase": (Size(value=_PHASES[0], low=-_ROUND, high=_ROUND, unit="rad"), _PHASES),
+        "apart": (Size(value=_APART[0], low=-_ROUND, high=_ROUND, unit="rad"), _APART),
         "tau": (Size(value=_LAGS[1], low=_SHORTEST, high=_LONGEST, unit="s"), _LAGS),
         "centre": (Size(value=places[2], low=low - way, high=high + way, unit=unit), places),
         "width": (Size(value=widths[0], low=_NARROWEST * way, high=way, unit=unit), widths),
     }
+
+
+def likely_periods(fit: Fit, target: Target) -> list[float]:
+    """Periods along the way of the motors of what is left of their positions, m or rad, the likeliest first.
+
+    Cogging and ripple of gears or of an encoder have one that a fit finds from nearby alone. A servo that lags shifts
+    waves, and does not stretch them.
+    """
+    position, left = (each[..., target.axis.positions][target.mask] for each in (fit.predicted, fit.residual))
+    way = max(float(np.ptp(position)), 1e-9)
+    waves = np.arange(_SLOWEST_WAVE, 1 / _PERIOD, _WAVE_STEP)  # on the way
+    explained = np.zeros(len(waves))
+    for where, residual in zip(position.T / way, left.T, strict=True):
+        read = np.isfinite(residual)
+        smooth, _ = np.linalg.qr(np.vander(where[read], _SMOOTH))
+        rest = residual[read] - smooth @ (smooth.T @ residual[read])
+        for index, number in enumerate(waves):
+            angle = _ROUND * number * where[read]
+            wave = np.column_stack([np.sin(angle), np.cos(angle)])
+            wave -= smooth @ (smooth.T @ wave)
+            explained[index] += rest @ wave @ np.linalg.lstsq(wave, rest, rcond=1e-9)[0]
+    around = np.pad(explained, 1)
+    peaks = np.flatnonzero((explained >= around[:-2]) & (explained >= around[2:]))
+    best = peaks[np.argsort(-explained[peaks])][:_MOST_PERIODS]
+    return (way / waves[best]).tolist()
 
 
 def along(law: type[Law], values: np.ndarray | None, fit: Fit, target: Target) -> np.ndarray:
@@ -165,4 +203,5 @@ def sampled(place: str, fit: Fit, target: Target) -> dict[str, np.ndarray]:
         "position": of_width(position, width), "velocity": of_width(velocity, width), "force": force,
         "acceleration": of_width(acceleration, width), "command": of_width(command, width),
         "time": np.repeat(time[..., None], width, axis=-1), "time_since_contact": since,
+        "side": np.broadcast_to(SIDES if has_sides(place, target.gripper) else 0.0, (*target.mask.shape, width)),
     }  # fmt: skip

@@ -7,16 +7,21 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import chi2
 
 from forcegrasp.diagnosis.evidence import LEAST_LEAD, LEAST_SHARE_OF_MANY, is_beyond_chance, rivals_in
 from forcegrasp.diagnosis.families import refit_without, roughly_as
 from forcegrasp.diagnosis.faults import Fault, besides, within_tolerance
 from forcegrasp.diagnosis.few import with_few
+from forcegrasp.diagnosis.judge import judged
+from forcegrasp.diagnosis.lost_motion import with_lost_motion
 from forcegrasp.diagnosis.needless import drop_all_needless
 from forcegrasp.diagnosis.result import Candidate, Diagnosis, Step, kept_steps
+from forcegrasp.diagnosis.signatures import direction
 from forcegrasp.diagnosis.study import Study
-from forcegrasp.diagnosis.tolerance import all_radii, may_be_moved, time_of_reading
+from forcegrasp.diagnosis.tolerance import Moved, all_radii, may_be_moved, time_of_reading
 from forcegrasp.diagnosis.verdict import LEAST_SHARE
+from forcegrasp.effects import Effect
 from forcegrasp.effects.object_size import ObjectSize
 from forcegrasp.effects.readout_skew import ReadoutSkew
 from forcegrasp.identify.base_fit import BaseFit
@@ -34,8 +39,9 @@ from forcegrasp.measure import MeasurementSet
 #: Searches on from a base model, a fit with effects besides, and the steps that found these.
 SearchOn = Callable[[Target, Simulators, BaseFit, Fit, Sequence[Step]], Diagnosis]
 
-# Where a move within the tolerance would take off this share of what a model leaves, it comes before unlikely effects.
-_NEARLY_ALL = 0.8
+# Where a move within the tolerance would take off this share of what a model leaves, it comes before unlikely effects:
+# they are then looked for in what it leaves.
+_COMES_FIRST = 0.25
 
 
 @dataclass(eq=False)
@@ -46,7 +52,7 @@ class MovesFirst:
     asked: bool = False  #: whether they were, of any fit
 
     def __call__(self, target: Target, fit: Fit) -> bool:
-        first = may_be_moved(self.loaded.measured, target, fit, _NEARLY_ALL)
+        first = may_be_moved(self.loaded.measured, target, fit, _COMES_FIRST)
         self.asked |= first
         return first
 
@@ -102,7 +108,11 @@ def _told_as_moved(found: Diagnosis, step: Step, fault: Fault) -> Diagnosis:
 
 
 def go_on_with_moved(
-    found: Diagnosis, loaded: Loaded[MeasurementSet], search_on: SearchOn, progress: Progress
+    found: Diagnosis,
+    loaded: Loaded[MeasurementSet],
+    search_on: SearchOn,
+    progress: Progress,
+    effects: Sequence[type[Effect]] = (),
 ) -> tuple[Diagnosis, Simulators] | None:
     """The diagnosis of a set whose givens were moved within their tolerance; None if nothing asks for a move.
 
@@ -114,10 +124,11 @@ def go_on_with_moved(
       loaded: the set.
       search_on: looks for further effects.
       progress: told what is going on.
+      effects: the catalogue.
     """
     if not found.left or loaded.gripper.is_servo or found.verdict in (Verdict.NOT_FITTED, Verdict.DATA):
         return None
-    models = [_with_move(model, found, loaded) for model in _models(found)]
+    models = [_with_move(model, loaded) for model in _models(found)]
     best = min((one for one in models if one.fault is not None), key=lambda one: one.price, default=None)
     if best is None or best.fault is None:
         return None
@@ -127,8 +138,13 @@ def go_on_with_moved(
     study = with_few(Study(target, simulators, evidence_folds(target.grasps), numerical, progress), best.fit)
     if not is_beyond_chance(_lead(best, _Model(found.fit, found.target, []), study), LEAST_LEAD):
         return None
+    steps = _with_rivals_that_do_as_well(best, models, study)
+    lost = _with_lost_motion(best, loaded, effects, study)
+    if lost is not None:
+        best, steps, target, simulators = lost, lost.steps, lost.target, Simulators(lost.fit.problem)
+        study = with_few(dataclasses.replace(study, target=target, simulators=simulators, few=None), lost.fit)
     given = len(found.base.fit.problem.effects)
-    steps, fit = drop_all_needless(study, _with_rivals_that_do_as_well(best, models, study), best.fit, given)
+    steps, fit = drop_all_needless(study, steps, best.fit, given)
     steps, bare = one_after_the_other(study, steps, fit)
     again = search_on(target, simulators, dataclasses.replace(found.base, fit=bare), fit, steps)
     before, after = found.error_before, again.error_before
@@ -174,18 +190,55 @@ def _models(found: Diagnosis) -> Iterator[_Model]:
             yield _Model(fit, found.target, [*steps[:place], first, *steps[place + 1 :]], place)
 
 
-def _with_move(model: _Model, found: Diagnosis, loaded: Loaded[MeasurementSet]) -> _Model:
-    """The model on the set as moved, if a move within the tolerance explains some of what it leaves."""
+def _with_move(model: _Model, loaded: Loaded[MeasurementSet], start: Moved | None = None) -> _Model:
+    """The model on the set as moved, if a move within the tolerance explains some of what it leaves.
+
+    Args:
+      model: of the set as it is, or as it was moved to start with.
+      loaded: the set.
+      start: how it was moved.
+    """
     # of a law that is not known some may look like a move
     worth = LEAST_SHARE_OF_MANY if model.steps else LEAST_SHARE
-    fault = within_tolerance(loaded, found.target, model.fit, worth)
+    fault = within_tolerance(loaded, model.target, model.fit, worth, start)
     if fault is None and model.place < 0:
         return model
-    grasps = found.target.grasps if fault is None else fault.put_right.measured.grasps
-    target = dataclasses.replace(found.target, grasps=grasps)
+    grasps = model.target.grasps if fault is None else fault.put_right.measured.grasps
+    target = dataclasses.replace(model.target, grasps=grasps)
     problem = Problem(loaded.gripper, target.grasps, model.fit.problem.case(model.fit.vector).effects)
     fit = fit_exactly(target, problem, Simulators(problem), model.fit.vector, model.fit.jacobian)
     return dataclasses.replace(model, fit=fit, target=target, fault=fault)
+
+
+def _with_lost_motion(
+    moved: _Model,
+    loaded: Loaded[MeasurementSet],
+    effects: Sequence[type[Effect]],
+    study: Study,
+) -> _Model | None:
+    """The model with lost motion besides, and other moves; None if it is no likelier, or nothing hints at it.
+
+    Args:
+      moved: the model on the set as moved.
+      loaded: the set.
+      effects: the catalogue.
+      study: the measurements as moved.
+    """
+    if moved.fault is None or moved.fault.moved is None:
+        return None
+    tried = with_lost_motion(moved.fit, moved.target, moved.fault.moved, loaded.measured, effects, study.progress)
+    for rough, start in tried:
+        lost = _with_move(_Model(rough, moved.target, moved.steps), loaded, start)
+        if lost.fault is None or not is_beyond_chance(_lead(lost, moved, study), LEAST_LEAD):
+            continue
+        setting, held = lost.fit.effects[-1], study.heldout(moved.fit)
+        by_chance = float(chi2.sf(moved.price - lost.price, len(setting.values)))
+        candidate = judged(study, held, lost.fit, setting, by_chance, direction(moved.fit, lost.fit))
+        candidate = dataclasses.replace(candidate, without=moved.fit)
+        study.progress(f"{setting.effect.name} and {lost.fault.words} leave less")
+        step = Step((setting.effect.name,), (candidate,), (), study.error(held), candidate.error_after)
+        return dataclasses.replace(lost, steps=[*moved.steps, step])
+    return None
 
 
 def _lead(best: _Model, other: _Model, study: Study) -> np.ndarray:

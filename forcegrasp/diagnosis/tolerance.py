@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import norm
 
 from forcegrasp.identify.fit import Fit, fit_once
 from forcegrasp.identify.intervals import listed
@@ -18,7 +19,7 @@ from forcegrasp.measure.schema import MeasuredGrasp, MeasurementSet
 from forcegrasp.physics.gripper import FORCE_SKEW, SKEW
 from forcegrasp.replay.replay import Replay
 
-#: What is further off than so many standard deviations is no tolerance.
+#: What is further off than so many standard deviations is no tolerance, if it is one number alone.
 MOST = 3.0
 # What is nearer than so many is not told.
 _TOLD = 1.0
@@ -94,7 +95,7 @@ class Moved:
     @property
     def is_within(self) -> bool:
         """Whether all are within the tolerance."""
-        return bool(np.abs(self.deviations).max() < MOST)
+        return bool((np.abs(self.deviations) < _limits(self.numbers)).all())
 
     def radii_apart(self) -> list[str]:
         """Objects whose radius is beyond the tolerance, if that is not so of all alike, as an effect would have it."""
@@ -109,6 +110,11 @@ class Moved:
         stds, moves = np.array(radii).reshape(-1, 2).T
         alike = len(radii) > 1 and moves.sum() < -_ALIKE * np.sqrt(len(radii))
         return float(-np.mean(stds * moves)) if alike else 0.0
+
+    def with_radii_raised(self, by_m: float) -> Moved:
+        """The same moves, but of all radii by so much more, metres."""
+        more = [by_m / number.std if number.kind == "radius_m" else 0.0 for number in self.numbers]
+        return Moved(self.numbers, self.deviations + more)
 
     @property
     def is_no_surprise(self) -> bool:
@@ -141,6 +147,15 @@ class Moved:
         return listed(told)
 
 
+def _limits(numbers: Sequence[_Number]) -> np.ndarray:
+    """By how many standard deviations each may be off, ``(numbers,)``.
+
+    Each grasp has a place of its own: any of two dozen is as likely beyond 3.9 of them as one radius beyond 3.
+    """
+    places = np.array([number.kind == "offset_m" for number in numbers])
+    return np.where(places, norm.isf(norm.sf(MOST) / max(1, places.sum())), MOST)
+
+
 def all_radii(measured: MeasurementSet, target: Target, move_m: float) -> Moved | None:
     """All radii moved by so much, metres; None if that is more than the tolerance of what is given leaves open."""
     numbers = tuple(number for number in _numbers(measured, target) if number.kind == "radius_m")
@@ -157,13 +172,17 @@ def time_of_reading(measured: MeasurementSet, target: Target, delay_s: float) ->
     return Moved(numbers, np.array([delay_s / numbers[0].std]))
 
 
-def move_given(measured: MeasurementSet, target: Target, fit: Fit, worth: float = WORTH) -> Moved | None:
+def move_given(
+    measured: MeasurementSet, target: Target, fit: Fit, worth: float = WORTH, start: Moved | None = None
+) -> Moved | None:
     """What :func:`wanted_moves` says, if that is within the tolerance of what is given; else None."""
-    moved = wanted_moves(measured, target, fit, worth)
+    moved = wanted_moves(measured, target, fit, worth, start)
     return moved if moved is not None and moved.is_within else None
 
 
-def wanted_moves(measured: MeasurementSet, target: Target, fit: Fit, worth: float = WORTH) -> Moved | None:
+def wanted_moves(
+    measured: MeasurementSet, target: Target, fit: Fit, worth: float = WORTH, start: Moved | None = None
+) -> Moved | None:
     """What is given as the readings have it, up to :data:`MOST` standard deviations; None if that explains little.
 
     Linear steps from a fit, whose parameters follow, with a Gaussian prior of the set's standard deviations on what is
@@ -174,9 +193,11 @@ def wanted_moves(measured: MeasurementSet, target: Target, fit: Fit, worth: floa
       target: its grasps, lined up.
       fit: of the base model, with all as given.
       worth: least share of the squares beyond the noise.
+      start: moves from which the fit started already; none by default, and then they are to explain enough.
     """
-    first = _first_step(measured, target, fit, worth)
-    if first is None:
+    if start is not None:
+        first = _columns(target, fit, start.numbers), _Step(start, fit.vector, fit.cost)
+    elif (first := _first_step(measured, target, fit, worth)) is None:
         return None
     columns, step = first
     for _ in range(_STEPS):
@@ -295,7 +316,8 @@ def _step(
     slopes = np.column_stack([fit.jacobian.reshape(-1, len(fit.problem)), columns[:, chosen]])
     prior, residual = np.eye(slopes.shape[1])[len(fit.problem) :], fit.residual.ravel()
     step = np.linalg.lstsq(np.vstack([slopes, prior]), np.r_[residual, -start], rcond=None)[0]
-    moves = np.clip(start + step[len(fit.problem) :], -MOST, MOST)  # the first step may lead too far
-    moved = Moved(tuple(numbers[index] for index in chosen), moves)
+    chosen_ones = tuple(numbers[index] for index in chosen)
+    limits = _limits(chosen_ones)
+    moved = Moved(chosen_ones, np.clip(start + step[len(fit.problem) :], -limits, limits))  # one step may lead too far
     left = float(np.sum((residual - slopes @ step) ** 2))
     return _Step(moved, fit.vector + step[: len(fit.problem)], left)

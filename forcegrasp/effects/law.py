@@ -10,6 +10,7 @@ import yaml
 from pydantic import Field, model_validator
 
 from forcegrasp.effects.base import Contribution, Effect, Parameter, State
+from forcegrasp.effects.each_finger import SIDES
 from forcegrasp.effects.expression import FUNCTIONS, LONGEST, Expression
 from forcegrasp.effects.registry import catalogue
 from forcegrasp.errors import ConfigError, PhysicsError
@@ -20,7 +21,7 @@ from forcegrasp.physics.gripper import Gripper
 
 #: How the name of a file ends that describes a law.
 SUFFIXES = (".yaml", ".yml")
-_COMMON = ("position", "velocity", "force", "time", "time_since_contact")
+_COMMON = ("position", "velocity", "force", "time", "time_since_contact", "side")
 #: Signals that a law may hold, by the place where it acts.
 SIGNALS = {
     "motor": (*_COMMON, "command"),
@@ -122,7 +123,7 @@ class Law(Effect):
         since = np.where(began, state["since"], 0.0)
         state["since"] = np.where(began | (force != 0), since + self.dt, 0.0)
         signals = {name: _of_width(values, width) for name, values in signals.items()}
-        signals |= {"force": force, "time": time, "time_since_contact": since}
+        signals |= {"force": force, "time": time, "time_since_contact": since, "side": SIDES}
         value = self.parsed.value(signals, {p.name: self[p.name] for p in self.parameters}, state, self.dt)
         if not np.isfinite(value).all():
             raise PhysicsError(
@@ -203,6 +204,8 @@ def make_law(name: str, formula: Formula, gripper: Gripper) -> type[Law]:
         raise ConfigError(f"place: {gripper.name} has no force readings")
     if parsed.uses & _OF_CONTACT and not (channels if reads else not gripper.is_servo):
         raise ConfigError(f"expression: {' and '.join(sorted(parsed.uses & _OF_CONTACT))}: {gripper.name} has none")
+    if "side" in parsed.uses and not has_sides(formula.place, gripper):
+        raise ConfigError(f"expression: side tells left from right, and {gripper.name} has not both at {formula.place}")
     kind = _KINDS[formula.place]
     return type(kind.__name__, (kind,), {
         "__doc__": formula.symptom, "name": name, "symptom": formula.symptom, "formula_of": formula, "parsed": parsed,
@@ -210,6 +213,12 @@ def make_law(name: str, formula: Formula, gripper: Gripper) -> type[Law]:
         "parameters": tuple(_parameter(n, size, parsed) for n, size in formula.parameters.items()),
         "commands_effort": gripper.command != "position", "trials": classmethod(_trials),
     })  # fmt: skip
+
+
+def has_sides(place: str, gripper: Gripper) -> bool:
+    """Whether what a law changes there is that of a left and a right finger, which `side` tells apart: 1 and −1."""
+    width = len(gripper.forces) if place == "force" else len(gripper.motors)
+    return not gripper.is_servo and width == len(SIDES)
 
 
 _SUM = {"motor": "F' = F", "command": "u' = u", "position": "q' = q", "force": "f' = f"}

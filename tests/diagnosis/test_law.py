@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from forcegrasp.diagnosis.diagnose_set import diagnose_set
-from forcegrasp.diagnosis.law_terms import LIBRARY, along, terms
+from forcegrasp.diagnosis.law_terms import LIBRARY, along, likely_periods, terms
 from forcegrasp.effects.law import make_law
 from forcegrasp.errors import ConfigError
 from forcegrasp.identify.verdict import Verdict
@@ -63,6 +63,24 @@ def test_every_term_does_something_and_is_small(made_up):
         added = np.abs(along(law, None, fit, target)[target.mask])
         if law.formula_of.place == "force":
             assert 0 < np.quantile(added, 0.98) < 5 * target.sigma[2]
+
+
+@pytest.mark.parametrize("period_m", [0.002, 0.005, 0.013])
+def test_the_period_of_what_is_left_along_the_way_is_tried(made_up, period_m):
+    fit, target = made_up.base.fit, made_up.target
+    position, rng = fit.predicted[..., :2], np.random.default_rng(0)
+    wave = 2 * np.sin(2 * np.pi * position / period_m + [0.4, 1.6]) + 300 * position**2
+    residual = fit.residual.copy()
+    residual[..., :2] = np.where(target.mask[..., None], wave + rng.standard_normal(wave.shape), np.nan)
+    first, *_ = likely_periods(dataclasses.replace(fit, residual=residual), target)
+    way = np.ptp(position[target.mask])
+    assert 1 / first == pytest.approx(1 / period_m, abs=0.2 / way)  # a fit finds the rest
+
+
+def test_waves_of_two_fingers_may_be_apart(made_up):
+    waves = [law for law in terms(made_up.base.fit, made_up.target) if "period" in law.formula_of.expression]
+    assert {law.formula_of.place for law in waves} == {"motor", "position"}
+    assert all("apart * side" in law.formula_of.expression for law in waves)
 
 
 def test_a_model_file_holds_a_law_that_can_be_trained_with(made_up, tmp_path):

@@ -125,3 +125,15 @@ def test_a_formula_without_a_value_is_refused_where_it_happens(tmp_path):
     plant.reset(np.arange(1), np.zeros(1))
     with pytest.raises(PhysicsError, match="my_law"):
         plant.advance(np.full((1, 2), 0.03))
+
+
+def test_a_law_tells_left_from_right(tmp_path):
+    path = written(tmp_path, "motor", "c * side", c=0.02)
+    law = read_law(path, load_gripper("tiago"))
+    plant = Plant(load_gripper("tiago"), 1, "fast", threads=1)
+    plant.attach([(law(np.array([[0.02]]), plant.dt), np.array([0]))])
+    plant.reset(np.arange(1), np.zeros(1))
+    plant.advance(np.full((1, 2), 0.03), 1)
+    assert plant.motor_push[0].tolist() == [0.02, -0.02]
+    with pytest.raises(ConfigError, match=r"side tells left from right, and robotiq_2f85 has not both at motor"):
+        read_law(path, load_gripper("robotiq_2f85"))
