@@ -12,14 +12,14 @@ from forcegrasp.effects.load_friction import COEFFICIENT, LOADS, LOADS_NEED, loa
 class SmoothLoadFriction(CreepingFriction):
     """Greased gears that are pressed together: load friction against fast motion, in proportion to slow motion.
 
-    The load is ``carried`` or ``pressed``, as load_friction has it.
+    The load is ``carried``, ``pressed`` or ``driven``, as load_friction has it.
     """
 
     name = "smooth_load_friction"
     symptom = (
         "force is lost while squeezing, the more the higher it is, and comes back as the joint creeps to its command"
     )
-    formula = "F = −c |F_motor − F_outside| tanh(v / v_c) (carried), −c |F_outside| tanh(v / v_c) (pressed)"
+    formula = "F = −c W tanh(v / v_c), W = |F_motor − F_outside| (carried), |F_outside|, |F_motor − J_rotor d²q/dt²|"
     source = "load_friction with the smooth law of Andersson, Söderberg and Björklund (2007)"
     look_alikes = ("load_friction", "smooth_friction", "viscoelastic_contact", "force_lag")
     separates = (

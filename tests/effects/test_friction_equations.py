@@ -81,6 +81,25 @@ def test_friction_of_a_transmission_that_turns_freely_until_pads_press(coefficie
     np.testing.assert_array_equal(loaded, free)
 
 
+@pytest.mark.parametrize("coefficient", [0.1, 0.3])
+def test_friction_of_a_gear_by_what_its_motor_puts_in(coefficient):
+    """While closing |f| = c F, so that of the motor's force F the pads get P = F (1 − c)."""
+    plant = settle("load_friction", (coefficient,), 0.0245, 0.0235, 0.0225, variant="driven")
+    motor = GAIN * (plant.position[0] - 0.0225)
+    assert plant.pad_force[0] == pytest.approx(motor * (1 - coefficient), rel=0.04)
+
+
+@pytest.mark.parametrize("name", ["load_friction", "smooth_load_friction"])
+def test_what_speeds_up_a_rotor_does_not_load_its_gear(name):
+    """Of 0.3 N 0.05 kg · (0.06 − 0.02) m/s / 0.5 s are the rotor's."""
+    stub = SimpleNamespace(velocity=np.array([[0.02]]), motor_force=np.array([[0.3]]), rotor_inertia=np.array([[0.05]]))
+    effect = get_effect(name)(np.array([[0.1, 0.0][: len(get_effect(name).parameters)]]), 0.5, "driven")
+    effect.attach(stub, np.array([0])).reset(np.array([0]))
+    stub.velocity = np.array([[0.06]])
+    np.testing.assert_allclose(effect.act().friction, [[0.1 * (0.3 - 0.05 * 0.04 / 0.5)]])
+    np.testing.assert_allclose(effect.act().friction, [[0.1 * 0.3]])  # it goes on as fast
+
+
 @pytest.mark.parametrize("side", [-1, 1])
 def test_load_friction_of_a_pendulum_is_as_wide_as_its_load(side):
     """Crept to from either side: F (1 ∓ c) = W (1 ± c), with F = kp (u − q) and W = m g l sin q."""
@@ -247,11 +266,12 @@ def test_smooth_load_friction_takes_its_share_until_it_has_crept(coefficient):
     assert creeping.pad_force[0] == pytest.approx(at_rest, rel=0.02)
 
 
-@pytest.mark.parametrize(("variant", "load"), [("carried", 0.5), ("pressed", 0.2)])
+@pytest.mark.parametrize(("variant", "load"), [("carried", 0.5), ("pressed", 0.2), ("driven", 0.3)])
 def test_smooth_load_friction_is_a_damping_by_the_load(variant, load):
     stub = SimpleNamespace(
-        velocity=np.array([[0.0, 1e-3]]), motor_force=np.array([[-0.3, -0.3]]), outside_force=np.array([[0.2, 0.2]])
-    )
+        velocity=np.array([[0.0, 1e-3]]), motor_force=np.array([[-0.3, -0.3]]), outside_force=np.array([[0.2, 0.2]]),
+        rotor_inertia=np.zeros((1, 2)),
+    )  # fmt: skip
     added = make("smooth_load_friction", 0.1, 1e-3, variant=variant).attach(stub, np.array([0])).act()
     np.testing.assert_allclose(added.damping, [[100 * load, 100 * load * np.tanh(1.0)]], rtol=1e-9)
     np.testing.assert_allclose(added.friction, 0)
