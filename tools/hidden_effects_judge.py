@@ -19,6 +19,8 @@ OF_THE_MESS = (
 BY_FAMILY = ("law", "contact")
 #: Of effects outside the catalogue for which the library of terms has a law: where it acts, and what is in its term.
 TERMS = {
+    "motor_cogging": ("motor", ("sin(6.28319 * position / period",)),
+    "eccentric_encoder": ("position", ("sin(6.28319 * position / period",)),
     "motor_fade": ("motor", ("memory(abs(command - position)",)),
     "directional_gain": ("motor", ("* abs(command - position)",)),
     "rough_guide": ("motor", ("velocity * exp(",)),

@@ -477,6 +477,35 @@ def test_effects_on_trial_are_believed_where_a_move_beside_them_leaves_nothing(
     assert diagnosis.effects == (moved if believed else found).effects
 
 
+@pytest.mark.parametrize("promised_much", [False, True])
+def test_what_was_sought_in_vain_is_not_sought_again_after_a_small_move(sound, made_up, monkeypatch, promised_much):
+    found = dataclasses.replace(made_up.diagnosis("unknown"), left="in all")
+    module = importlib.import_module("forcegrasp.diagnosis.diagnose_set")
+    asked = []
+
+    def diagnosed(*args):
+        *_, may_be_given, _ = args
+        asked.append(may_be_given)
+        if len(asked) == 1 and promised_much:
+            may_be_given(found.target, found.fit)
+        return found
+
+    def moved(one, loaded, search_on, *_):
+        return search_on(one.target, None, one.base, one.fit, one.steps), None
+
+    monkeypatch.setattr(module, "diagnose", diagnosed)
+    monkeypatch.setattr(module, "suspects", lambda *_: [])
+    monkeypatch.setattr(module, "go_on_with_moved", moved)
+    monkeypatch.setattr("forcegrasp.diagnosis.moved_set.may_be_moved", lambda *_: True)
+    monkeypatch.setattr("forcegrasp.diagnosis.left_out.most_missed", lambda *_: ())
+    for name in ("may_be_late_rows", "timing_within_tolerance_after_all"):
+        monkeypatch.setattr(module, name, lambda one, *_: one)
+    diagnose_set(sound[0], sound[1], [], 0, silent)
+    _, again = asked
+    assert (again is None) == promised_much
+    assert promised_much or again(found.target, found.fit)
+
+
 def test_swapped_labels_are_told_and_nothing_else_is_looked_for(sound):
     loaded, model = sound
     one = loaded.measured.grasps[0]

@@ -99,12 +99,16 @@ def test_a_law_is_right_if_it_has_the_term_of_what_was_hidden() -> None:
     assert has_right_term(outside("curved_force_gain", bent | {"place": "motor"})) is False
     assert has_right_term(outside("tip_inertia", bent)) is False
     assert has_right_term(outside("tip_inertia", None)) is False
-    assert has_right_term(outside("motor_cogging", bent)) is None  # no term of the library turns with the motor
+    wave = {"place": "motor", "expression": "c1 * sin(6.28319 * position / period1 + phase1 + apart1 * side)"}
+    assert has_right_term(outside("motor_cogging", wave)) is True
+    assert has_right_term(outside("eccentric_encoder", wave)) is False
+    assert has_right_term(outside("stale_positions", bent)) is None  # no term of the library forgets to read
     assert has_right_term(row("none", "explained") | {"hidden": [], "law": bent}) is None
 
 
 def test_each_term_that_would_be_right_is_in_the_library_and_each_effect_in_the_rig() -> None:
     assert set(TERMS) <= set(OUTSIDE)
     for place, texts in TERMS.values():
-        known = [ast.unparse(ast.parse("c1 * " + t.format(e="(command - position)", v=1))) for t, _ in LIBRARY[place]]
+        known = [t.format(e="(command - position)", v=1, side="") for t, _ in LIBRARY[place]]
+        known = [ast.unparse(ast.parse(f"c1 * {term}")) for term in known]
         assert all(any(text in one for one in known) for text in texts)
