@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from forcegrasp.cli.verb import Verb
 from forcegrasp.errors import ConfigError
 
@@ -26,6 +28,8 @@ Exit status: 0, or 1 if something must be mended.
 
 def run(arguments: list[str]) -> int:
     """Runs the verb; returns the exit status."""
+    if len(arguments) == 1 and Path(arguments[0]).is_dir():  # a set needs no data=
+        arguments = [f"data={arguments[0]}"]
     key, _, name = (arguments or [""])[0].partition("=")
     from forcegrasp.doctor import examine
     from forcegrasp.doctor.gripper import check_gripper

@@ -11,7 +11,7 @@ from forcegrasp.identify.between_sets import BetweenSets, compare_sets
 from forcegrasp.identify.cross_validation import heldout_residual, make_folds, rms, rms_of_grasps
 from forcegrasp.identify.fitted_model import model_of
 from forcegrasp.identify.loading import Loaded
-from forcegrasp.identify.noise_floor import beyond_fit, numerical_error, numerical_floor
+from forcegrasp.identify.noise_floor import at_floor, beyond_fit, numerical_error, numerical_floor
 from forcegrasp.identify.phases import contacts
 from forcegrasp.identify.progress import Progress
 from forcegrasp.identify.target import Target
@@ -22,6 +22,8 @@ from forcegrasp.short_repr import ShortRepr
 #: What a residual is held against, in reports and where nothing explains it.
 COVARIATES = ("time_since_contact_s", "velocity_m_s", "direction", "force_n", "command_m", "position_m", "time_s")
 _BINS = 12
+# A reading went wrong that is so many σ off while those before and after it are within so many: no motion is so short.
+_WRONG, _FIT = 20.0, 5.0
 
 
 @dataclass(frozen=True)
@@ -71,6 +73,12 @@ class Comparison(ShortRepr):
         worst = int(np.nanargmax(rms_of_grasps(held, self.target)))
         others = np.arange(len(held)) != worst
         return self.target.grasps[worst].label, rms(held, self.target, others[:, None, None])
+
+    def wrong_readings(self) -> np.ndarray:
+        """Grasp, sample and signal of single readings that are far off while those beside them fit, ``(n, 3)``."""
+        size = np.where(self.target.mask[..., None], np.abs(np.nan_to_num(self.residual)), 0.0)
+        beside = np.pad(size, ((0, 0), (1, 1), (0, 0)))
+        return np.argwhere((size > _WRONG) & (np.maximum(beside[:, :-2], beside[:, 2:]) < _FIT))
 
     def by_grasp(self) -> np.ndarray:
         """rms residual ÷ noise of each grasp, ``(G,)``."""
@@ -150,10 +158,8 @@ def compare(
     """Where a model fails; without one, where the base model fails after fitting it."""
     if model is None:
         target, _, base = fit_set.fit_model(loaded, seed, progress)
-        notes = [] if base.converged else [f"the base model is not fitted: {base.reason}"]
     else:
         target, _, base = fit_set.apply_model(loaded, model, progress, refit=False)
-        notes = []
     fit, same = base.fit, model is None or model.data.get("fingerprint") == loaded.measured.fingerprint
     # a model that has not seen this set is tested on all of it
     held = heldout_residual(fit, target, make_folds(target.grasps)) if same else fit.residual
@@ -163,7 +169,18 @@ def compare(
     used = model or model_of(fit, target, loaded, numerical)
     between = compare_sets(loaded.parts, used, progress) if loaded.parts else None
     half, other = (rms(one, target) for one in beyond)
-    return Comparison(target, fit.predicted, fit.residual, held, floor, between, (half, other)), used, notes
+    found = Comparison(target, fit.predicted, fit.residual, held, floor, between, (half, other))
+    return found, used, [] if model is not None or base.converged else [_not_fitted(found, base.reason)]
+
+
+def _not_fitted(comparison: Comparison, reason: str) -> str:
+    """What a base fit that came to no end means for what was compared."""
+    if at_floor(comparison.floor_ratio(), comparison.floor):
+        return (
+            f"the fit came to no clear end ({reason}), though it leaves no more than that: parameters may be further"
+            " off than their intervals say; to see by how much, try another seed="
+        )
+    return f"the base model is not fitted: {reason}; what it lacks may be the cause, which diagnose looks for"
 
 
 def of_width(values: np.ndarray, width: int) -> np.ndarray:

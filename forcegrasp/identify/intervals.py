@@ -121,7 +121,7 @@ def warnings(fit: Fit, errors: np.ndarray) -> list[str]:
         pure = entry.unit == "1"
         if bound is not None and not (pure and bound in (0.0, 1.0)):  # a share has all or nothing as its natural limits
             unit = "" if pure else f" {entry.unit}"
-            lines.append(f"{entry.name} ended at its bound {bound:g}{unit}: widen it or doubt the model")
+            lines.append(f"{entry.name} ended at its bound {bound:g}{unit}: doubt the model, or widen it")
     loose = [entry.name for entry, wide in zip(entries, hardly_fixed(fit, errors), strict=True) if wide]
     if loose:
         lines.append(f"{listed(loose)} {'is' if len(loose) == 1 else 'are'} hardly fixed by these data")

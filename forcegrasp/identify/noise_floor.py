@@ -12,6 +12,8 @@ from forcegrasp.identify.predict import predict
 from forcegrasp.identify.target import Target
 from forcegrasp.replay.replay import Replay
 
+#: Error ÷ floor up to which a model is as good as the data can tell.
+AT_FLOOR = 1.03
 # Room for what the estimate of the floor misses: in all, and in a single signal and phase.
 _ROOM, _ROOM_IN_CELL = 1.03, 1.15
 # And for chance: so many standard errors of the rms of white noise.
@@ -63,6 +65,16 @@ def numerical_floor(
     besides = 0.0 if tolerated is None else rms(tolerated, target, where)
     # Halving the step shows about half of what the step costs in all.
     return float(np.sqrt(1 + 4 * half**2 + other**2 + besides**2))
+
+
+def at_floor(error: float, floor: float) -> bool:
+    """Whether a model is as good as the data can tell."""
+    return error <= most_at_floor(floor)
+
+
+def most_at_floor(floor: float) -> float:
+    """The largest error ÷ noise of a model that is as good as the data can tell."""
+    return max(floor, 1.02) * AT_FLOOR
 
 
 def excess(

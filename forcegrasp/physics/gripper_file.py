@@ -48,6 +48,8 @@ def load_gripper(name: str | Path, folder: str | Path = "") -> Gripper:
         if name in shipped_mechanisms():
             return _load(shipped_folder() / MECHANISMS / f"{name}.yaml")
         if name not in known:
+            if Path(folder, name).is_dir():
+                raise ConfigError(f"gripper={name}: a folder; give the description in it, such as {name}/mine.yaml")
             raise ConfigError(f"gripper={name}: no such gripper{closest(name, known)}; or give a description's path")
         return _shipped(name)
     return _load(Path(folder) / name)

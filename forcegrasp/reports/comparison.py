@@ -12,13 +12,12 @@ from rich.text import Text as Plain
 
 from forcegrasp.identify.comparison import Cell, Comparison
 from forcegrasp.identify.cross_validation import rms
+from forcegrasp.identify.noise_floor import at_floor, most_at_floor
 from forcegrasp.identify.target import Target
 from forcegrasp.reports import between_sets, figures
 from forcegrasp.reports.html import Answer, Command, Picture, Section, Table, Text
 from forcegrasp.reports.view import view_section
 
-#: Error ÷ floor up to which a model is as good as the data can tell.
-AT_FLOOR = 1.03
 # Beyond it an error below the floor is excused by the simulation's numerical error, and not by noise.
 _MOST_NOISE = 1.2
 # Floor ÷ noise from which on the simulation's numerical error is a good part of it.
@@ -121,16 +120,6 @@ def _cell_json(cell: Cell) -> dict[str, Any]:
     return {f"rms_{unit}": cell.rms, "ratio": cell.ratio, f"bias_{unit}": cell.bias, "samples": cell.samples}
 
 
-def at_floor(error: float, floor: float) -> bool:
-    """Whether a model is as good as the data can tell."""
-    return error <= _most(floor)
-
-
-def _most(floor: float) -> float:
-    """The largest error ÷ noise of a model that is as good as the data can tell."""
-    return max(floor, 1.02) * AT_FLOOR
-
-
 def worst_cell(cells: list[Cell]) -> Cell:
     """The signal and phase with the largest error ÷ noise; a handful of samples does not count."""
     many = [cell for cell in cells if cell.samples >= 40]
@@ -158,7 +147,7 @@ def answer(comparison: Comparison) -> str:
     total = f"{error}; up to {floor:.2f} is {noise}."
     if at_floor(value, floor):
         if round(value, 2) > round(floor, 2):
-            total = f"{error}; up to {floor:.2f} is {noise}, and up to {_most(floor):.2f} next to nothing."
+            total = f"{error}; up to {floor:.2f} is {noise}, and up to {most_at_floor(floor):.2f} next to nothing."
         return f"{total} These measurements show no failure of the model."
     label, less = comparison.without_worst()
     alone = f" Without {comparison.target.part} {label} it would be {less:.2f}." if at_floor(less, floor) else ""
@@ -211,11 +200,27 @@ def _rows(comparison: Comparison) -> list[tuple[str, str]]:
     errors, target = comparison.by_grasp(), comparison.target
     worst = [f"{target.grasps[i].label} ({errors[i]:.1f} ×)" for i in worst_grasps(comparison)]
     rows = [*_between_rows(comparison), *_recording_rows(comparison), (f"worst {target.part}s", ", ".join(worst))]
+    if len(wrong := comparison.wrong_readings()):
+        rows.append(("readings that went wrong", _wrong_words(comparison, wrong)))
     name, kind, share = comparison.explanations()[0]
     if share >= _WORTH_TELLING and not at_floor(comparison.floor_ratio(), comparison.floor):
         rows.append((_GOES_WITH, f"{share:.0%} of the {kind} error goes with {covariate_words(name)}"))
     noise, _, sizes = noise_sentence(target).partition(": ")
     return [*rows, (noise, sizes)]
+
+
+def _wrong_words(comparison: Comparison, wrong: np.ndarray) -> str:
+    """Where single readings are that no motion explains, ``(n, 3)``; the first few of them."""
+    axis, told = comparison.target.axis, list[str]()
+    for index, sample, signal in wrong[:_WORST].tolist():
+        grasp = comparison.target.grasps[index]
+        off = abs(comparison.residual[index, sample, signal]) * comparison.target.sigma[signal]
+        told.append(
+            f"{words(axis.names[signal])} at {grasp.time_s[sample]:.4g} s of {grasp.label} by"
+            f" {amount(off, axis.units[signal])}"
+        )
+    more = f", and {len(wrong) - _WORST} more" if len(wrong) > _WORST else ""
+    return f"{', '.join(told)}{more}, while those beside fit; look at these rows"
 
 
 def _between_rows(comparison: Comparison) -> list[tuple[str, str]]:

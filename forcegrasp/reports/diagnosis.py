@@ -18,10 +18,10 @@ from forcegrasp.effects.for_gripper import effect_of
 from forcegrasp.identify.cross_validation import rms
 from forcegrasp.identify.fit import Fit
 from forcegrasp.identify.intervals import listed, reached_bound
+from forcegrasp.identify.noise_floor import AT_FLOOR
 from forcegrasp.identify.verdict import Verdict
 from forcegrasp.reports import figures
 from forcegrasp.reports.comparison import (
-    AT_FLOOR,
     dependence_section,
     grid_picture,
     noise_sentence,

@@ -13,10 +13,10 @@ from forcegrasp.effects.for_gripper import effect_of
 from forcegrasp.identify.between_sets import Agreement
 from forcegrasp.identify.comparison import Comparison
 from forcegrasp.identify.intervals import listed
+from forcegrasp.identify.noise_floor import at_floor
 from forcegrasp.identify.verdict import Verdict
 from forcegrasp.measure import MeasurementSet
 from forcegrasp.physics.gripper import Gripper
-from forcegrasp.reports.comparison import at_floor
 from forcegrasp.reports.diagnosis_words import besides, is_not_all
 from forcegrasp.reports.html import Command
 

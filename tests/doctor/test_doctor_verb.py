@@ -55,6 +55,14 @@ def test_a_check_that_fails_is_a_finding():
     assert "could not be checked (OSError: no such thing)" in found[1].text
 
 
+def test_a_set_needs_no_data(tmp_path, monkeypatch, capsys):
+    seen = []
+    monkeypatch.setattr("forcegrasp.doctor.measurements.check_data", lambda path: seen.append(path) or [fine("a", "b")])
+    assert main(["doctor", str(tmp_path)]) == 0
+    assert seen == [str(tmp_path)]
+    assert "all that is needed is fine" in capsys.readouterr().out
+
+
 @pytest.mark.parametrize("arguments", [["physics"], ["a=1"], ["--verbose"]])
 def test_takes_no_other_options(arguments, capsys):
     assert main(["doctor", *arguments]) == 2

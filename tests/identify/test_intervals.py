@@ -99,13 +99,13 @@ def test_warnings_are_few_where_all_is_well():
 @pytest.mark.parametrize(("value", "bound"), [(30.0, "30"), (300.0, "300")])
 def test_warning_at_a_bound(value, bound):
     lines = warnings(fit_at(random_slopes(4), noise(), position_gain=value), np.full(4, 0.01))
-    assert lines == [f"position_gain ended at its bound {bound} N/m: widen it or doubt the model"]
+    assert lines == [f"position_gain ended at its bound {bound} N/m: doubt the model, or widen it"]
 
 
 def test_no_warning_where_an_effect_is_simply_not_there():
     fit = fit_at(random_slopes(7), noise(), "stiffening_contact", spring_n=0.0, extra_power=8.0)
     lines = warnings(fit, np.full(7, 0.01))
-    assert lines == ["stiffening_contact.extra_power ended at its bound 8: widen it or doubt the model"]
+    assert lines == ["stiffening_contact.extra_power ended at its bound 8: doubt the model, or widen it"]
 
 
 def test_no_warning_of_a_share_that_is_all_or_nothing():

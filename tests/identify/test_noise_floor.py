@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from forcegrasp.identify.comparison import _not_fitted
 from forcegrasp.identify.noise_floor import cells, excess, numerical_floor
 from forcegrasp.identify.phases import PHASES
 from tests.identify.targets import ONES, G, S, make, noise
@@ -85,3 +87,12 @@ def test_numerical_error_raises_the_floor():
     where[3] = True
     expected = np.sqrt(1 + 4 * np.mean(half[3] ** 2) + np.mean(other[3] ** 2))
     assert numerical_floor((half, other), target, where) == pytest.approx(expected)
+
+
+@pytest.mark.parametrize(("error", "told"), [(1.0, "the fit came to no clear end"), (1.6, "is not fitted: it falls")])
+def test_a_fit_without_an_end_is_told_by_what_it_leaves(error, told):
+    comparison = SimpleNamespace(floor=1.02, floor_ratio=lambda: error)
+    note = _not_fitted(comparison, "it falls")  # pyright: ignore[reportArgumentType]
+    assert told in note
+    assert "it falls" in note
+    assert ("diagnose" in note) == (error > 1.5)

@@ -435,6 +435,13 @@ def test_fast_tier_that_does_not_compile_is_refused(tmp_path):
     assert "MuJoCo refuses it" in _refusal(_copy(tmp_path, description, swap))
 
 
+def test_a_folder_is_no_description(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    _folder(tmp_path / "mine")
+    with pytest.raises(ConfigError, match=r"gripper=mine: a folder; give the description in it, such as mine/"):
+        load_gripper("mine")
+
+
 def test_missing_description(tmp_path):
     assert "No such file" in _refusal(tmp_path / "second.yaml")
     assert "Is a directory" in _refusal(_folder(tmp_path / "folder.yaml"))

@@ -298,3 +298,16 @@ def test_what_was_tried_last_and_made_grasps_worse_is_not_in_the_table(made_up, 
     last = dataclasses.replace(step, effects=(), candidates=(dataclasses.replace(best, gains=np.full(4, gain)),))
     table = diagnosis_report.printed(dataclasses.replace(found, steps=(first, last)))
     assert table.row_count == rows
+
+
+def test_single_readings_that_went_wrong_are_told_by_their_place(made_up):
+    comparison = made_up.comparison
+    residual = np.clip(comparison.residual, -4.0, 4.0)  # of what lasts, readings beside are off as well
+    assert comparison_report.details(dataclasses.replace(comparison, residual=residual))[0].startswith("worst grasps")
+    residual[1, 40, 0] = 148.0
+    residual[2, 60:62, 2] = 30.0  # two in a row are a knock
+    (told, *_) = comparison_report.details(dataclasses.replace(comparison, residual=residual))[1:]
+    assert told.startswith("readings that went wrong: position left at 1.6 s of g1")
+    assert "by 4e+03 µm" in told or "by 3996 µm" in told
+    assert told.endswith("while those beside fit; look at these rows")
+    assert "g2" not in told

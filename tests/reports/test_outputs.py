@@ -183,7 +183,7 @@ def texts(sections) -> list[str]:
 def test_a_parameter_at_its_bound_is_marked_in_every_table(made_up):
     fit = at_bounds(made_up.added.after)
     model = model_of(fit, made_up.target, made_up.loaded, [])
-    assert "position_gain ended at its bound 300 N/m: widen it or doubt the model" in model.warnings
+    assert "position_gain ended at its bound 300 N/m: doubt the model, or widen it" in model.warnings
     added = dataclasses.replace(made_up.added, after=fit, model=model)
     base = BaseFit(fit, (1.0,), True)
     for shown_texts in (
@@ -217,7 +217,7 @@ def test_a_diagnosis_marks_parameters_at_their_bounds(made_up, tmp_path):
     assert f"{bias:g} (at its bound)" in cells  # the table of the effect's parameters
     lines = diagnosis_report.lines(diagnosis, None)
     assert any(line.startswith(f"  left_n {bias:g} (at its bound) N (95 %: ") for line in lines)
-    warning = f"force_bias.left_n ended at its bound {bias:g} N: widen it or doubt the model"
+    warning = f"force_bias.left_n ended at its bound {bias:g} N: doubt the model, or widen it"
     assert f"warning: {warning}" in lines
     assert warning in plain(diagnosis_report.diagnosis_json(diagnosis, None, made_up.tried, "s"), tmp_path)["warnings"]
 
