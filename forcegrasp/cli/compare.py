@@ -42,7 +42,8 @@ def run(config: CompareConfig) -> None:
     result.write_beside(out)
     if model is None:
         print(f"wrote {out / BASE_MODEL}: the base model, fitted to this set")
-    print(f"next: {result.commands(out)[0]}")
+    for command in result.commands(out)[:1]:
+        print(f"next: {command}")
     write_results(out, result)
 
 

@@ -44,7 +44,8 @@ def run(config: ImportConfig) -> None:
         print(f"note: {note}")
     for line in unlike(form, recordings) if form and not config.mechanism else ():
         print(f"warning: {line}")
-    for warning in check_servo(measured, [motor.stroke for motor in mechanism.motors], mechanism.unsigned):
+    spans = [motor.stroke for motor in mechanism.motors]
+    for warning in check_servo(measured, spans, mechanism.unsigned, mechanism.settings):
         print(f"warning: {warning}")
     write_servo_set(measured, out)
     samples = sum(len(one.time_s) for one in measured.grasps)

@@ -64,9 +64,8 @@ def _load(path: str | Path) -> Loaded[MeasurementSet] | Loaded[FinalForceTable]:
     if isinstance(measured, FinalForceTable):
         return Loaded(measured, gripper, check_table(measured, gripper.stroke))
     if gripper.is_servo:
-        return Loaded(
-            measured, gripper, check_servo(measured, [motor.stroke for motor in gripper.motors], gripper.unsigned)
-        )
+        spans = [motor.stroke for motor in gripper.motors]
+        return Loaded(measured, gripper, check_servo(measured, spans, gripper.unsigned, gripper.settings))
     half_opening_m = float(gripper.opening.opening_m[-1]) / 2
     warnings = check_set(measured, gripper.stroke, half_opening_m=half_opening_m, pads_at=gripper.pads_at)
     warnings += check_givens(measured, gripper.period_s)

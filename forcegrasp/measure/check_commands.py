@@ -28,8 +28,8 @@ _LEAST, _MOST = 0.05, 3.0
 _OTHERS, _OWN = 0.95, 0.6
 # Efforts that are never negative, and come down to this share of their size, though the joint goes both ways.
 _NEAR_ZERO, _BOTH_WAYS = 0.05, 0.2
-# An effort runs against what the servo has yet to go.
-_AGAINST = -0.8
+# What a servo has yet to go and its speed give so much of its effort's variance, if they are what drives it.
+_DRIVEN = 0.6
 
 
 def check_relation(measured: MeasurementSet, joint: int, span: float) -> list[str]:
@@ -152,10 +152,25 @@ def check_efforts(measured: MeasurementSet, unsigned: bool) -> list[str]:
                 f"{where}: never negative, and down to 0 while the joint goes both ways: looks like a size without its"
                 " sign; say `signed: false` in its map, and `effort: unsigned` or `none` in the mechanism"
             )
-        to_go = np.concatenate([g.command_m[:, channel] - g.position_m[:, channel] for g in measured.grasps])
-        if measured.columns.command[channel].startswith("qdes") and correlation(to_go, efforts) < _AGAINST:
-            warnings.append(f"{where}: falls where the servo has further to go; is its sign turned round?")
+        if not measured.columns.command[channel].startswith("qdes"):
+            continue
+        if against := [one.name for one in measured.grasps if _falls_with_what_is_to_go(one, channel)]:
+            those = "" if len(against) == len(measured.grasps) else f" in {', '.join(against)}"
+            warnings.append(f"{where}: falls where the servo has further to go{those}; is its sign turned round?")
     return warnings
+
+
+def _falls_with_what_is_to_go(one: MeasuredGrasp, joint: int) -> bool:
+    """Whether an effort is that of a servo which drives away from its command, as far as it is switched on."""
+    on = np.ones(len(one.time_s), bool) if one.enabled is None else np.asarray(one.enabled, float) > 0
+    position, effort = one.position_m[:, joint], one.force_n[on, joint]
+    speed = np.gradient(position, one.time_s)
+    causes = np.column_stack([one.command_m[:, joint] - position, speed, np.ones(len(position))])[on]
+    if len(effort) < _LEAST_CHANGES or np.ptp(effort) == 0 or np.ptp(causes[:, 0]) == 0:
+        return False
+    weights = np.linalg.lstsq(causes, effort, rcond=None)[0]
+    explained = 1 - np.var(effort - causes @ weights) / np.var(effort)
+    return bool(weights[0] < 0 and explained > _DRIVEN)
 
 
 def _size_alone(measured: MeasurementSet, efforts: np.ndarray, joint: int) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
@@ -31,13 +31,16 @@ _GAP, _GAP_S = 5, 0.1
 _STUCK = 0.2
 
 
-def check_servo(measured: MeasurementSet, spans: Sequence[float], unsigned: bool = False) -> list[str]:
+def check_servo(
+    measured: MeasurementSet, spans: Sequence[float], unsigned: bool = False, settings: Collection[str] = ()
+) -> list[str]:
     """Checks the recordings of a set; returns warnings, one line each.
 
     Args:
       measured: the set.
       spans: how far each motor of the mechanism usually moves, m or rad.
       unsigned: whether efforts are sizes without a sign.
+      settings: what the scene takes from recordings, such as the mass of a load.
 
     Raises:
       MeasurementError: where, why, and what to do.
@@ -57,7 +60,16 @@ def check_servo(measured: MeasurementSet, spans: Sequence[float], unsigned: bool
         for one in measured.grasps:
             warnings += _check_units(measured, one, joint, spans[joint])
     check_order(measured)
-    return [*measured.notes, *warnings, *check_efforts(measured, unsigned)]
+    return [*measured.notes, *_unsaid(measured, settings), *warnings, *check_efforts(measured, unsigned)]
+
+
+def _unsaid(measured: MeasurementSet, settings: Collection[str]) -> list[str]:
+    """Warns of what the scene would take from the recordings, and they do not say."""
+    unsaid = [name for name in settings if not any(name in one.settings for one in measured.grasps)]
+    if not unsaid:
+        return []
+    columns = f"{'column' if len(unsaid) == 1 else 'columns'} {', '.join(unsaid)}"
+    return [f"{show(measured.path)}: recordings.csv has no {columns}; the scene's own stands for all"]
 
 
 def _check_clock(measured: MeasurementSet, one: MeasuredGrasp) -> list[str]:

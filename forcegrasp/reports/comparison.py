@@ -214,7 +214,7 @@ def _wrong_words(comparison: Comparison, wrong: np.ndarray) -> str:
     axis, told = comparison.target.axis, list[str]()
     for index, sample, signal in wrong[:_WORST].tolist():
         grasp = comparison.target.grasps[index]
-        off = abs(comparison.residual[index, sample, signal]) * comparison.target.sigma[signal]
+        off = abs(float(comparison.residual[index, sample, signal] * comparison.target.sigma[signal]))
         told.append(
             f"{words(axis.names[signal])} at {grasp.time_s[sample]:.4g} s of {grasp.label} by"
             f" {amount(off, axis.units[signal])}"

@@ -147,6 +147,37 @@ def test_efforts_are_held_against_motion():
         check_servo(emps(np.full(4000, 3.0)), [0.25])
 
 
+def swung(sign: float, name: str) -> MeasuredGrasp:
+    """A hinge with a weight, position commands and its effort; released for the last quarter."""
+    time = np.arange(1200) * 0.01
+    enabled = time < 9
+    command = np.where(enabled, 0.8 * np.sin(2 * time), 0.0)
+    position = 0.7 * np.sin(2 * time - 0.2)
+    speed = np.gradient(position, time)
+    effort = np.where(enabled, 14 * (command - position) - 1.1 * speed, 0.0)
+    effort += 0.03 * np.random.default_rng(0).standard_normal(1200)
+    return changed(
+        name=name, time_s=time, command_m=command[:, None], position_m=position[:, None],
+        force_n=sign * effort[:, None], enabled=enabled, columns=columns_of(load_gripper("bam_pendulum")),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(("signs", "told"), [((1, 1), None), ((-1, -1), "to go; is"), ((1, -1), "to go in b; is")])
+def test_an_effort_that_drives_away_from_its_command_is_told(signs, told):
+    columns = dataclasses.replace(columns_of(load_gripper("so101_jaw")), force=("tau_nm",))
+    recordings = [changed(swung(sign, name), columns=columns) for sign, name in zip(signs, "ab", strict=True)]
+    warnings = [w for w in checked(*recordings, span=1.5) if "further" in w]
+    assert [told in w for w in warnings if told] == ([True] if told else [])
+    assert len(warnings) == (told is not None)
+
+
+def test_settings_that_no_recording_says_are_told():
+    (warning,) = check_servo(dataclasses.replace(EXAMPLE, grasps=(SINE,)), [1.0], settings=("payload_kg", "length_m"))
+    assert "recordings.csv has no columns payload_kg, length_m; the scene's own stands for all" in warning
+    known = changed(settings={"payload_kg": 0.3})
+    assert check_servo(dataclasses.replace(EXAMPLE, grasps=(known,)), [1.0], settings=("payload_kg",)) == []
+
+
 def test_joints_in_another_order_are_told():
     first, second = np.sin(TIME), np.sin(2.3 * TIME + 1)
     command = np.stack([first, second, 0 * TIME], axis=1)
