@@ -152,6 +152,16 @@ def test_compare_writes_the_base_model_beside_the_report_and_suggests_it(folder,
     assert "base_model" not in capsys.readouterr().out
 
 
+def test_a_comparison_that_leaves_nothing_to_do_writes_its_results_all_the_same(folder, capsys, monkeypatch):
+    """As that of a servo whose model is at the floor, which nobody trains with."""
+    monkeypatch.setattr("forcegrasp.reports.results.CompareResult.commands", lambda *_: [])
+    monkeypatch.setattr("forcegrasp.reports.html._svg", lambda figure: "")  # the loop has drawn them
+    assert main(["compare", "my_set", "model=better.yaml", "out=nothing_next"]) == 0
+    assert "next:" not in capsys.readouterr().out
+    assert (folder / "nothing_next" / "compare.json").exists()
+    assert (folder / "nothing_next" / "report.html").exists()
+
+
 @pytest.mark.parametrize("verb", ["compare", "diagnose", "add"])
 @pytest.mark.parametrize("other", [True, False])
 def test_a_model_of_other_measurements_is_used_with_a_warning(verb, other, folder, capsys, monkeypatch):
