@@ -95,7 +95,7 @@ def test_ties_and_laws_have_rates_of_their_own(page):
         "proposed": [{"verdict": "effect", "effects": ["backlash"]}],
         "chance": [{"verdict": "one_of", "effects": []}],
     }
-    laws = [Job("outside", (name,), "large", 1) for name in ("curved_force_gain", "tip_inertia", "motor_cogging")]
+    laws = [Job("outside", (name,), "large", 1) for name in ("curved_force_gain", "tip_inertia", "stale_positions")]
     bent = {"place": "force", "expression": "c1 * force * abs(force)", "share": 0.9}
     tied = ("one_of", ("backlash", "adhesion"))
     rows = [
