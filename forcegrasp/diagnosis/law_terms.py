@@ -58,6 +58,8 @@ _SLOWEST_WAVE, _WAVE_STEP, _PERIOD, _MOST_PERIODS, _SMOOTH = 0.75, 0.2, 1 / 40, 
 # A term of a reading is tried so large that it is so many times the noise; and between what a fit stays. Its size is
 # that of its largest values: a feedback must not run away.
 _READING, _RANGE, _NEARLY_LARGEST = 3.0, 50.0, 0.98
+#: Numbers inside terms by name, and those of them that are tried.
+_Inside = dict[str, tuple[Size, tuple[float, ...]]]
 # Of a fast motion's speed what is slow.
 _SLOW = 0.1
 
@@ -71,7 +73,7 @@ def terms(fit: Fit, target: Target) -> Iterator[type[Law]]:
     slow = float(f"{max(_SLOW * np.nanquantile(speeds[target.mask], 0.9), 1e-9):.1g}")
     units: dict[str, str] = {"L": gripper.unit, "T": "s", "F": target.axis.units[-1], "E": driven}
     offset = effects_of(gripper).get(MotorOffset.name, MotorOffset).parameters[0]
-    noise = float(target.sigma[target.axis.forces].max(initial=0.0))
+    noise, inner = float(target.sigma[target.axis.forces].max(initial=0.0)), _inner(fit, target)
     amounts = {
         "motor": (offset.typical, offset.unit),
         "position": (_READING * float(target.sigma[target.axis.positions].max()), gripper.unit),
@@ -85,14 +87,16 @@ def terms(fit: Fit, target: Target) -> Iterator[type[Law]]:
             expression = ast.unparse(ast.parse("c1" if text == "1" else f"c1 * {term}"))  # without spare parentheses
             per = of_term.translate(str.maketrans(units))
             divided = f"({per})" if "·" in per or "/" in per else per
-            law = _scaled(place, expression, amount, f"{unit}/{divided}" if per else unit, fit, target)
+            law = _scaled(place, expression, amount, f"{unit}/{divided}" if per else unit, inner, fit, target)
             if law is not None:
                 yield law
 
 
-def _scaled(place: str, expression: str, amount: float, unit: str, fit: Fit, target: Target) -> type[Law] | None:
+def _scaled(
+    place: str, expression: str, amount: float, unit: str, inside: _Inside, fit: Fit, target: Target
+) -> type[Law] | None:
     """A term that adds this amount where it is large; None if it does nothing here, or can't be on this gripper."""
-    inner = {n: size for n, size in _inner(fit, target).items() if re.search(rf"\b{n}\b", expression)}
+    inner = {n: size for n, size in inside.items() if re.search(rf"\b{n}\b", expression)}
 
     def make(size: float) -> type[Law]:
         most = float(f"{_RANGE * abs(size):.6g}")
@@ -104,17 +108,17 @@ def _scaled(place: str, expression: str, amount: float, unit: str, fit: Fit, tar
         return type(law.__name__, (law,), {"trials": classmethod(lambda cls: tried.copy())})
 
     try:
-        inside = along(make(1.0), None, fit, target)[target.mask]
+        added = along(make(1.0), None, fit, target)[target.mask]
     except ConfigError:
         return None
-    size = float(np.quantile(np.abs(inside), _NEARLY_LARGEST))
+    size = float(np.quantile(np.abs(added), _NEARLY_LARGEST))
     if not (np.isfinite(size) and size > 0 < amount):
         return None
     brakes = place == "motor" and "velocity" in expression  # what drives a motion on runs away
     return make((-1 if brakes else 1) * float(f"{amount / size:.2g}"))
 
 
-def _inner(fit: Fit, target: Target) -> dict[str, tuple[Size, tuple[float, ...]]]:
+def _inner(fit: Fit, target: Target) -> _Inside:
     """Numbers inside terms by name, and those of them that are tried."""
     position, unit = fit.predicted[..., target.axis.positions][target.mask], target.gripper.unit
     low, high = (float(f"{end:.3g}") for end in np.quantile(position, (0.0, 1.0)))

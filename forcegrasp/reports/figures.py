@@ -130,12 +130,12 @@ def dependence(values: dict[str, np.ndarray], residual: np.ndarray, target: Targ
                 _binned(axes, x, y)
                 if name == "velocity_m_s":  # most samples are nearly at rest
                     axes.set_xscale("symlog", linthresh=5)
-                    axes.set_xticks([-100, -10, 0, 10, 100], ["−100", "−10", "0", "10", "100"], fontsize=8)
+                    axes.set_xticks([-100, 0, 100], ["−100", "0", "100"])
                     axes.set_xticks([], minor=True)
             axes.axhspan(-1, 1, color="0.92", zorder=0)
             axes.axhline(0, color="0.5", lw=0.6)
             _finish(axes, f"{kind} residual ÷ noise" if column == 0 else "")
-        grid[-1, column].set_xlabel(label.replace("mm", SHOWN[target.axis.units[0]][0]))
+        grid[-1, column].set_xlabel(label.replace("[mm", f"[{SHOWN[target.axis.units[0]][0]}"))
     for row, part in enumerate(kinds.values()):  # a few outliers must not flatten the rest
         sizes = np.abs(residual[..., part][mask])
         sizes = sizes[np.isfinite(sizes)]

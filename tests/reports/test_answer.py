@@ -18,6 +18,7 @@ from forcegrasp.identify.verdict import Verdict
 from forcegrasp.models.model_file import write_model
 from forcegrasp.reports import comparison as comparison_report
 from forcegrasp.reports import diagnosis as diagnosis_report
+from forcegrasp.reports import figures
 from forcegrasp.reports.diagnosis_box import answer_box, weakest_step
 from forcegrasp.reports.diagnosis_words import percent, place_of_rest, shares_sentence
 from forcegrasp.reports.html import Answer
@@ -311,3 +312,11 @@ def test_single_readings_that_went_wrong_are_told_by_their_place(made_up):
     assert "by 4e+03 µm" in told or "by 3996 µm" in told
     assert told.endswith("while those beside fit; look at these rows")
     assert "g2" not in told
+
+
+def test_axes_of_hinges_are_in_angles_and_keep_their_names(made_up, monkeypatch):
+    monkeypatch.setitem(figures.SHOWN, "m", ("mrad", 1e3))
+    comparison = made_up.comparison
+    page = figures.dependence(comparison.covariates(), comparison.residual, comparison.target)
+    labels = {axes.get_xlabel() for axes in page.axes}
+    assert {"command [mrad]", "velocity [mrad/s]"} <= labels
