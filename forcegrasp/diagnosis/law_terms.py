@@ -21,6 +21,7 @@ from forcegrasp.identify.target import Target
 # {e} is what drives the motor: command − position, or the effort that is commanded. {v} is a slow speed. {side} is by
 # how much the phases of two fingers' waves are apart, if there are two.
 # Units: L of a position, T of time, F of a force, E of {e}.
+_WAVE = ("sin(6.28319 * position / period + phase{side})", "")
 _MOTOR = (
     ("1", ""), ("position", "L"), ("position**2", "L²"),
     ("velocity", "L/T"), ("abs(velocity) * velocity", "L²/T²"), ("velocity**2", "L²/T²"), ("tanh(velocity / {v})", ""),
@@ -31,7 +32,7 @@ _MOTOR = (
     ("abs({e})", "E"), ("{e} * abs({e})", "E²"), ("{e} * position", "E·L"), ("{e} * memory(abs({e}), tau)", "E²"),
     ("sign(force) * {e}", "E"), ("memory(velocity, tau)", "L/T"),
     ("velocity * exp(-((position - centre) / width)**2)", "L/T"),
-    ("sin(6.28319 * position / period + phase{side})", ""),
+    _WAVE,
 )  # fmt: skip
 _FORCE = (
     ("sign(force)", ""), ("force * abs(force)", "F²"), ("force**3", "F³"), ("force * position", "F·L"),
@@ -43,7 +44,7 @@ _POSITION = (
     ("position", "L"), ("position**2", "L²"), ("position**3", "L³"), ("velocity", "L/T"), ("force", "F"),
     ("force * abs(force)", "F²"), ("sign(force)", ""), ("force * position", "F·L"), ("memory(force, tau)", "F"),
     ("time", "T"), ("time**2", "T²"), ("time_since_contact", "T"),
-    ("sin(6.28319 * position / period + phase{side})", ""),
+    _WAVE,
 )  # fmt: skip
 #: Terms by the place where they act. A shift of a commanded position is a force on the motor, but for its limits.
 LIBRARY = {"motor": _MOTOR, "force": _FORCE, "position": _POSITION}
@@ -81,8 +82,8 @@ def terms(fit: Fit, target: Target) -> Iterator[type[Law]]:
     }
     for place, library in LIBRARY.items():
         amount, unit = amounts[place]
+        apart = " + apart * side" if has_sides(place, gripper) else ""
         for text, of_term in library:
-            apart = " + apart * side" if has_sides(place, gripper) else ""
             term = text.format(e=f"({drive})", v=slow, side=apart)
             expression = ast.unparse(ast.parse("c1" if text == "1" else f"c1 * {term}"))  # without spare parentheses
             per = of_term.translate(str.maketrans(units))

@@ -86,11 +86,16 @@ def _copied(command: np.ndarray, position: np.ndarray) -> int | None:
 
 def _slope(one: MeasuredGrasp, joint: int) -> float | None:
     """How far the position goes for one unit of its command; None where it does not follow."""
-    on = np.ones(len(one.time_s), bool) if one.enabled is None else np.asarray(one.enabled, float) > 0
+    on = _switched_on(one)
     command, position = one.command_m[on, joint], one.position_m[on, joint]
     if len(command) < 10 or abs(correlation(command, position)) < _FOLLOWS:
         return None
     return float(np.polyfit(command, position, 1)[0])
+
+
+def _switched_on(one: MeasuredGrasp) -> np.ndarray:
+    """At which samples the servo is switched on, ``(T,)``."""
+    return np.ones(len(one.time_s), bool) if one.enabled is None else np.asarray(one.enabled, float) > 0
 
 
 def _far_apart(measured: MeasurementSet, joint: int, span: float) -> list[str]:
@@ -162,7 +167,7 @@ def check_efforts(measured: MeasurementSet, unsigned: bool) -> list[str]:
 
 def _falls_with_what_is_to_go(one: MeasuredGrasp, joint: int) -> bool:
     """Whether an effort is that of a servo which drives away from its command, as far as it is switched on."""
-    on = np.ones(len(one.time_s), bool) if one.enabled is None else np.asarray(one.enabled, float) > 0
+    on = _switched_on(one)
     position, effort = one.position_m[:, joint], one.force_n[on, joint]
     speed = np.gradient(position, one.time_s)
     causes = np.column_stack([one.command_m[:, joint] - position, speed, np.ones(len(position))])[on]
