@@ -16,6 +16,8 @@ from pathlib import Path
 import numpy as np
 
 from forcegrasp.effects import STAGES, Effect, catalogue, get_effect
+from forcegrasp.effects.for_gripper import effect_of, why_left_out
+from forcegrasp.physics.gripper import Gripper
 from forcegrasp.physics.gripper_file import load_gripper
 from forcegrasp.physics.plant import Plant, write_base
 
@@ -23,8 +25,8 @@ PERIOD_S, JUMP = 0.04, 9.0
 NOISE_M, NOISE_N = 27e-6, 0.013
 FORCE_SCALE, RADIUS_M = 2.0, 0.025
 
-#: Where effects of servos alone are shown, and steps of its command, rad.
-_SERVO, _SERVO_STEPS = "so101_jaw", (0.0, 0.3, 0.0, -0.2, 0.1)
+#: Effects of servos alone are shown on the first of these that they can show on, at steps of its command, rad.
+_SERVOS, _SERVO_STEPS = ("so101_jaw", "xl330_pendulum"), (0.0, 0.3, 0.0, -0.2, 0.1)
 
 
 @dataclass(frozen=True)
@@ -112,6 +114,8 @@ _PLANS = {
     ),
     "readout_skew": _STEPS,
     "elastic_transmission": Show("steps of a servo's jaw", ()),
+    "elastic_joint": Show("steps of a servo with a pendulum", ()),
+    "loose_joint": Show("steps of a servo with a pendulum", ()),
     "velocity_lag": Show("steps of a servo's jaw", ()),
     "force_limit": Show(
         "squeezes of growing strength, as fast steps",
@@ -263,7 +267,8 @@ def draw_servo(effect: type[Effect], path: Path) -> None:
     import matplotlib.pyplot as plt
     from PIL import Image
 
-    plant = Plant(load_gripper(_SERVO), 2, threads=1)
+    plant = Plant(servo_for(effect), 2, threads=1)
+    effect = effect_of(effect.name, plant.gripper)
     plant.attach([(effect(effect.typical_values()[None], plant.dt), np.array([1]))])
     plant.reset(np.arange(2), np.zeros(2))
     command, read = np.repeat(_SERVO_STEPS, 250), []
@@ -289,8 +294,15 @@ def draw_servo(effect: type[Effect], path: Path) -> None:
     Image.open(path).convert("RGB").quantize(96).save(path, optimize=True)
 
 
+def servo_for(effect: type[Effect]) -> Gripper:
+    """The mechanism that an effect of servos alone is shown on."""
+    return next(gripper for gripper in map(load_gripper, _SERVOS) if not why_left_out(effect, gripper))
+
+
 def size(effect: type[Effect]) -> str:
-    """The typical size in words."""
+    """The typical size in words, as on what shows it."""
+    if effect.servo_only:
+        effect = effect_of(effect.name, servo_for(effect))
     return ", ".join(f"{p.name} = {p.typical:g}{'' if p.unit == '1' else ' ' + p.unit}" for p in effect.parameters)
 
 

@@ -29,7 +29,14 @@ class Backlash(Effect):
     symptom = "motion is lost after each reversal, however small the load; contact comes late"
     formula = "p ← clip(p, m − g/2, m + g/2)"
     source = "play operator (Krasnosel'skii and Pokrovskii 1989)"
-    look_alikes = ("two_mass_backlash", "force_deadzone", "adhesion", "coulomb_friction", "elastic_transmission")
+    look_alikes = (
+        "two_mass_backlash",
+        "loose_joint",
+        "force_deadzone",
+        "adhesion",
+        "coulomb_friction",
+        "elastic_transmission",
+    )
     separates = "pauses, reversals and partial releases in contact, at several speeds"
     parameters = (
         Parameter(

@@ -31,7 +31,8 @@ class Parameter:
     logarithmic: bool = False  #: fitted by its logarithm
     trials: tuple[float, ...] = ()  #: sizes that a diagnosis tries
     #: What its sizes are proportional to, from gripper to gripper: the motors' "position", "effort" or "damping",
-    #: a contact's "force", or its inverse, "compliance"; empty if they are alike for all.
+    #: a contact's "force", or its inverse, "compliance", or what yields under an effort, "motor compliance"; empty if
+    #: they are alike for all.
     follows: str = ""
     #: Value in model files that were written before the parameter existed; None: files must have it.
     if_missing: float | None = None
@@ -97,6 +98,7 @@ class Effect:
     needs_object: ClassVar[bool] = False  #: shows only where fingers press on something
     needs_ground: ClassVar[bool] = False  #: has no meaning where the object stands on nothing
     needs_rotors: ClassVar[bool] = False  #: has no meaning where motors have no inertia of their own, or move linkages
+    needs_load_behind_rotor: ClassVar[bool] = False  #: has no meaning where rotor and load have no inertia each
     needs_parallel_pads: ClassVar[bool] = False  #: would let objects slip out of pads that turn
     instead_of: ClassVar[tuple[str, ...]] = ()  #: effects that mean nothing beside it
     servo_only: ClassVar[bool] = False  #: of drives alone; where fingers grasp, another effect has its part

@@ -25,7 +25,7 @@ class ElasticTransmission(Effect):
     symptom = "the joint rings at one frequency after fast motion, whatever the servo's gain"
     formula = "F = s J (ω² (x − q) + 2 ζ ω (dx/dt − dq/dt)), d²x/dt² = −F / (s J), ω = 2 π f, ζ = 0.1"
     source = "two-mass drive: Spong (1987), elastic joints"
-    look_alikes = ("backlash", "presliding", "actuator_lag")
+    look_alikes = ("elastic_joint", "backlash", "presliding", "actuator_lag")
     separates = (
         "steps at several gains: what rings at one frequency is behind a spring, what changes with it is the servo"
     )

@@ -62,6 +62,8 @@ def why_left_out(effect: type[Effect], gripper: Gripper) -> str:
         return f"needs pads that stay parallel; those of {gripper.name} turn"
     if effect.servo_only and not gripper.is_servo:
         return f"is one of servos alone; {gripper.name} has fingers"
+    if effect.needs_load_behind_rotor and not gripper.has_load_behind_rotor:
+        return f"needs one joint with an `armature` that is not all of its inertia; that of {gripper.name} is another"
     if effect.needs_position_loop and gripper.command != "position":
         return f"needs positions that are commanded; of {gripper.name} it is the effort"
     if effect.needs_velocity_gain and not gripper.has_velocity_gain:
@@ -140,6 +142,7 @@ def _adapt(effect: type[Effect], traits: _Traits) -> type[Effect]:
 def _factor(parameter: Parameter, traits: _Traits) -> float:
     factors = {"position": traits.position, "effort": traits.effort, "force": traits.force, "": 1.0}
     factors |= {"compliance": 1 / traits.force, "damping": traits.effort / traits.position}
+    factors |= {"motor compliance": traits.position / traits.effort}
     return factors[parameter.follows]
 
 
@@ -147,6 +150,8 @@ def _rename(parameter: Parameter, factor: float, effect: type[Effect], traits: _
     name, unit = parameter.name, parameter.unit
     if traits.turns and parameter.follows in ("position", "damping"):
         name, unit = name.replace("_m", "_rad"), unit.replace("m", "rad", 1)
+    if traits.turns and parameter.follows == "motor compliance":
+        name, unit = name.replace("_m_n", "_rad_nm"), "rad/(N·m)"
     if traits.turns and parameter.follows in ("effort", "damping"):
         name, unit = name.replace("_n", "_nm").replace("force", "torque"), unit.replace("N", "N·m")
     if alone:

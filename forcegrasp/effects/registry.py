@@ -30,6 +30,8 @@ _SHIPPED = (
     "coulomb_friction",
     "direction_friction",
     "elastic_transmission",
+    "elastic_joint",
+    "loose_joint",
     "encoder_bias",
     "encoder_scale",
     "finger_compliance",

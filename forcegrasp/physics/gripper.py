@@ -269,6 +269,14 @@ class Gripper(ShortRepr):
         return min(own) > 0 and all(d.trntype[0] == joint_drive and abs(d.gear[0]) == 1 for d in drives)
 
     @functools.cached_property
+    def has_load_behind_rotor(self) -> bool:
+        """Whether a servo turns or slides one joint, of whose inertia a part is the rotor's and a part the load's."""
+        model = self.compile()
+        if not self.is_servo or model.nv != 1:
+            return False
+        return 0.01 * model.dof_M0[0] < model.dof_armature[0] < 0.99 * model.dof_M0[0]
+
+    @functools.cached_property
     def has_ground(self) -> bool:
         """Whether there is something that the object may stand on."""
         return len(ground_geoms(self.compile(), self.object_geom)) > 0

@@ -87,8 +87,13 @@ class Plant(ContributedFields):
 
         Gravity, springs, a load and what presses against the pads; not friction, nor what else effects push.
         """
+        return self.weight + self._to_motors(self.press_n) + self._load[:, None]
+
+    @property
+    def weight(self) -> np.ndarray:
+        """What gravity and springs of the scene do to the motors' joints, N or N·m, ``(n, motors)``; positive opens."""
         weight = self.batch.bind("qfrc_spring") - self.batch.bind("qfrc_bias")
-        return weight[:, self._motor_v] * self._signs + self._to_motors(self.press_n) + self._load[:, None]
+        return weight[:, self._motor_v] * self._signs
 
     @property
     def pad_position(self) -> np.ndarray:

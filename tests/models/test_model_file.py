@@ -90,7 +90,7 @@ def test_round_trip(tmp_path):
 
 def test_round_trip_of_every_effect_and_variant(tmp_path):
     seen = set()
-    for gripper in (load_gripper("tiago"), load_gripper("so101_jaw")):
+    for gripper in map(load_gripper, ("tiago", "so101_jaw", "xl330_pendulum")):
         parameters_of = gripper.parameters.items()
         base = {n: Fitted(p.nominal, p.low, p.high, p.unit) for n, p in parameters_of if p.scope == "gripper"}
         for effect in effects_of(gripper).values():
