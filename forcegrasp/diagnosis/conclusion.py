@@ -14,7 +14,7 @@ from forcegrasp.diagnosis.left_over import AS_GOOD_AS_NOTHING, left_by_many
 from forcegrasp.diagnosis.odd_grasps import OddGrasp, odd_grasps
 from forcegrasp.diagnosis.result import Diagnosis, Step, kept_steps, settle_ties
 from forcegrasp.diagnosis.study import Study
-from forcegrasp.diagnosis.verdict import EXPLAINED_FAR, MUCH, conclude
+from forcegrasp.diagnosis.verdict import EXPLAINED_FAR, MUCH, conclude, explained_share
 from forcegrasp.effects import Effect
 from forcegrasp.identify.base_fit import BaseFit, check_gradient
 from forcegrasp.identify.fit import Fit
@@ -69,7 +69,8 @@ def concluded(begun: Begun, study: Study, steps: Sequence[Step], fit: Fit, in_a_
     share = study.explained(target.before_rounding(study.heldout(base.fit)), study.heldout(fit))
     # a missing effect makes the error rough, and the base fit stop short: then what leaves more may be a look-alike,
     # unless with it the fit came to an end
-    leaves_more = error_after > AS_GOOD_AS_NOTHING * floor and share < EXPLAINED_FAR
+    beyond_floor = explained_share(error_before, error_after, noise=floor)
+    leaves_more = error_after > AS_GOOD_AS_NOTHING * floor and beyond_floor < EXPLAINED_FAR
     led_on = bool(found) and check_gradient(fit, target).converged
     if left and not base.converged and not led_on and (not found or leaves_more):
         return Diagnosis(

@@ -256,7 +256,9 @@ class _Start:
 
     def fit_anyway(self, scores: Sequence[Score], null: np.ndarray) -> list[Candidate]:
         """Rough fits with the effects of these signatures, whatever little they promise."""
-        effects = best_effects(scores, _FITTED_ANYWAY)
+        ordered = best_effects(scores, len(scores))
+        # what takes the place of the scene's own law has no small size, and a signature that says little
+        effects = [e for place, e in enumerate(ordered) if place < _FITTED_ANYWAY or e.instead_of]
         for effect in effects:
             self._study.progress(f"fitting {effect.name} to few grasps, though it promises little")
         return [self._judge_by_gain(fit, null) for fit in refine_anyway(effects, self._study, self._fit)]

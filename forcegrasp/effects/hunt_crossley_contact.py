@@ -34,7 +34,7 @@ class HuntCrossleyContact(Effect):
         " k/k₀ and b/b₀ an object's stiffness and damping ÷ the scene's"
     )
     source = "Hunt and Crossley 1975; p is 1 of flat pads on a bed of springs, 1.5 of round bodies (Hertz 1882)"
-    look_alikes = ("stiffening_contact", "viscoelastic_contact", "finger_compliance", "object_size")
+    look_alikes = ("stiffening_contact", "viscoelastic_contact", "finger_compliance", "object_size", "force_deadzone")
     separates = "slow ramps to high force, and touches at several speeds"
     parameters = (
         Parameter(

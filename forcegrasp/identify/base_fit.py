@@ -22,6 +22,8 @@ from forcegrasp.short_repr import ShortRepr
 STARTS, MOST_STARTS = 3, 6
 # The further starts see this many grasps of each object: enough to tell whether there is another optimum.
 _GRASPS_PER_OBJECT = 2
+# Where these do not agree, so many of the best are fitted to the end, on all grasps.
+_FINISHED = 3
 # Starts end in the same place if their costs agree to this share, or to this much per residual.
 _SAME_SHARE, _SAME_COST = 0.01, 0.002
 # Up to so many times the noise, a fit is where it should be, wherever others ended.
@@ -62,7 +64,7 @@ def fit_base(
     ends = side_by_side([partial(small.fit, start) for start in starts])
     for number, end in enumerate(ends[1:], 2):
         progress(f"base model, start {number} of {STARTS}, on a few grasps: {end.error:.2f} × noise")
-    while len(ends) < MOST_STARTS and not _ends_agree(ends, small.target):
+    while len(ends) < MOST_STARTS and not _agree(ends, small.target):
         ends.append(small.fit(_random_start(small.problem, contact_estimate, rng)))
         progress(f"base model, start {len(ends)} of {MOST_STARTS}, on a few grasps: {ends[-1].error:.2f} × noise")
     best = min(ends, key=lambda end: end.cost)
@@ -72,7 +74,14 @@ def fit_base(
     if ends[0].cost - best.cost > tolerance or small.cost - best.cost > max(tolerance, _WENT_ON * (small.cost - noise)):
         again = fit_once(target, problem, simulators, small.enlarge(best.vector))
         first = min([first, again], key=lambda fit: fit.cost)
-    if not _ends_agree(ends, small.target) and rms_error(first, target) > _NOISE_ALONE:
+    agree = _agree(ends, small.target) or rms_error(first, target) <= _NOISE_ALONE
+    if not agree:  # rough fits may stop on their way to the same place
+        ends.sort(key=lambda end: end.cost)
+        rough = [first, *(fit_once(target, problem, simulators, small.enlarge(e.vector)) for e in ends[:_FINISHED])]
+        whole = [fit_exactly(target, problem, simulators, fit.vector) for fit in rough]
+        first, agree = min(whole, key=lambda fit: fit.cost), _agree(whole, target)
+        progress(f"base model, the best {_FINISHED} starts to the end: {rms_error(first, target):.2f} × noise")
+    if not agree:
         spread = ", ".join(f"{error:.2f}" for error in errors)
         reason = f"the starts end in different places (errors of {spread} × noise)"
         return BaseFit(first, errors, False, reason, starts_agree=False)
@@ -100,7 +109,7 @@ def cost_tolerance(best: Fit | End, target: Target) -> float:
     return max(_SAME_SHARE * best.cost, _SAME_COST * target.readings)
 
 
-def _ends_agree(ends: Sequence[End], target: Target) -> bool:
+def _agree(ends: Sequence[Fit | End], target: Target) -> bool:
     """Whether two fits at least ended in the best place."""
     best = min(ends, key=lambda end: end.cost)
     tolerance = max(cost_tolerance(best, target), _SAME_BEYOND * (best.cost - target.cost_of_noise))

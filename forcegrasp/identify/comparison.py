@@ -168,7 +168,7 @@ def compare(
     floor = numerical_floor(beyond, target)
     used = model or model_of(fit, target, loaded, numerical)
     between = compare_sets(loaded.parts, used, progress) if loaded.parts else None
-    half, other = (rms(one, target) for one in beyond)
+    half, other = (rms(one, target) for one in beyond[:2])
     found = Comparison(target, fit.predicted, fit.residual, held, floor, between, (half, other))
     return found, used, [] if model is not None or base.converged else [_not_fitted(found, base.reason)]
 

@@ -27,6 +27,7 @@ _LEAST_SAMPLES = 40
 def numerical_error(fit: Fit, target: Target) -> tuple[np.ndarray, ...]:
     """How far the prediction moves with half the physics step, and with the other collision code, ÷ noise.
 
+    Of parts of recordings also with another position and with another velocity at the start, for these are measured.
     Each ``(G, S, C)``. The fit must be one of the model itself, no rough one. A scene that steps at the control period
     samples as its drive does: with half a step it would be another drive, and no finer simulation of the same one.
     """
@@ -35,6 +36,8 @@ def numerical_error(fit: Fit, target: Target) -> tuple[np.ndarray, ...]:
         Replay(gripper, grasps, step_factor=1.0 if gripper.steps_as_its_drive else 0.5, strict=True),
         Replay(gripper, grasps, other_collisions=True, strict=True),
     )
+    if any(grasp.start_std is not None for grasp in grasps):
+        others += tuple(Replay(gripper, grasps, start_off=off, strict=True) for off in ((1.0, 0.0), (0.0, 1.0)))
     return tuple(target.change(predict(o, case)[0], fit.predicted) for o in others)
 
 
@@ -61,10 +64,10 @@ def numerical_floor(
       where: choice of samples and signals, ``(G, S, C)``.
       tolerated: what the model may be off by besides, ÷ noise, ``(G, S, C)``.
     """
-    half, other = (rms(n, target, where) for n in numerical)
+    half, *others = (rms(n, target, where) for n in numerical)
     besides = 0.0 if tolerated is None else rms(tolerated, target, where)
     # Halving the step shows about half of what the step costs in all.
-    return float(np.sqrt(1 + 4 * half**2 + other**2 + besides**2))
+    return float(np.sqrt(1 + 4 * half**2 + np.sum(np.square(others)) + besides**2))
 
 
 def at_floor(error: float, floor: float) -> bool:
@@ -93,7 +96,7 @@ def excess(
         error, floor = rms(residual, target, where), numerical_floor(numerical, target, where, tolerated)
         if error > floor * max(_ROOM_IN_CELL, _by_chance(residual, target, where)):
             return f"{name}: {error:.2f} × noise, {floor:.2f} is the floor"
-    off = 2 * np.abs(numerical[0]) + np.abs(numerical[1]) + (0.0 if tolerated is None else tolerated)
+    off = 2 * np.abs(numerical[0]) + np.abs(numerical[1:]).sum(axis=0) + (0.0 if tolerated is None else tolerated)
     far = np.abs(residual) > _OUTLIER + 3 * off
     if far.sum() > max(_MAX_OUTLIERS, 2e-4 * target.readings):
         return f"{far.sum()} readings are more than {_OUTLIER:g} σ off"

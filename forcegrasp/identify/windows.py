@@ -78,6 +78,7 @@ def _windows(recording: MeasuredGrasp, part: slice, length: float, skew: BasePar
     if len(time) <= 2 * _AROUND:
         return []
     warm_up, smooth = min(WARM_UP_S, length / 2), _smoothed(one)
+    noise = 1.4826 * np.median(np.abs(one.position_m - smooth), axis=0)
     count = max(1, math.ceil((time[-1] - warm_up) / length - 0.5))
     lows = [0, *(_start_near(one, index * length, length / 4) for index in range(1, count)), len(time)]
     usual, most = (skew.nominal, max(0.0, skew.high)) if skew else (0.0, 0.0)
@@ -89,10 +90,13 @@ def _windows(recording: MeasuredGrasp, part: slice, length: float, skew: BasePar
         counts = (since >= warm_up) & (np.arange(low, high) < last)
         if counts.sum() > _AROUND:
             window, name = _cut_out(one, slice(low, int(high))), f"{one.name} {began + time[low]:.1f} s"
-            start, earlier = _state(one, low, usual), slice(int(np.searchsorted(time, time[low] - REMEMBERED_S)), low)
+            start, unsure = _state(one, low, usual, noise)
+            earlier = slice(int(np.searchsorted(time, time[low] - REMEMBERED_S)), low)
             before = time[earlier] - time[low], one.command_m[earlier], smooth[earlier]
             found.append(
-                dataclasses.replace(window, name=name, time_s=since, start=start, counts=counts, before=before)
+                dataclasses.replace(
+                    window, name=name, time_s=since, start=start, start_std=unsure, counts=counts, before=before
+                )
             )
     return found
 
@@ -111,7 +115,7 @@ def _start_near(one: MeasuredGrasp, middle: float, reach: float) -> int:
 
 def _doubt(one: MeasuredGrasp, index: int) -> float:
     """How badly the state at a sample is known, m or rad: what a parabola leaves, and how far it moves meanwhile."""
-    curves, left = _parabola(one, index)
+    curves, left, _ = _parabola(one, index)
     return float(np.max(left + _UNSURE_S * np.abs(curves[1])))
 
 
@@ -129,18 +133,23 @@ def _cut_out(one: MeasuredGrasp, part: slice) -> MeasuredGrasp:
     )
 
 
-def _state(one: MeasuredGrasp, index: int, skew: float) -> tuple[np.ndarray, np.ndarray]:
-    """Position and velocity of which a sample tells that much later, each ``(motors,)``.
+def _state(
+    one: MeasuredGrasp, index: int, skew: float, noise: np.ndarray
+) -> tuple[tuple[np.ndarray, ...], tuple[np.ndarray, ...]]:
+    """Position and velocity of which a sample tells that much later, and their standard errors, each ``(motors,)``.
 
     From a parabola through the samples around it; but a servo that sets off at once rested when its recording began.
+    Windows start where it fits best, by chance, too: the usual ``noise``, ``(motors,)``, is the least that it leaves.
     """
-    curves, _ = _parabola(one, index)
+    curves, left, spread = _parabola(one, index)
+    errors = spread[:, None] * np.maximum(left, noise)
     position, velocity = curves[0] - skew * curves[1] + skew**2 * curves[2], curves[1] - 2 * skew * curves[2]
     if index == 0:
         moves = np.abs(np.diff(one.position_m[: _AROUND + 1], axis=0))
         rested = moves[0] <= _RESTED * moves.max(axis=0)
         position, velocity = np.where(rested, one.position_m[0], position), np.where(rested, 0.0, velocity)
-    return position, velocity
+        errors = np.where(rested, 0.0, errors)
+    return (position, velocity), (errors[0], errors[1])
 
 
 def _reach(one: MeasuredGrasp) -> int:
@@ -149,10 +158,16 @@ def _reach(one: MeasuredGrasp) -> int:
     return min(max(_AROUND, round(_AROUND_S / step)), (len(one.time_s) - 1) // 2)
 
 
-def _parabola(one: MeasuredGrasp, index: int) -> tuple[np.ndarray, np.ndarray]:
-    """A parabola through the samples around one, ``(3, motors)``, and the rms that it leaves, ``(motors,)``."""
+def _parabola(one: MeasuredGrasp, index: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """A parabola through the samples around one, what it leaves, and its standard errors ÷ that.
+
+    Returns:
+      ``(3, motors)``, rms ``(motors,)``, ``(3,)``.
+    """
     around = _reach(one)
     low, high = max(0, index - around), min(len(one.time_s), index + around + 1)
     powers = np.vander(one.time_s[low:high] - one.time_s[index], 3, increasing=True)
     curves = np.linalg.lstsq(powers, one.position_m[low:high], rcond=None)[0]
-    return curves, np.sqrt(np.mean((one.position_m[low:high] - powers @ curves) ** 2, axis=0))
+    left = np.sqrt(np.mean((one.position_m[low:high] - powers @ curves) ** 2, axis=0))
+    spread = np.linalg.norm(np.linalg.pinv(powers), axis=1) * np.sqrt(len(powers) / max(len(powers) - 3, 1))
+    return curves, left, spread

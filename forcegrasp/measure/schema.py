@@ -102,7 +102,8 @@ class MeasuredGrasp(ShortRepr):
     enabled: np.ndarray | None = None  #: ``(T,)``, whether the motor was switched on; None if always
     load: np.ndarray | None = None  #: ``(T,)``, force or torque from outside, N or N·m; None if there was none
     #: Of a part of a recording: where the motors stood and how fast they moved at its start, and what of it counts.
-    start: tuple[np.ndarray, np.ndarray] | None = field(default=None, compare=False)
+    start: tuple[np.ndarray, ...] | None = field(default=None, compare=False)
+    start_std: tuple[np.ndarray, ...] | None = field(default=None, compare=False)  #: standard errors of both
     counts: np.ndarray | None = field(default=None, compare=False)  #: ``(T,)``
     #: Of a part of a recording, the samples before it: when ``(P,)``, what was commanded, and where the motors were,
     #: ``(P, motors)`` each.

@@ -76,6 +76,8 @@ class Replay:
       step_factor: multiplies the physics step; ½ tells how exact the integration is.
       other_collisions: uses MuJoCo's other collision code; tells how exact the contacts are.
       encoders_known: the grasps hold measured positions, which the gripper's own driver may have acted on.
+      start_off: by how many of their standard errors positions and velocities at the start are off, of each grasp to
+        one side or the other; tells how much of what is predicted hangs on them.
       strict: whether rows must not diverge; by default they end :data:`NOWHERE`, lest one of many models that are tried
         ends the search, and :attr:`diverged` tells of the last one.
     """
@@ -89,6 +91,7 @@ class Replay:
         other_collisions: bool = False,
         encoders_known: bool = True,
         strict: bool = False,
+        start_off: tuple[float, float] = (0.0, 0.0),
     ) -> None:
         self._strict, self.diverged = strict, ""
         self.gripper, self.grasps, self.tier = gripper, tuple(grasps), tier
@@ -127,6 +130,10 @@ class Replay:
         starts_at = [g.start or (start_position(g, gripper.stroke, noise), still) for g in self.grasps]
         #: where the motors stand at the first sample, m or rad, and how fast they move, ``(grasps, motors)``
         self.start_m, self._start_velocity = (np.stack([pair[i] for pair in starts_at]) for i in (0, 1))
+        sides = np.random.default_rng(0).choice((-1.0, 1.0), (len(self.grasps), 1))
+        unsure = [g.start_std or (still, still) for g in self.grasps]
+        self.start_m += start_off[0] * sides * [pair[0] for pair in unsure]
+        self._start_velocity += start_off[1] * sides * [pair[1] for pair in unsure]
         known = any(g.before is not None for g in self.grasps)
         at_rest = self.start_m if gripper.command == "position" else np.zeros_like(self.start_m)
         self._earlier = _earlier(self.grasps, self.dt, at_rest, self.start_m) if known else None

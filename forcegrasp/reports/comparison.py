@@ -138,12 +138,14 @@ def answer(comparison: Comparison) -> str:
     error = f"The model's error {where} is {value:.2f} × the sensor noise"
     half, other = comparison.numerical
     cure = "a smaller timestep" if 2 * half > other else "<flag multiccd='disable'/> or rounder pads"
+    own = float(np.sqrt(1 + 4 * half**2 + other**2))  # the floor without what noise makes unsure of the start
     if at_floor(value, floor) and not at_floor(value, _MOST_NOISE):
+        cause = "the simulation's own numerical error" if own > _ALL_NOISE else "what is unsure of where windows start"
+        better = f"In the gripper's scene, try {cure}" if own > _ALL_NOISE else "Record more moves that start at rest"
         return (
-            f"{error}, and up to {floor:.2f} × may be the simulation's own numerical error: this can't tell whether an"
-            f" effect is missing. In the gripper's scene, try {cure}."
+            f"{error}, and up to {floor:.2f} × may be {cause}: this can't tell whether an effect is missing. {better}."
         )
-    noise = "noise" if floor < _ALL_NOISE else f"noise and the simulation's own error, for which {cure} would be better"
+    noise = "noise" if own < _ALL_NOISE else f"noise and the simulation's own error, for which {cure} would be better"
     total = f"{error}; up to {floor:.2f} is {noise}."
     if at_floor(value, floor):
         if round(value, 2) > round(floor, 2):
@@ -312,7 +314,8 @@ def _by_signal_and_phase(comparison: Comparison) -> Section:
             Text(f"S{noise_sentence(comparison.target)[1:]}."),
             Text(
                 f"Held-out error {comparison.floor_ratio():.3f} × noise. Floor {comparison.floor:.3f} × noise: sensor"
-                " noise, and what the simulation's own step and collision code add."
+                " noise, what the simulation's own step and collision code add, and of a servo what is unsure of where"
+                " windows start."
             ),
         ],
     )

@@ -17,6 +17,7 @@ from forcegrasp.diagnosis.odd_grasps import OddGrasp
 from forcegrasp.diagnosis.refine import fit_with, refine_anyway
 from forcegrasp.diagnosis.result import Step, kept_steps
 from forcegrasp.diagnosis.screen import Screen
+from forcegrasp.diagnosis.signatures import Score
 from forcegrasp.diagnosis.stalled_base import better_without
 from forcegrasp.diagnosis.step import _Start, look_further
 from forcegrasp.diagnosis.study import Study
@@ -329,6 +330,16 @@ def test_little_is_near_the_floor_and_a_small_part_of_what_was_beyond_it(before,
 def test_forms_leave_a_very_small_part_of_a_large_error(before, after, of_forms):
     study = SimpleNamespace(heldout=lambda fit: None, error=lambda held: after)
     assert leaves_forms(study, None, before, 1.01) == of_forms
+
+
+def test_what_replaces_the_law_of_contacts_is_fitted_however_little_it_promises(creeping, monkeypatch):
+    study, base = creeping
+    fitted: list[str] = []
+    monkeypatch.setattr(step_module, "refine_anyway", lambda effects, *_: fitted.extend(e.name for e in effects) or [])
+    effects = sorted(catalogue().values(), key=lambda effect: bool(effect.instead_of))
+    scores = [Score(EffectSetting.typical(effect), 0.0, np.zeros(1)) for effect in effects]
+    _Start(study, base.fit).fit_anyway(scores, np.zeros(1))
+    assert fitted == [effect.name for effect in effects[:12]] + ["hunt_crossley_contact"]
 
 
 @pytest.mark.parametrize("of_forms", [True, False])

@@ -427,6 +427,17 @@ def test_where_the_base_fit_stopped_short_what_explains_most_is_an_answer(made_u
         assert found_by(Step(("force_bias",), (candidate,), (), 2.0, 1.6), converged=False).verdict == verdict
 
 
+@pytest.mark.parametrize(("floor", "verdict"), [(1.0, "not_fitted"), (1.5, "effect")])
+def test_what_explains_most_beyond_the_floor_is_an_answer(made_up, found_by, monkeypatch, floor, verdict):
+    """Noise is not all that no effect can explain."""
+    bias, drift = made_up.diagnosis("one_of").steps[0].candidates
+    half = dataclasses.replace(bias, fit=drift.fit)
+    end = dataclasses.replace(made_up.base, converged=False)
+    monkeypatch.setattr(conclusion, "check_gradient", lambda *_: end)
+    monkeypatch.setattr(search, "numerical_floor", lambda *_: floor)
+    assert found_by(Step(("force_bias",), (half,), (), 2.0, 1.6), converged=False).verdict == verdict
+
+
 def test_where_the_base_fit_stopped_short_what_led_a_fit_to_its_end_is_an_answer(made_up, found_by, monkeypatch):
     bias, drift = made_up.diagnosis("one_of").steps[0].candidates
     half = dataclasses.replace(bias, fit=drift.fit)

@@ -311,13 +311,28 @@ def test_a_fit_that_stopped_short_is_led_on_by_few_grasps(fitted, monkeypatch):
 
 
 def test_a_fit_that_leaves_noise_alone_needs_no_second_start(fitted, monkeypatch):
-    monkeypatch.setattr(base_fit, "_ends_agree", lambda ends, target: False)
+    monkeypatch.setattr(base_fit, "_agree", lambda ends, target: False)
     start = fitted.target, fitted.problem, fitted.simulators
     assert fit_base(*start, np.random.default_rng(0)).converged
     monkeypatch.setattr(base_fit, "_NOISE_ALONE", 0.9)
     apart = fit_base(*start, np.random.default_rng(0))
     assert not apart.converged
     assert "the starts end in different places" in apart.reason
+
+
+def test_starts_that_end_apart_roughly_may_agree_at_the_end(fitted, monkeypatch):
+    monkeypatch.setattr(base_fit, "_NOISE_ALONE", 0.9)
+    agree, told = base_fit._agree, []
+
+    def only_at_the_end(ends, target) -> bool:
+        return isinstance(ends[0], Fit) and agree(ends, target)
+
+    monkeypatch.setattr(base_fit, "_agree", only_at_the_end)
+    base = fit_base(fitted.target, fitted.problem, fitted.simulators, np.random.default_rng(0), told.append)
+    assert base.converged
+    assert base.fit.cost == pytest.approx(fitted.fit.cost, rel=0.01)
+    assert "start 6 of 6" in told[-2]
+    assert told[-1].startswith("base model, the best 3 starts to the end: 0.9")
 
 
 def test_a_fit_that_ended_on_a_slope_is_not_believed(fitted):

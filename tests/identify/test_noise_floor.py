@@ -89,6 +89,17 @@ def test_numerical_error_raises_the_floor():
     assert numerical_floor((half, other), target, where) == pytest.approx(expected)
 
 
+def test_what_is_unsure_of_the_start_raises_the_floor():
+    target, off = make(), np.zeros((4, G, S, 4))
+    for index, size in enumerate((0.1, 0.2, 0.3, 1.5)):
+        off[index] = size
+    assert numerical_floor(off, target) == pytest.approx(np.sqrt(1 + 4 * 0.1**2 + 0.2**2 + 0.3**2 + 1.5**2))
+    residual = np.zeros((G, S, 4))
+    residual[:, ::30, 0] = 7.0
+    assert excess(residual, off[:2], target).startswith("40 readings are more than")
+    assert excess(residual, off, target) == ""
+
+
 @pytest.mark.parametrize(("error", "told"), [(1.0, "the fit came to no clear end"), (1.6, "is not fitted: it falls")])
 def test_a_fit_without_an_end_is_told_by_what_it_leaves(error, told):
     comparison = SimpleNamespace(floor=1.02, floor_ratio=lambda: error)

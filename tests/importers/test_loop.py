@@ -88,6 +88,32 @@ def test_windows_start_where_the_servo_was(example):
         assert not part.counts[:10].any()
 
 
+def test_what_is_known_of_a_start(example):
+    """Positions and velocities at the starts of windows scatter as their standard errors say; it moves predictions."""
+    sine = next(one for one in example.grasps if one.name == "sine")
+    exact, rng = 0.5 + 0.2 * np.sin(np.pi * sine.time_s[:, None]), np.random.default_rng(0)
+    off = []
+    for _ in range(100):
+        noisy = exact + 0.002 * rng.standard_normal(exact.shape)
+        for part in windows.cut([dataclasses.replace(sine, position_m=noisy, rows=np.arange(len(exact)))])[1:]:
+            assert part.start is not None
+            assert part.start_std is not None
+            assert part.rows is not None
+            true = exact[part.rows[0]], 0.2 * np.pi * np.cos(np.pi * sine.time_s[part.rows[0]])
+            off.append([(a - b) / std for a, b, std in zip(part.start, true, part.start_std, strict=True)])
+    np.testing.assert_allclose(np.std(np.squeeze(off), axis=0), 1.0, atol=0.25)
+    parts = windows.cut([sine])[1:]
+    usual, *moved = (
+        Replay(load_gripper("so101_jaw"), parts, start_off=by) for by in ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0))
+    )
+    unsure = [np.stack([part.start_std[i] for part in parts if part.start_std]) for i in (0, 1)]
+    for index, name in enumerate(("start_m", "_start_velocity")):
+        change = [getattr(replay, name) - getattr(usual, name) for replay in moved]
+        np.testing.assert_allclose(np.abs(change[index]), unsure[index])
+        assert len(set(np.sign(change[index][:, 0]))) == 2
+        assert not change[1 - index].any()
+
+
 def test_a_start_lies_where_the_servo_is_at_rest_and_no_window_crosses_a_gap(example):
     steps = next(one for one in example.grasps if one.name == "steps")
     for part in windows.cut([steps])[1:]:

@@ -104,7 +104,12 @@ def test_compare_can_not_tell_where_numerical_error_is_large(made_up):
     assert "no failure" not in answer
     assert "try a smaller timestep" in answer
     assert "multiccd" in comparison_report.answer(dataclasses.replace(comparison, numerical=(0.1, 2.0)))
+    unsure = comparison_report.answer(dataclasses.replace(comparison, numerical=(0.1, 0.1)))
+    assert "may be what is unsure of where windows start: this can't tell" in unsure
+    assert "timestep" not in unsure
     fine = dataclasses.replace(comparison, residual=one_and_a_half / 1.5, heldout=one_and_a_half / 1.5, floor=1.5)
+    assert "up to 1.50 is noise. These" in comparison_report.answer(dataclasses.replace(fine, numerical=(0.1, 0.1)))
+    fine = dataclasses.replace(fine, numerical=(0.5, 0.5))
     assert "up to 1.50 is noise and the simulation's own error" in comparison_report.answer(fine)
 
 
