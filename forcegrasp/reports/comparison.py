@@ -37,6 +37,8 @@ PHASE_WORDS = {
 # Share of the error below which what it goes with is no news.
 _WORTH_TELLING = 0.05
 _GOES_WITH = "what it goes with"
+#: What single readings are called that no motion explains.
+WRONG = "readings that went wrong"
 
 
 def amount(value: float, unit: str) -> str:
@@ -202,8 +204,8 @@ def _rows(comparison: Comparison) -> list[tuple[str, str]]:
     errors, target = comparison.by_grasp(), comparison.target
     worst = [f"{target.grasps[i].label} ({errors[i]:.1f} ×)" for i in worst_grasps(comparison)]
     rows = [*_between_rows(comparison), *_recording_rows(comparison), (f"worst {target.part}s", ", ".join(worst))]
-    if len(wrong := comparison.wrong_readings()):
-        rows.append(("readings that went wrong", _wrong_words(comparison, wrong)))
+    if wrong := wrong_words(comparison):
+        rows.append((WRONG, wrong))
     name, kind, share = comparison.explanations()[0]
     if share >= _WORTH_TELLING and not at_floor(comparison.floor_ratio(), comparison.floor):
         rows.append((_GOES_WITH, f"{share:.0%} of the {kind} error goes with {covariate_words(name)}"))
@@ -211,9 +213,11 @@ def _rows(comparison: Comparison) -> list[tuple[str, str]]:
     return [*rows, (noise, sizes)]
 
 
-def _wrong_words(comparison: Comparison, wrong: np.ndarray) -> str:
-    """Where single readings are that no motion explains, ``(n, 3)``; the first few of them."""
-    axis, told = comparison.target.axis, list[str]()
+def wrong_words(comparison: Comparison) -> str:
+    """Where single readings are that no motion explains, the first few of them; empty if there are none."""
+    wrong, axis, told = comparison.wrong_readings(), comparison.target.axis, list[str]()
+    if not len(wrong):
+        return ""
     for index, sample, signal in wrong[:_WORST].tolist():
         grasp = comparison.target.grasps[index]
         off = abs(float(comparison.residual[index, sample, signal] * comparison.target.sigma[signal]))

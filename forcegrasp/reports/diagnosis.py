@@ -22,12 +22,14 @@ from forcegrasp.identify.noise_floor import AT_FLOOR
 from forcegrasp.identify.verdict import Verdict
 from forcegrasp.reports import figures
 from forcegrasp.reports.comparison import (
+    WRONG,
     dependence_section,
     grid_picture,
     noise_sentence,
     value_text,
     words,
     worst_cell,
+    wrong_words,
 )
 from forcegrasp.reports.diagnosis_words import (
     besides_sentence,
@@ -232,6 +234,8 @@ def lines(diagnosis: Diagnosis, advice: Advice | None) -> list[str]:
         text += [f"  it could also be: {listed(step.effects[1:], 'or')}"] if len(step.effects) > 1 else []
     if diagnosis.odd and diagnosis.steps:
         text.append(f"look at these first: {odd_words(diagnosis)}")
+    if wrong := wrong_words(remaining(diagnosis)):
+        text.append(f"{WRONG}: {wrong}")
     if row := row_sentence(diagnosis):
         text.append(row)
     if diagnosis.verdict is Verdict.UNKNOWN or diagnosis.verdict.names_effects:

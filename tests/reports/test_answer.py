@@ -312,6 +312,16 @@ def test_single_readings_that_went_wrong_are_told_by_their_place(made_up):
     assert "by 4e+03 µm" in told or "by 3996 µm" in told
     assert told.endswith("while those beside fit; look at these rows")
     assert "g2" not in told
+    found = made_up.diagnosis("unknown")
+    left = found.fit.residual.clip(-4.0, 4.0)
+    assert "went wrong:" not in " ".join(diagnosis_report.lines(with_residual(found, left), None))
+    left[1, 40, 0] = 148.0
+    assert told in diagnosis_report.lines(with_residual(found, left), None)
+
+
+def with_residual(diagnosis: Diagnosis, residual: np.ndarray) -> Diagnosis:
+    """The same with a final fit that leaves something else."""
+    return dataclasses.replace(diagnosis, fit=dataclasses.replace(diagnosis.fit, residual=residual))
 
 
 def test_axes_of_hinges_are_in_angles_and_keep_their_names(made_up, monkeypatch):
