@@ -63,7 +63,7 @@ def why_left_out(effect: type[Effect], gripper: Gripper) -> str:
     if effect.servo_only and not gripper.is_servo:
         return f"is one of servos alone; {gripper.name} has fingers"
     if effect.needs_load_behind_rotor and not gripper.has_load_behind_rotor:
-        return f"needs one joint with an `armature` that is not all of its inertia; that of {gripper.name} is another"
+        return f"needs one joint that moves a load besides its own `armature`; {gripper.name} has none"
     if effect.needs_position_loop and gripper.command != "position":
         return f"needs positions that are commanded; of {gripper.name} it is the effort"
     if effect.needs_velocity_gain and not gripper.has_velocity_gain:

@@ -156,5 +156,5 @@ def test_any_size_is_stable(name, effect):
 
 def test_it_needs_a_rotor_and_a_load():
     for effect in ("elastic_joint", "loose_joint"):
-        assert why_left_out(catalogue()[effect], load_gripper("emps")).startswith("needs one joint with an `armature`")
+        assert why_left_out(catalogue()[effect], load_gripper("emps")).startswith("needs one joint that moves a load")
         assert "servos alone" in why_left_out(catalogue()[effect], load_gripper("tiago"))
