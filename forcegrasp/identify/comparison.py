@@ -22,8 +22,9 @@ from forcegrasp.short_repr import ShortRepr
 #: What a residual is held against, in reports and where nothing explains it.
 COVARIATES = ("time_since_contact_s", "velocity_m_s", "direction", "force_n", "command_m", "position_m", "time_s")
 _BINS = 12
-# A reading went wrong that is so many σ off while those before and after it are within so many: no motion is so short.
-_WRONG, _FIT = 20.0, 5.0
+# A reading went wrong that is so many σ off while those before and after it are within so many, or this share of it: no
+# motion is so short.
+_WRONG, _FIT, _NEXT_TO_IT = 20.0, 5.0, 0.1
 
 
 @dataclass(frozen=True)
@@ -75,10 +76,15 @@ class Comparison(ShortRepr):
         return self.target.grasps[worst].label, rms(held, self.target, others[:, None, None])
 
     def wrong_readings(self) -> np.ndarray:
-        """Grasp, sample and signal of single readings that are far off while those beside them fit, ``(n, 3)``."""
+        """Grasp, sample and signal of single readings that are far off while those beside them fit, ``(n, 3)``.
+
+        Those that are furthest off come first.
+        """
         size = np.where(self.target.mask[..., None], np.abs(np.nan_to_num(self.residual)), 0.0)
-        beside = np.pad(size, ((0, 0), (1, 1), (0, 0)))
-        return np.argwhere((size > _WRONG) & (np.maximum(beside[:, :-2], beside[:, 2:]) < _FIT))
+        around = np.pad(size, ((0, 0), (1, 1), (0, 0)))
+        beside = np.maximum(around[:, :-2], around[:, 2:])
+        found = np.argwhere((size > _WRONG) & (beside < np.maximum(_FIT, _NEXT_TO_IT * size)))
+        return found[np.argsort(-size[tuple(found.T)], kind="stable")]
 
     def by_grasp(self) -> np.ndarray:
         """rms residual ÷ noise of each grasp, ``(G,)``."""

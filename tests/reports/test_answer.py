@@ -305,17 +305,20 @@ def test_single_readings_that_went_wrong_are_told_by_their_place(made_up):
     comparison = made_up.comparison
     residual = np.clip(comparison.residual, -4.0, 4.0)  # of what lasts, readings beside are off as well
     assert comparison_report.details(dataclasses.replace(comparison, residual=residual))[0].startswith("worst grasps")
-    residual[1, 40, 0] = 148.0
+    residual[1, 40:42, 0] = 148.0, -9.6  # the one after it is of the tails of the noise
+    residual[0, 60, 2] = 25.0
     residual[2, 60:62, 2] = 30.0  # two in a row are a knock
     (told, *_) = comparison_report.details(dataclasses.replace(comparison, residual=residual))[1:]
     assert told.startswith("readings that went wrong: position left at 1.6 s of g1")
     assert "by 4e+03 µm" in told or "by 3996 µm" in told
+    assert ", force left at 2.4 s of" in told  # after the one that is further off
     assert told.endswith("while those beside fit; look at these rows")
     assert "g2" not in told
     found = made_up.diagnosis("unknown")
     left = found.fit.residual.clip(-4.0, 4.0)
     assert "went wrong:" not in " ".join(diagnosis_report.lines(with_residual(found, left), None))
-    left[1, 40, 0] = 148.0
+    left[1, 40:42, 0] = 148.0, -9.6
+    left[0, 60, 2] = 25.0
     assert told in diagnosis_report.lines(with_residual(found, left), None)
 
 
