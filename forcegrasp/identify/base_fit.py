@@ -71,15 +71,17 @@ def fit_base(
     errors = tuple(end.error for end in ends)
     tolerance, noise = cost_tolerance(best, small.target), small.target.cost_of_noise
     # another start found a better place, or this one went on: a fit of all grasps had stopped short
+    again = None
     if ends[0].cost - best.cost > tolerance or small.cost - best.cost > max(tolerance, _WENT_ON * (small.cost - noise)):
         again = fit_once(target, problem, simulators, small.enlarge(best.vector))
         first = min([first, again], key=lambda fit: fit.cost)
     agree = _agree(ends, small.target) or rms_error(first, target) <= _NOISE_ALONE
-    if not agree:  # rough fits may stop on their way to the same place
-        ends.sort(key=lambda end: end.cost)
-        rough = [first, *(fit_once(target, problem, simulators, small.enlarge(e.vector)) for e in ends[:_FINISHED])]
+    if not agree:  # rough fits may stop on their way to the same place; each start counts once
+        rough = [again] if again is not None else []
+        for end in sorted(ends, key=lambda end: end.cost)[len(rough) : _FINISHED]:
+            rough.append(fit_once(target, problem, simulators, small.enlarge(end.vector)))
         whole = [fit_exactly(target, problem, simulators, fit.vector) for fit in rough]
-        first, agree = min(whole, key=lambda fit: fit.cost), _agree(whole, target)
+        first, agree = min([first, *whole], key=lambda fit: fit.cost), _agree(whole, target)
         progress(f"base model, the best {_FINISHED} starts to the end: {rms_error(first, target):.2f} × noise")
     if not agree:
         spread = ", ".join(f"{error:.2f}" for error in errors)

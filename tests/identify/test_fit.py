@@ -333,6 +333,8 @@ def test_starts_that_end_apart_roughly_may_agree_at_the_end(fitted, monkeypatch)
     assert base.fit.cost == pytest.approx(fitted.fit.cost, rel=0.01)
     assert "start 6 of 6" in told[-2]
     assert told[-1].startswith("base model, the best 3 starts to the end: 0.9")
+    monkeypatch.setattr(base_fit, "_FINISHED", 1)  # one start agrees with no other
+    assert not fit_base(fitted.target, fitted.problem, fitted.simulators, np.random.default_rng(0)).converged
 
 
 def test_a_fit_that_ended_on_a_slope_is_not_believed(fitted):
