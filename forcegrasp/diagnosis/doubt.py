@@ -10,7 +10,13 @@ from forcegrasp.diagnosis.evidence import LEAST_LEAD, is_beyond_chance
 from forcegrasp.diagnosis.faults import Fault
 from forcegrasp.diagnosis.result import Diagnosis, kept_steps
 from forcegrasp.diagnosis.verdict import EXPLAINED_FAR, explained_share
-from forcegrasp.identify.cross_validation import heldout_residual, log_likelihood, make_folds, rms
+from forcegrasp.identify.cross_validation import (
+    heldout_residual,
+    log_likelihood,
+    log_likelihood_of_sizes,
+    make_folds,
+    rms,
+)  # fmt: skip
 from forcegrasp.identify.fit import Fit
 from forcegrasp.identify.target import Target
 from forcegrasp.identify.verdict import Verdict
@@ -64,8 +70,22 @@ def _held(target: Target, fit: Fit) -> np.ndarray:
 
 
 def _gains(fault: Fault, right: _Fitted, said: _Fitted) -> np.ndarray:
-    """Change of each held-out grasp's log-likelihood, ``(G,)``, over the rows that both sets have: the last ones."""
+    """Change of the log-likelihood of each held-out grasp, or window, over the rows that both sets have: the last ones.
+
+    Of recordings that are cut into other windows now it is that of each recording.
+    """
     better, worse = _held(*right), _held(*said)
-    scale = right[0].sigma / said[0].sigma
-    gains = log_likelihood(better * scale) - log_likelihood(worse[:, -better.shape[1] :])
+    better = better * (right[0].sigma / said[0].sigma)
+    if right[0].recordings:
+        after, before = (log_likelihood_of_sizes(*one) for one in ((better, right[0]), (worse, said[0])))
+        return after - before if len(after) == len(before) else _of_each(after, right[0]) - _of_each(before, said[0])
+    gains = log_likelihood(better) - log_likelihood(worse[:, -better.shape[1] :])
     return gains - (fault.moved.price / len(gains) if fault.moved else 0.0)
+
+
+def _of_each(log_likelihoods: np.ndarray, target: Target) -> np.ndarray:
+    """Log-likelihood of each recording, ``(recordings,)``, as if all had as many readings."""
+    readings = target.mask.sum(axis=1) * target.signals.shape[-1]
+    recordings = target.recordings.values()
+    each = [log_likelihoods[members].sum() / readings[members].sum() for members in recordings]
+    return np.array(each) * readings.sum() / len(each)

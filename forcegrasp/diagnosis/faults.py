@@ -13,6 +13,7 @@ from forcegrasp.diagnosis.felt_sizes import SEEN_M, doubtful_radii
 from forcegrasp.diagnosis.late_side import command_row_later, late_side
 from forcegrasp.diagnosis.linear_step import linear_step
 from forcegrasp.diagnosis.odd_grasps import odd_grasps
+from forcegrasp.diagnosis.recording_faults import RecordingFault, recording_faults
 from forcegrasp.diagnosis.session_drift import order_in_session, session_drift
 from forcegrasp.diagnosis.shifted_rows import WORTH_A_FIT, left_by_shift
 from forcegrasp.diagnosis.signatures import Background
@@ -30,6 +31,8 @@ from forcegrasp.short_repr import ShortRepr, cut
 
 # What a linear step makes of a change of zero is believed if it differs by no more than this share.
 _OTHERWISE = 0.2
+# What a scale or a ruler says of a recording's setting is right if it differs by no more than this share.
+_SAME_SETTING = 0.02
 # A set of which a fit leaves less than so many times the noise is not doubted.
 _NOTHING = 1.03
 
@@ -43,8 +46,9 @@ class Fault(ShortRepr):
     check: str  #: what to look at
     put_right: Loaded[MeasurementSet]
     moved: Moved | None = None  #: what was moved within the tolerance of what is given, so that it is no fault
-    fitted_m: dict[str, float] = field(default_factory=dict)  #: given radii that are fitted instead, by object, metres
-    least_m: float = SEEN_M  #: by how much less they were as given
+    #: What is given and is fitted instead, such as ``radius_m of sponge``, as the set has it.
+    fitted: dict[str, float] = field(default_factory=dict)
+    least: float = SEEN_M  #: by how much less it is as given
     worth: float = EXPLAINED  #: least share of what is left beyond the noise that it must explain
     of_most: bool = False  #: radii of most objects are doubted, so that an effect may do as well, unless few were wrong
     wider: Fault | None = None  #: the same of more objects, to be tried if something is left
@@ -53,34 +57,33 @@ class Fault(ShortRepr):
     def is_borne_out(self, fit: Fit) -> bool:
         """Whether a fit of the set put right, with the effects that were found, still wants other radii than given."""
         wrong = self._still_wrong(fit)
-        return bool(wrong) if self.of_most else len(wrong) == len(self.fitted_m)
+        return bool(wrong) if self.of_most else len(wrong) == len(self.fitted)
 
     def is_of_few(self, fit: Fit) -> bool:
         """Whether a fit of the set put right puts fewer than half of the objects elsewhere: no effect is of so few."""
         return 2 * len(self._still_wrong(fit)) < len({grasp.object for grasp in fit.problem.grasps})
 
-    def _still_wrong(self, fit: Fit) -> dict[str, float]:
-        """The given radii, by object, that a fit puts elsewhere."""
-        values = _radii(fit)
-        return {name: said for name, said in self.fitted_m.items() if abs(values[name] - said) > self.least_m}
+    def _still_wrong(self, fit: Fit) -> dict[str, tuple[float, float]]:
+        """What a fit puts elsewhere than it was given: as fitted and as given, by name."""
+        named = zip((entry.name for entry in fit.problem.entries), fit.values.tolist(), strict=True)
+        values = {name: (value, self.fitted[name]) for name, value in named if name in self.fitted}
+        return {name: (value, said) for name, (value, said) in values.items() if abs(value - said) > self.least}
 
     def told_by(self, fit: Fit) -> Fault:
         """The same with what a fit of the set put right makes of what is fitted."""
-        values = _radii(fit)
-        told = [
-            f"the radius of {name} is {1e3 * values[name]:.1f} mm, the set says {1e3 * said:.1f} mm"
-            for name, said in self._still_wrong(fit).items()
-        ]
+        told = [_told(name, value, said) for name, (value, said) in self._still_wrong(fit).items()]
         return dataclasses.replace(self, words="; ".join(told)) if told else self
 
     def summary(self) -> str:
         return cut(f"{self.name}: {self.words}", 100)
 
 
-def _radii(fit: Fit) -> dict[str, float]:
-    """The radii that a fit fitted, metres, by object."""
-    named = zip((entry.name for entry in fit.problem.entries), fit.values.tolist(), strict=True)
-    return {name.removeprefix("radius_m of "): value for name, value in named if name.startswith("radius_m of ")}
+def _told(name: str, value: float, said: float) -> str:
+    """What was fitted, and what the set has for it."""
+    what, _, whose = name.partition(" of ")
+    if what == "radius_m":
+        return f"the radius of {whose} is {1e3 * value:.1f} mm, the set says {1e3 * said:.1f} mm"
+    return f"{name} is {value:.3g}, the set says {said:.3g}"
 
 
 def besides(fault: Fault, moved: Fault | None) -> Fault:
@@ -100,13 +103,15 @@ def suspects(loaded: Loaded[MeasurementSet], target: Target, fit: Fit) -> list[F
     """The faults that a set gives reason to look for.
 
     Args:
-      loaded: grasps of a gripper, as the set has them.
+      loaded: grasps of a gripper, or recordings of a servo, as the set has them.
       target: the same, lined up.
       fit: of the base model.
     """
     measured, found = loaded.measured, []
-    if loaded.gripper.is_servo or leaves_nothing(fit, target):
+    if leaves_nothing(fit, target):
         return []
+    if loaded.gripper.is_servo:
+        return _of_recordings(loaded, target, fit)
     if any(grasp.like for grasp in odd_grasps(target, fit)):  # wrong labels may look like any other fault
         return []
     if (factor := clock_factor(measured, loaded.gripper.period_s, 1 + MOST * measured.period_std_share)) is not None:
@@ -154,7 +159,7 @@ def suspects(loaded: Loaded[MeasurementSet], target: Target, fit: Fit) -> list[F
     moved = wanted_moves(measured, target, fit) if all(one.name == "time_scale" for one in found) else None
     most = None if moved is None or moved.is_within else _most_radii(loaded, moved.radii_apart())
     if wrong := doubtful_radii(target, fit, measured.radius_std_m):
-        wider = most if most is not None and set(most.fitted_m) > set(wrong) else None
+        wider = most if most is not None and set(most.fitted) > {f"radius_m of {name}" for name in wrong} else None
         found.append(dataclasses.replace(_wrong_radii(loaded, wrong), wider=wider))
     elif most is not None:
         found.append(most)
@@ -163,13 +168,33 @@ def suspects(loaded: Loaded[MeasurementSet], target: Target, fit: Fit) -> list[F
     return found
 
 
+def _of_recordings(loaded: Loaded[MeasurementSet], target: Target, fit: Fit) -> list[Fault]:
+    """What one recording of a servo, or the clock of all, is seen to have otherwise than the set says."""
+    return [_of_recording(loaded, one) for one in recording_faults(target, fit)]
+
+
+def _of_recording(loaded: Loaded[MeasurementSet], odd: RecordingFault) -> Fault:
+    right = _changed(loaded, lambda _, g: odd.put_right(g))
+    fitted = odd.fitted(loaded.measured.grasps)
+    least = _SAME_SETTING * max(map(abs, fitted.values()), default=0.0)
+    words = odd.words(loaded.measured.columns.unit)
+    return Fault(odd.name, words, odd.check, right, fitted=fitted, least=least)
+
+
 def _wrong_radii(loaded: Loaded[MeasurementSet], wrong: dict[str, float]) -> Fault:
     """Given radii, by object, are to be fitted instead."""
     words = f"fingers met {listed(list(wrong))} elsewhere than the set says"
     right = _changed(loaded, lambda _, g: dataclasses.replace(g, radius_m=None) if g.object in wrong else g)
     check = f"the radius of {listed(list(wrong))}, with a calliper: it may be another object's, or a diameter"
     # what fingers felt is seen in the readings themselves: as much is enough as of an effect
-    return Fault("object_radius", words, check, right, fitted_m=wrong, worth=LEAST_SHARE)
+    return Fault(
+        "object_radius",
+        words,
+        check,
+        right,
+        fitted={f"radius_m of {name}": said for name, said in wrong.items()},
+        worth=LEAST_SHARE,
+    )
 
 
 def _most_radii(loaded: Loaded[MeasurementSet], apart: Sequence[str]) -> Fault | None:
@@ -180,7 +205,7 @@ def _most_radii(loaded: Loaded[MeasurementSet], apart: Sequence[str]) -> Fault |
         return None
     check = "the radii, with a calliper; were they measured by a ruler, meta.yaml may say object_radius_std_m"
     most = dataclasses.replace(_wrong_radii(loaded, said), check=check, of_most=True)
-    return dataclasses.replace(most, least_m=MOST * measured.radius_std_m)
+    return dataclasses.replace(most, least=MOST * measured.radius_std_m)
 
 
 def within_tolerance(

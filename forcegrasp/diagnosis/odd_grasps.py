@@ -66,7 +66,7 @@ def odd_grasps(target: Target, fit: Fit) -> tuple[OddGrasp, ...]:
             break
         rest = np.setdiff1d(np.arange(len(errors)), suspects)
         others = Subset(target, rest, fit)
-        problem, vector = others.problem, others.fit(_coordinates(others.problem, (problem, vector))).vector
+        problem, vector = others.problem, others.fit(coordinates_by_name(others.problem, (problem, vector))).vector
         errors = errors_as(target, np.arange(len(errors)), target.grasps, problem, vector)
         usual = max(1.0, float(np.median(errors[rest])))
     if not suspects.size:
@@ -131,7 +131,7 @@ def _left_out(labels: Sequence[str], count: int, cost: Callable[[int, Sequence[i
     return np.array(chosen, int)
 
 
-def _coordinates(problem: Problem, known: tuple[Problem, np.ndarray]) -> np.ndarray:
+def coordinates_by_name(problem: Problem, known: tuple[Problem, np.ndarray]) -> np.ndarray:
     """A problem's coordinates, as far as another one has them by name."""
     values = {entry.name: x for entry, x in zip(known[0].entries, known[1], strict=True)}
     return np.array([values.get(entry.name, x) for entry, x in zip(problem.entries, problem.start(), strict=True)])
@@ -143,5 +143,5 @@ def errors_as(
     """Errors of these grasps, with labels of their own, under parameters of the others."""
     own = Problem(problem.gripper, grasps, problem.effects)
     few = target.subset(which)
-    case = own.case(_coordinates(own, (problem, vector)))
+    case = own.case(coordinates_by_name(own, (problem, vector)))
     return rms_of_grasps(few.residual(predict(Replay(problem.gripper, grasps), [case])[0]), few)

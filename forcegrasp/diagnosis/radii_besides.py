@@ -46,7 +46,7 @@ def with_radii_put_right(
         return None
     said = found.target, Simulators(found.fit.problem), dataclasses.replace(found.base, fit=found.fit)
     for fault in suspects(loaded, found.target, found.fit):
-        if not fault.fitted_m or (better := put_right(fault, said)) is None:
+        if not fault.fitted or (better := put_right(fault, said)) is None:
             continue
         fault, (target, simulators, base) = better
         numerical = beyond_fit(base.fit, found.numerical)

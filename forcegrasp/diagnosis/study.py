@@ -8,7 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from forcegrasp.diagnosis.verdict import explained_share
-from forcegrasp.identify.cross_validation import heldout_residual, log_likelihood, rms, rms_of_recordings, to_check_with
+from forcegrasp.identify.cross_validation import (
+    heldout_residual,
+    log_likelihood_of_sizes,
+    rms,
+    rms_of_recordings,
+    to_check_with,
+)
 from forcegrasp.identify.fit import Fit
 from forcegrasp.identify.progress import Progress, silent
 from forcegrasp.identify.simulators import Simulators
@@ -70,8 +76,7 @@ class Study:
           before: residuals of held-out grasps under one fit, ``(G, S, C)``.
           after: the same under another.
         """
-        weight = self.target.weight
-        gains = log_likelihood(weight * after) - log_likelihood(weight * before)
+        gains = log_likelihood_of_sizes(after, self.target) - log_likelihood_of_sizes(before, self.target)
         gains[~np.isfinite(before).any(axis=(1, 2))] = np.nan
         return gains
 

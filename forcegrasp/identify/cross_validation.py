@@ -11,6 +11,7 @@ from forcegrasp.identify.fit import Fit
 from forcegrasp.identify.predict import predict
 from forcegrasp.identify.simulators import cheap_tier
 from forcegrasp.identify.target import Target
+from forcegrasp.identify.weights import weights
 from forcegrasp.measure.schema import MeasuredGrasp
 from forcegrasp.replay.replay import Replay
 
@@ -161,6 +162,20 @@ def log_likelihood(residual: np.ndarray) -> np.ndarray:
     size = np.abs(residual)
     loss = np.where(size <= _HEAVY, 0.5 * size**2, _HEAVY * (size - 0.5 * _HEAVY))
     return -np.nansum(loss, axis=(-1, -2))
+
+
+def log_likelihood_of_sizes(residual: np.ndarray, target: Target) -> np.ndarray:
+    """The same of a servo's windows, ``(G,)``, if errors of each recording have a size of their own: :mod:`.weights`.
+
+    By what another model leaves they must not be judged: of much that it misses an effect could take but little off.
+
+    Args:
+      residual: in units of the noise, ``(G, S, C)``; windows of no fold are NaN.
+      target: the measurements.
+    """
+    weight = weights(target, residual)
+    readings = np.sum(target.mask, axis=1) * residual.shape[-1]
+    return log_likelihood(weight * residual) + readings * np.log(weight[:, 0, 0])
 
 
 def rms(residual: np.ndarray, target: Target, where: np.ndarray | None = None) -> float:

@@ -20,7 +20,7 @@ def model_of(fit: Fit, target: Target, loaded: Loaded, numerical: Sequence[np.nd
     objects: dict[str, dict[str, Fitted]] = {}
     grasps: dict[str, dict[str, Fitted]] = {}
     for entry, (value, low, high) in zip(problem.entries, intervals(fit, errors), strict=True):
-        if entry.effect is not None:
+        if entry.effect is not None or entry.parameter not in loaded.gripper.parameters:  # a recording's setting
             continue
         fitted = Fitted(value, low, high, entry.unit)
         scope = loaded.gripper.parameters[entry.parameter].scope

@@ -14,6 +14,9 @@ from forcegrasp.measure.schema import MeasuredGrasp
 from forcegrasp.physics.gripper import FORCE_SKEW, MASS, SKEW, Gripper
 from forcegrasp.short_repr import ShortRepr
 
+# A setting that is not known is at most so many times what other recordings have, or the inverse.
+_BEYOND_OTHERS = 4.0
+
 
 @dataclass(frozen=True, repr=False)
 class Entry(ShortRepr):
@@ -49,7 +52,7 @@ class Problem:
     """Base parameters of a gripper on given grasps, and chosen effects.
 
     Per-object parameters have one entry for each object; a radius or an offset has one only where the set does not
-    give it.
+    give it, and so has a setting of a servo's recording (NaN there).
 
     Args:
       gripper: the model under test.
@@ -61,10 +64,15 @@ class Problem:
         self, gripper: Gripper, grasps: Sequence[MeasuredGrasp], effects: Sequence[EffectSetting] = ()
     ) -> None:
         self.gripper, self.grasps, self.effects = gripper, tuple(grasps), tuple(effects)
+        #: which base parameters a setting of a recording multiplies
+        self._multiplied: dict[str, list[str]] = {}
+        for p in gripper.parameters.values():
+            if p.times:
+                self._multiplied.setdefault(p.times, []).append(p.name)
         self._given = (
             {
                 name: np.array([g.settings[name] for g in grasps])
-                for name in gripper.settings
+                for name in dict.fromkeys((*gripper.settings, *self._multiplied))
                 if all(name in g.settings for g in grasps)
             }
             if gripper.is_servo
@@ -78,11 +86,7 @@ class Problem:
         masses = np.array([np.nan if g.mass_kg is None else g.mass_kg for g in grasps])
         if np.isfinite(masses).any():
             self._given[MASS] = masses
-        #: what a recording's settings multiply a base parameter with, each ``(G,)``
-        self._factors = {
-            p.name: np.array([g.settings[p.times] for g in grasps]) for p in gripper.parameters.values() if p.times
-        }
-        self.entries = [*self._base_entries(), *self._effect_entries()]
+        self.entries = [*self._base_entries(), *self._setting_entries(), *self._effect_entries()]
         self.low = np.array([e.coordinate(e.low) for e in self.entries])
         self.high = np.array([e.coordinate(e.high) for e in self.entries])
 
@@ -112,6 +116,25 @@ class Problem:
                 if members.any():
                     bounds = (parameter.nominal, parameter.low, parameter.high, parameter.unit)
                     entries.append(Entry(name, parameter.name, None, members, *bounds, parameter.logarithmic, scale))
+        return entries
+
+    def _setting_entries(self) -> list[Entry]:
+        """What was set for some of a servo's recordings, and is not known: not far beyond what others have."""
+        entries, sessions = [], np.array([g.session for g in self.grasps])
+        for name, given in self._given.items() if self.gripper.is_servo else ():
+            unknown = np.isnan(given)
+            if name in self.gripper.parameters or unknown.all() or not unknown.any():
+                continue
+            known = given[~unknown]
+            usual, low, high = float(np.median(known)), float(known.min()), float(known.max())
+            if positive := low > 0:
+                low, high, scale = low / _BEYOND_OTHERS, high * _BEYOND_OTHERS, 1.0
+            else:
+                scale = max(high - low, -low, 1e-9)
+                low, high = low - scale, high + scale
+            for one in dict.fromkeys(sessions[unknown]):
+                members = unknown & (sessions == one)
+                entries.append(Entry(f"{name} of {one}", name, None, members, usual, low, high, "", positive, scale))
         return entries
 
     def _effect_entries(self) -> list[Entry]:
@@ -148,8 +171,9 @@ class Problem:
                 base[entry.parameter][entry.members] = value
             else:
                 numbers[entry.effect].append(value)
-        for name, factor in self._factors.items():
-            base[name] = base[name] * factor
+        for setting, parameters in self._multiplied.items():
+            factor = base[setting] if setting in self.gripper.settings else base.pop(setting)
+            base |= {name: base[name] * factor for name in parameters}
         base.setdefault("force_scale", np.ones(len(self.grasps)))
         pairs = zip(self.effects, numbers, strict=True)
         return Case(base, tuple(dataclasses.replace(one, values=np.array(values)) for one, values in pairs))

@@ -107,7 +107,7 @@ class Target(ShortRepr):
         """(measured − predicted) ÷ noise, ``(..., G, S, C)``; 0 where there is no sample."""
         return np.where(self.mask[:, :, None], (self.signals - predicted) / self.sigma, 0.0)
 
-    def change(self, predicted: np.ndarray, before: np.ndarray) -> np.ndarray:
+    def change(self, predicted: np.ndarray, before: np.ndarray | float) -> np.ndarray:
         """What one prediction differs from another by ÷ noise, ``(..., G, S, C)``; 0 where there is no sample."""
         return np.where(self.mask[:, :, None], (predicted - before) / self.sigma, 0.0)
 

@@ -31,9 +31,15 @@ def reweigh(target: Target, fit: Fit, simulators: Simulators) -> tuple[Target, F
 
 
 def weights(target: Target, residual: np.ndarray) -> np.ndarray:
-    """By which each grasp's residuals count, ``(G, 1, 1)``; 1 where there is one recording, or none."""
+    """By which each grasp's residuals count, ``(G, 1, 1)``; 1 where there is one recording, or none.
+
+    Args:
+      target: the measurements.
+      residual: in units of the noise, ``(G, S, C)``; grasps of no fold are NaN.
+    """
     weight, recordings = np.ones(target.weight.shape), target.recordings
     for members in recordings.values() if len(recordings) > 1 else ():
         inside = residual[members][target.mask[members]]
+        inside = inside[np.isfinite(inside)]
         weight[members] = 1 / max(1.0, float(np.sqrt(np.mean(inside**2)))) if inside.size else 1.0
     return weight

@@ -158,8 +158,9 @@ def test_radii_that_a_ruler_gave_are_doubted_where_no_effect_would_do(sound):
     (felt,) = suspects(wrong, target, base.fit)
     fault = felt.wider
     assert fault is not None
-    assert (felt.name, felt.of_most, list(felt.fitted_m)) == ("object_radius", False, ["thing_1"])
-    assert (fault.name, fault.of_most, sorted(fault.fitted_m)) == ("object_radius", True, ["thing_0", "thing_1"])
+    assert (felt.name, felt.of_most, list(felt.fitted)) == ("object_radius", False, ["radius_m of thing_1"])
+    assert (fault.name, fault.of_most, sorted(fault.fitted)) == (
+        "object_radius", True, ["radius_m of thing_0", "radius_m of thing_1"])  # fmt: skip
     assert "object_radius_std_m" in fault.check
     right = {g.object: g.radius_m for g in fault.put_right.measured.grasps}
     assert [right[name] is None for name in off] == [True, True, False]
@@ -173,7 +174,7 @@ def test_radii_that_a_ruler_gave_are_doubted_where_no_effect_would_do(sound):
         ]
         return SimpleNamespace(problem=problem, values=np.array(values))
 
-    said = fault.fitted_m
+    said = {name.removeprefix("radius_m of "): radius for name, radius in fault.fitted.items()}
     one = fitted(said["thing_0"] - 4e-4, said["thing_1"] + 1e-5)
     assert fault.is_borne_out(one)
     assert "thing_0" in fault.told_by(one).words

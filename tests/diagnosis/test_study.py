@@ -14,8 +14,10 @@ from forcegrasp.diagnosis.verdict import explained_share
 from forcegrasp.identify.cross_validation import evidence_folds, make_folds
 
 
-def study(recordings: dict[str, np.ndarray], weight: np.ndarray) -> Study:
-    return Study(SimpleNamespace(recordings=recordings, weight=weight), None, ())  # pyright: ignore[reportArgumentType]
+def study(recordings: dict[str, np.ndarray]) -> Study:
+    """Of five windows with two readings each, weighed by what a model leaves that is of no account here."""
+    target = SimpleNamespace(recordings=recordings, weight=np.full((5, 1, 1), 0.1), mask=np.ones((5, 2), bool))
+    return Study(target, None, ())  # pyright: ignore[reportArgumentType]
 
 
 def residuals(sizes: list[float]) -> np.ndarray:
@@ -24,15 +26,28 @@ def residuals(sizes: list[float]) -> np.ndarray:
 
 
 def test_windows_of_a_recording_are_told_together_where_three_are_held_out():
-    weight = np.array([1.0, 1.0, 0.5, 1.0, 1.0])[:, None, None]
     four = {"a": np.array([0, 1]), "b": np.array([2]), "c": np.array([3]), "not held out": np.array([4])}
     before, after = residuals([3, 2, 4, 1, np.nan]), residuals([1, 2, 2, 1, np.nan])
-    gains = study(four, weight).gains(before, after)
-    np.testing.assert_allclose(gains, [8, 0, 3, 0, np.nan])
-    assert [one.tolist() for one in study(four, weight).of_recordings(gains)] == [[8, 0], [3], [0]]
+    gains = study(four).gains(before, after)
+    of_a, of_b, of_c = study(four).of_recordings(gains)
+    # the log-likelihood of errors of unknown size: readings times the logarithm of how much smaller they are
+    assert of_a.sum() == pytest.approx(4 * np.log(np.sqrt(6.5 / 2.5)))
+    assert of_a[0] > 0 > of_a[1]  # which is as it was, where the other one is better
+    assert [*of_b, *of_c] == pytest.approx([2 * np.log(2), 0])
+    assert np.isnan(gains[4])
     del four["c"]  # two are too few to scatter
-    assert study(four, weight).of_recordings(gains) == []
-    assert study({}, weight).of_recordings(gains) == []
+    assert study(four).of_recordings(gains) == []
+    assert study({}).of_recordings(gains) == []
+    np.testing.assert_allclose(study({}).gains(before, after), [8, 0, 12, 0, np.nan])  # of grasps the noise is known
+
+
+def test_what_was_missed_by_far_may_come_near_at_the_cost_of_what_was_not():
+    """By the sizes of what is left before, the second recording would lose more than the first could ever gain."""
+    gains = study({"fast": np.array([0, 1]), "slow": np.array([2, 3, 4])}).gains(
+        residuals([60, 60, 3, 3, 3]), residuals([2, 2, 6, 6, 6])
+    )
+    assert gains.sum() == pytest.approx(4 * np.log(30) - 6 * np.log(2))
+    assert gains[2:].sum() < 0
 
 
 def marked(splits: dict[str, str], recordings: dict[str, np.ndarray]) -> Study:
