@@ -73,7 +73,7 @@ def test_replay_with_the_true_parameters_is_the_recording(gripper):
 
 
 def shows_on_light(effect: type[Effect], variant: str) -> bool:
-    """On the gripper that is simulated in less time: its pads do not rub along a ball on a rail, nor the ball on ground."""
+    """On the gripper that is simulated in less time; but nothing rubs along its ball, which slides on a rail."""
     if effect.name in ("contact_friction", "table_friction") or why_left_out(effect, light_gripper()):
         return False
     return variant in effect_of(effect.name, light_gripper()).variants
