@@ -72,7 +72,9 @@ def concluded(begun: Begun, study: Study, steps: Sequence[Step], fit: Fit, in_a_
     beyond_floor = explained_share(error_before, error_after, noise=floor)
     leaves_more = error_after > AS_GOOD_AS_NOTHING * floor and beyond_floor < EXPLAINED_FAR
     led_on = bool(found) and check_gradient(fit, target).converged
-    if left and not base.converged and not led_on and (not found or leaves_more):
+    # nor is it the fit that is to blame for what no effect explains where no step leads further
+    came_to_an_end = base.converged or led_on or (base.settled and not found)
+    if left and not came_to_an_end and (not found or leaves_more):
         return Diagnosis(
             Verdict.NOT_FITTED, (), (), base, base.fit, target, begun.folds, error_before, error_before, odd=begun.odd
         )

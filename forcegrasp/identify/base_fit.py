@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -32,6 +33,8 @@ _NOISE_ALONE = 1.1
 _SAME_BEYOND = 0.2
 # A fit had stopped short if on few grasps it goes on by this share of what it leaves beyond the noise.
 _WENT_ON = 0.5
+# So many patient fits, each from where the one before ended.
+_SETTLING = 3
 # Largest slope at an optimum, in standard errors of the parameter; those of a noisy simulator never vanish.
 _MAX_GRADIENT = 5.0
 
@@ -45,6 +48,7 @@ class BaseFit(ShortRepr):
     converged: bool
     reason: str = ""  #: why it is not, in words
     starts_agree: bool = True  #: whether two starts at least ended in the best place
+    settled: bool = False  #: whether no step lowers the error, however short, though slopes say so: contacts are rough
 
 
 def fit_base(
@@ -100,10 +104,27 @@ def fit_base(
     # nor may slopes over small steps, where a finger sticks and slips
     simulators.step = LARGE_STEP
     smooth = check_gradient(fit_exactly(target, problem, simulators, further.fit.vector), target, errors)
-    if smooth.converged or further.fit.cost - smooth.fit.cost > cost_tolerance(smooth.fit, target):
+    if smooth.converged:
         return smooth
+    if further.fit.cost - smooth.fit.cost > cost_tolerance(smooth.fit, target):
+        return _settle(smooth, target, simulators)
     simulators.step = STEP
-    return further
+    return _settle(further, target, simulators)
+
+
+def _settle(base: BaseFit, target: Target, simulators: Simulators) -> BaseFit:
+    """A fit that goes on by ever shorter steps, and whether it ends so."""
+    for _ in range(_SETTLING):
+        before = base.fit
+        fit = fit_exactly(target, before.problem, simulators, before.vector, patient=True)
+        base = check_gradient(fit, target, base.errors)
+        if base.converged:
+            break
+        if before.cost - fit.cost <= cost_tolerance(fit, target):
+            slopes = f"slopes of {fit.gradient:.1f} standard errors"
+            reason = f"no step lowers the error where the fit ended, though {slopes} say so"
+            return dataclasses.replace(base, reason=reason, settled=True)
+    return base
 
 
 def cost_tolerance(best: Fit | End, target: Target) -> float:

@@ -22,6 +22,8 @@ _TOLERANCE, _ROUGH, _EVALUATIONS = 1e-4, 1e-3, 15
 # A step that makes the cost rise by this share of what one reading costs ends a fit, or one as small as this, in
 # coordinates, or so many one after the other: that contacts are rough is all they say.
 _FLAT, _SMALLEST_STEP, _FAILED = 0.1, STEP / 20, 2
+# With patience it goes on by so many steps, each a quarter as long, and so many evaluations.
+_PATIENCE, _AT_MOST = 8, 40
 # Where a fit ended it goes on if slopes measured there promise to lower the cost by this share of one reading's; but
 # not so many times the noise off, where the model is wrong by more than that.
 _WORTH, _NEAR = 0.5, 2.0
@@ -169,8 +171,9 @@ def descend_roughly(
 
 
 def fit_exactly(
-    target: Target, problem: Problem, simulators: Simulators, start: np.ndarray, slopes: np.ndarray | None = None
-) -> Fit:
+    target: Target, problem: Problem, simulators: Simulators, start: np.ndarray, slopes: np.ndarray | None = None,
+    patient: bool = False,
+) -> Fit:  # fmt: skip
     """Fits the model itself, near an optimum, with slopes from the cheap one where the gripper has a fast tier.
 
     For effects with memory, such as play: where the two models differ, no correction makes up for it.
@@ -179,28 +182,31 @@ def fit_exactly(
       target, problem, simulators, start: as for :func:`fit_once`.
       slopes: of the first k coordinates, as they were found near the start, ``(G, S, C, k)``, which spares finding them
         there.
+      patient: goes on with ever shorter steps where slopes promise a gain that no step holds: contacts make them rough.
     """
     local = LocalSlopes(target, problem, simulators.exact, simulators.at_the_end, None, simulators.step)
     free = np.ones(len(problem), bool)
     start = np.clip(start, problem.low + 1e-9, problem.high - 1e-9)
     if slopes is not None:
         local.begin(start, slopes)
-    vector, total = _descend(local, start, 0.0, free, rough=False)
+    vector, total = _descend(local, start, 0.0, free, rough=False, patient=patient)
     exact = local.value(vector)
     cheap = exact if simulators.one_model else predict(simulators.cheap, [problem.case(vector)])[0]
     return _finish(local, vector, exact, exact - cheap, free, total)
 
 
 def _descend(
-    local: LocalSlopes, start: np.ndarray, shift: np.ndarray | float, free: np.ndarray, rough: bool
-) -> tuple[np.ndarray, int]:
+    local: LocalSlopes, start: np.ndarray, shift: np.ndarray | float, free: np.ndarray, rough: bool,
+    patient: bool = False,
+) -> tuple[np.ndarray, int]:  # fmt: skip
     """Goes to the next optimum in the free coordinates; also returns the number of evaluations.
 
     Slopes that only followed the values may lead nowhere; those measured where they end tell, and lead on.
     """
-    vector, count = _descend_once(local, start, shift, free, rough, _EVALUATIONS)
-    while not rough and count < _EVALUATIONS and _may_fall(local, vector, shift, free):
-        vector, more = _descend_once(local, vector, shift, free, rough, _EVALUATIONS - count)
+    most, failed = (_AT_MOST, _PATIENCE) if patient else (_EVALUATIONS, _FAILED)
+    vector, count = _descend_once(local, start, shift, free, rough, most, failed)
+    while not rough and count < most and _may_fall(local, vector, shift, free):
+        vector, more = _descend_once(local, vector, shift, free, rough, most - count, failed)
         count += more
     return vector, count
 
@@ -229,8 +235,9 @@ def _slopes(local: LocalSlopes, vector: np.ndarray, anew: bool = False) -> np.nd
 
 
 def _descend_once(
-    local: LocalSlopes, start: np.ndarray, shift: np.ndarray | float, free: np.ndarray, rough: bool, evaluations: int
-) -> tuple[np.ndarray, int]:
+    local: LocalSlopes, start: np.ndarray, shift: np.ndarray | float, free: np.ndarray, rough: bool, evaluations: int,
+    most_failed: int,
+) -> tuple[np.ndarray, int]:  # fmt: skip
     def whole(part: np.ndarray) -> np.ndarray:
         vector = start.copy()
         vector[free] = part
@@ -250,7 +257,8 @@ def _descend_once(
             return -residual
         failed += 1
         small = cost < (1 + flat) * best[1] or np.abs(vector - best[0]).max() < _SMALLEST_STEP
-        if small or (failed == _FAILED and not rough):  # a rough one may be far off, where steps are long
+        impatient = small and most_failed == _FAILED
+        if impatient or (failed == most_failed and not rough):  # a rough one may be far off, where steps are long
             raise _SettledError
         return -residual
 

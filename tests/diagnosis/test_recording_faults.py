@@ -147,3 +147,20 @@ def test_a_setting_is_fitted_and_told_in_the_answer(recorded):
     assert found.fault is not None
     assert found.fault.words == "payload_kg of release is 0.5, the set says 0.45"
     assert found.fault.check == "what payload_kg was in release, and recordings.csv"
+
+
+@pytest.mark.parametrize(
+    ("known", "bounds", "logarithmic"), [((0.3, 0.6, 0.9), (0.075, 3.6), True), ((-0.2, 0.0, 0.1), (-0.5, 0.4), False)]
+)
+def test_a_setting_that_is_not_known_is_not_far_beyond_what_others_have(recorded, known, bounds, logarithmic):
+    grasps = tuple(
+        dataclasses.replace(one, settings={"payload_kg": value})
+        for one, value in zip(recorded.measured.grasps, (*known, np.nan), strict=True)
+    )
+    problem = Problem(recorded.gripper, grasps)
+    (entry,) = (one for one in problem.entries if one.parameter == "payload_kg")
+    assert (entry.name, entry.start, entry.logarithmic) == ("payload_kg of release", known[1], logarithmic)
+    assert (entry.low, entry.high) == pytest.approx(bounds)
+    assert entry.value(entry.coordinate(0.2)) == pytest.approx(0.2)
+    given = problem.case(problem.start()).base["payload_kg"]
+    assert given == pytest.approx([*known, known[1]])

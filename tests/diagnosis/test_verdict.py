@@ -383,7 +383,7 @@ def test_only_what_may_be_negative_is_promised_with_that_sign():
 def found_by(made_up, monkeypatch):
     """Runs the search with steps that are given."""
 
-    def run(*steps: Step, converged: bool = True, forms: bool = False) -> Diagnosis:
+    def run(*steps: Step, converged: bool = True, settled: bool = False, forms: bool = False) -> Diagnosis:
         following = iter((*steps, Step((), (), (), 1.0, 1.0)))
         base = made_up.base.fit
         monkeypatch.setattr(search, "look_further", lambda *a, **k: next(following))
@@ -398,7 +398,7 @@ def found_by(made_up, monkeypatch):
         effects = [get_effect(name) for name in ("force_bias", "force_drift", "backlash", "stiction")]
         nothing = cast(Any, SimpleNamespace())
         assert base.problem.effects == ()
-        gate = dataclasses.replace(made_up.base, converged=converged)
+        gate = dataclasses.replace(made_up.base, converged=converged, settled=settled)
         return search.diagnose(made_up.target, gate, nothing, effects, np.random.default_rng(0))
 
     return run
@@ -463,6 +463,13 @@ def test_a_base_fit_that_stopped_short_and_leaves_nothing_is_good_enough(found_b
     monkeypatch.setattr(conclusion, "left_by_many", lambda *_: (left, None, ""))
     monkeypatch.setattr(search, "is_worth_looking", lambda *_: False)
     assert found_by(converged=False).verdict == verdict
+
+
+@pytest.mark.parametrize(("settled", "verdict"), [(True, "unknown"), (False, "not_fitted")])
+def test_where_no_step_leads_further_it_is_not_the_fit_that_is_to_blame(found_by, monkeypatch, settled, verdict):
+    monkeypatch.setattr(conclusion, "left_by_many", lambda *_: ("1.3 × noise", None, ""))
+    monkeypatch.setattr(search, "is_worth_looking", lambda *_: False)
+    assert found_by(converged=False, settled=settled).verdict == verdict
 
 
 @pytest.mark.parametrize(("verdict", "told"), [("effect", True), ("unknown", False)])

@@ -1,4 +1,4 @@
-"""Where no fit converges, slopes over larger steps are tried, and kept if they lead further."""
+"""Where no fit converges, larger steps for slopes are tried, and kept if they lead further; then shorter ways."""
 
 from __future__ import annotations
 
@@ -15,19 +15,25 @@ from forcegrasp.identify.simulators import LARGE_STEP, STEP
 
 
 @pytest.mark.parametrize(("left", "kept"), [(0.7, LARGE_STEP), (1.0, STEP)])
-def test_larger_steps_are_kept_where_they_lead_further(made_up, monkeypatch, left, kept):
-    fit = made_up.base.fit
-    steps = []
+@pytest.mark.parametrize(("patience", "settled", "rounds"), [(1.0, True, 1), (0.9, False, 3)])
+def test_larger_steps_are_kept_where_they_lead_further(made_up, monkeypatch, left, kept, patience, settled, rounds):
+    """``left`` of the residuals by larger steps, ``patience`` by each patient fit from where that ended."""
+    begun = made_up.base.fit
+    steps, last = [], begun
 
-    def fit_exactly(target, problem, simulators, start):
-        steps.append(simulators.step)
-        share = left if simulators.step == LARGE_STEP else 1.0
-        return dataclasses.replace(fit, residual=share * fit.residual)
+    def fit_exactly(target, problem, simulators, start, patient=False):
+        nonlocal last
+        steps.append((simulators.step, patient))
+        share = patience if patient else left if simulators.step == LARGE_STEP else 1.0
+        before = last if patient else begun
+        found = dataclasses.replace(before, residual=share * before.residual)
+        last = found if found.cost < last.cost else last
+        return found
 
-    end = SimpleNamespace(vector=fit.vector, cost=fit.cost, error=1.0)
-    small = SimpleNamespace(known=None, cost=fit.cost, fit=lambda start: end, problem=None, target=made_up.target)
+    end = SimpleNamespace(vector=begun.vector, cost=begun.cost, error=1.0)
+    small = SimpleNamespace(known=None, cost=begun.cost, fit=lambda start: end, problem=None, target=made_up.target)
     for name, value in {
-        "fit_once": lambda *a: fit,
+        "fit_once": lambda *a: begun,
         "fit_exactly": fit_exactly,
         "guess": lambda *a: None,
         "Subset": lambda *a: small,
@@ -36,7 +42,9 @@ def test_larger_steps_are_kept_where_they_lead_further(made_up, monkeypatch, lef
     }.items():
         monkeypatch.setattr(base_fit, name, value)
     simulators = SimpleNamespace(step=STEP, one_model=True)
-    base = fit_base(made_up.target, fit.problem, cast(Any, simulators), np.random.default_rng(0))
-    assert steps == [STEP, LARGE_STEP]
+    base = fit_base(made_up.target, begun.problem, cast(Any, simulators), np.random.default_rng(0))
+    assert steps == [(STEP, False), (LARGE_STEP, False), *rounds * [(kept, True)]]
     assert simulators.step == kept
-    assert base.fit.cost == pytest.approx(min(left, 1.0) ** 2 * fit.cost)
+    assert base.fit.cost == pytest.approx((min(left, 1.0) * patience**rounds) ** 2 * begun.cost)
+    assert (base.settled, base.converged) == (settled, False)
+    assert base.reason.startswith("no step lowers the error" if settled else "rough")
