@@ -12,6 +12,7 @@ import numpy as np
 from forcegrasp.diagnosis.cut_short import REASONS, cut_short
 from forcegrasp.diagnosis.doubt import leaves_less, more_likely, with_fault
 from forcegrasp.diagnosis.faults import Fault, besides, leaves_nothing, suspects
+from forcegrasp.diagnosis.givens_besides import Fitted, with_givens_put_right
 from forcegrasp.diagnosis.late_rows import may_be_late_rows
 from forcegrasp.diagnosis.law import find_law
 from forcegrasp.diagnosis.left_out import LeaveOutFirst, is_answer, told_of, without
@@ -21,7 +22,6 @@ from forcegrasp.diagnosis.moved_set import (
     timing_within_tolerance_after_all,
     within_tolerance_after_all,
 )
-from forcegrasp.diagnosis.radii_besides import Fitted, with_radii_put_right
 from forcegrasp.diagnosis.result import Diagnosis, Step
 from forcegrasp.diagnosis.search import MayBeGiven, diagnose
 from forcegrasp.diagnosis.verdict import EXPLAINED_FAR, explained_share
@@ -177,14 +177,14 @@ class _Ways:
         return told_of(found, names, target), simulators
 
     def put_right_besides(self, found: Diagnosis, loaded: Loaded[MeasurementSet]) -> Found | None:
-        """See :func:`.with_radii_put_right`."""
+        """See :func:`.with_givens_put_right`."""
 
         def put_right(fault: Fault, said: Fitted) -> tuple[Fault, Fitted] | None:
             model = model_of(found.fit, found.target, loaded, ())
             return dataclasses.replace(self, model=model).put_right(fault, said)
 
         try:
-            return with_radii_put_right(found, loaded, put_right, self._search_on, self.progress)
+            return with_givens_put_right(found, loaded, put_right, self._search_on, self.progress)
         except REASONS as reason:
             return dataclasses.replace(found, stopped=cut_short(reason, self.progress)), Simulators(found.fit.problem)
 

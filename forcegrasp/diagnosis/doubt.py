@@ -16,7 +16,7 @@ from forcegrasp.identify.cross_validation import (
     log_likelihood_of_sizes,
     make_folds,
     rms,
-)  # fmt: skip
+)
 from forcegrasp.identify.fit import Fit
 from forcegrasp.identify.target import Target
 from forcegrasp.identify.verdict import Verdict

@@ -55,7 +55,7 @@ class Fault(ShortRepr):
     instead_of: str = ""  #: the one effect that it stands for where it is a rival; otherwise it stands for all
 
     def is_borne_out(self, fit: Fit) -> bool:
-        """Whether a fit of the set put right, with the effects that were found, still wants other radii than given."""
+        """Whether a fit of the set put right, with the effects that were found, still puts elsewhere what was given."""
         wrong = self._still_wrong(fit)
         return bool(wrong) if self.of_most else len(wrong) == len(self.fitted)
 
@@ -173,12 +173,11 @@ def _of_recordings(loaded: Loaded[MeasurementSet], target: Target, fit: Fit) -> 
     return [_of_recording(loaded, one) for one in recording_faults(target, fit)]
 
 
-def _of_recording(loaded: Loaded[MeasurementSet], odd: RecordingFault) -> Fault:
-    right = _changed(loaded, lambda _, g: odd.put_right(g))
-    fitted = odd.fitted(loaded.measured.grasps)
+def _of_recording(loaded: Loaded[MeasurementSet], wrong: RecordingFault) -> Fault:
+    right = _changed(loaded, lambda _, g: wrong.put_right(g))
+    fitted = wrong.fitted(loaded.measured.grasps)
     least = _SAME_SETTING * max(map(abs, fitted.values()), default=0.0)
-    words = odd.words(loaded.measured.columns.unit)
-    return Fault(odd.name, words, odd.check, right, fitted=fitted, least=least)
+    return Fault(wrong.name, wrong.words(loaded.measured.columns.unit), wrong.check, right, fitted=fitted, least=least)
 
 
 def _wrong_radii(loaded: Loaded[MeasurementSet], wrong: dict[str, float]) -> Fault:
@@ -186,15 +185,9 @@ def _wrong_radii(loaded: Loaded[MeasurementSet], wrong: dict[str, float]) -> Fau
     words = f"fingers met {listed(list(wrong))} elsewhere than the set says"
     right = _changed(loaded, lambda _, g: dataclasses.replace(g, radius_m=None) if g.object in wrong else g)
     check = f"the radius of {listed(list(wrong))}, with a calliper: it may be another object's, or a diameter"
+    fitted = {f"radius_m of {name}": said for name, said in wrong.items()}
     # what fingers felt is seen in the readings themselves: as much is enough as of an effect
-    return Fault(
-        "object_radius",
-        words,
-        check,
-        right,
-        fitted={f"radius_m of {name}": said for name, said in wrong.items()},
-        worth=LEAST_SHARE,
-    )
+    return Fault("object_radius", words, check, right, fitted=fitted, worth=LEAST_SHARE)
 
 
 def _most_radii(loaded: Loaded[MeasurementSet], apart: Sequence[str]) -> Fault | None:

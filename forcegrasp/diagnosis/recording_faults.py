@@ -39,7 +39,7 @@ _NEAR_CLOCK = 0.02
 _EXACT_CLOCK = MOST * PERIOD_STD_SHARE
 # Changes that are tried, the likeliest first; the recording was the odd one if it is missed by less than so many times
 # what the others are then.
-_TRIED, _LIKE_OTHERS = 3, 1.5
+_TRIED, _LIKE_OTHERS = 3, 3.0
 
 
 @dataclass(frozen=True)
@@ -128,7 +128,7 @@ def _odd_one(target: Target, fit: Fit, search: _Search) -> RecordingFault | None
         if error / max(1.0, end.error) < least:
             least = error / max(1.0, end.error)
             value = change * part.gripper.motors[0].stroke if what == ZERO else _meant(1 + change, what, part)
-            best = RecordingFault(name, what, value if what in (EFFORT, CLOCK, ZERO) else np.nan)
+            best = RecordingFault(name, what, value if what in (EFFORT, ZERO) else np.nan)
     return best
 
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+import re
+from importlib import import_module
 from pathlib import Path
 
 import mujoco
@@ -55,12 +57,13 @@ def commands(name: str) -> np.ndarray:
     }[name]
 
 
-def record(folder: Path, limit: float = np.inf) -> Loaded[MeasurementSet]:
+def record(folder: Path, limit: float = np.inf, friction: float = 0.0) -> Loaded[MeasurementSet]:
     """An arm that swings a payload, its motor switched off for a while in the last recording, by MuJoCo alone.
 
     Args:
       folder: where its description is written.
       limit: of the motor's torque, N·m.
+      friction: of the joint, dry, N·m.
     """
     (folder / "arm.xml").write_text(SCENE)
     (folder / "arm.yaml").write_text(DESCRIPTION)
@@ -68,7 +71,7 @@ def record(folder: Path, limit: float = np.inf) -> Loaded[MeasurementSet]:
     columns, time = Columns(("qdes_rad",), ("q_rad",), ("tau_nm",)), PERIOD_S * np.arange(SAMPLES)
     for name, payload in PAYLOADS.items():
         model = mujoco.MjModel.from_xml_string(SCENE)
-        model.body_mass[1] = payload
+        model.body_mass[1], model.dof_frictionloss[0] = payload, friction
         model.actuator_forcelimited[0], model.actuator_forcerange[0] = np.isfinite(limit), (-limit, limit)
         data, command, read = mujoco.MjData(model), commands(name), []
         enabled = np.where((time > 0.8) & (time < 1.3) & (name == "release"), 0.0, 1.0)
@@ -147,6 +150,18 @@ def test_a_setting_is_fitted_and_told_in_the_answer(recorded):
     assert found.fault is not None
     assert found.fault.words == "payload_kg of release is 0.5, the set says 0.45"
     assert found.fault.check == "what payload_kg was in release, and recordings.csv"
+
+
+def test_it_is_told_beside_an_effect_that_had_hidden_it(tmp_path, monkeypatch):
+    """As if the base model had given no reason to look for it."""
+    monkeypatch.setattr(import_module("forcegrasp.diagnosis.diagnose_set"), "suspects", lambda *_: [])
+    loaded = changed(record(tmp_path, friction=0.15), "release", settings=lambda s: {"payload_kg": 0.35})
+    found, _ = diagnose_set(loaded, None, ["coulomb_friction"], 0, silent)
+    assert (found.verdict, found.effects) == (Verdict.EFFECT, ("odd_recording", "coulomb_friction"))
+    assert found.fault is not None
+    told = re.fullmatch(r"payload_kg of release is (.*), the set says 0.35", found.fault.words)
+    assert told is not None
+    assert float(told[1]) == pytest.approx(0.5, abs=0.01)
 
 
 @pytest.mark.parametrize(

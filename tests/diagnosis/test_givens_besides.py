@@ -6,7 +6,7 @@ import dataclasses
 
 import pytest
 
-from forcegrasp.diagnosis import radii_besides
+from forcegrasp.diagnosis import givens_besides
 from forcegrasp.diagnosis.diagnose_set import diagnose_set
 from forcegrasp.diagnosis.result import Diagnosis
 from forcegrasp.identify.loading import Loaded
@@ -47,7 +47,7 @@ def test_radii_are_put_right_beside_the_effect_that_had_hidden_them(diagnosis):
 
 def test_radii_are_not_doubted_where_little_is_left_or_what_was_found_is_tied(diagnosis, monkeypatch):
     asked = []
-    monkeypatch.setattr(radii_besides, "suspects", lambda *_: asked.append(1) or [])
+    monkeypatch.setattr(givens_besides, "suspects", lambda *_: asked.append(1) or [])
     step = diagnosis.steps[0]
     found = dataclasses.replace(diagnosis, fault=None, left="much", error_after=2.0, steps=(step,))
     tied = dataclasses.replace(step, effects=(*step.effects, "rate_limit"))
@@ -60,5 +60,5 @@ def test_radii_are_not_doubted_where_little_is_left_or_what_was_found_is_tied(di
         (dataclasses.replace(found, stopped="time"), False),
     ):
         asked.clear()
-        assert radii_besides.with_radii_put_right(other, limited(), None, None, silent) is None  # pyright: ignore
+        assert givens_besides.with_givens_put_right(other, limited(), None, None, silent) is None  # pyright: ignore
         assert bool(asked) == doubted

@@ -1,4 +1,4 @@
-"""Puts radii right that are seen to be wrong only once the effects are known that had hidden it."""
+"""Puts right what a set gives and is seen to be wrong only once the effects are known that had hidden it."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ Fitted = tuple[Target, Simulators, BaseFit]
 PutRight = Callable[[Fault, Fitted], tuple[Fault, Fitted] | None]
 
 
-def with_radii_put_right(
+def with_givens_put_right(
     found: Diagnosis, loaded: Loaded[MeasurementSet], put_right: PutRight, search_on: SearchOn, progress: Progress
 ) -> tuple[Diagnosis, Simulators] | None:
-    """The diagnosis with radii put right beside the effects that were found; None if they leave little, or are tied.
+    """The diagnosis with radii, or a recording's setting, put right beside effects; None if little is left, or a tie.
 
     Args:
       found: of the set as it is.
@@ -42,7 +42,7 @@ def with_radii_put_right(
     steps = kept_steps(found.steps)
     plain = bool(steps) and all(len(step.effects) == 1 and step.candidates for step in steps)
     little = not found.left or found.error_after < MUCH * found.floor
-    if loaded.gripper.is_servo or not plain or little or found.fault is not None or found.stopped:
+    if not plain or little or found.fault is not None or found.stopped:
         return None
     said = found.target, Simulators(found.fit.problem), dataclasses.replace(found.base, fit=found.fit)
     for fault in suspects(loaded, found.target, found.fit):
