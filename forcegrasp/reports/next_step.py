@@ -49,9 +49,11 @@ def after_diagnosis(
                         else "look for grasps that went wrong", _line("compare", f"data={data}"))]  # fmt: skip
     if d.verdict is Verdict.DATA:
         return [Command("put the set right, and diagnose again", again)]
+    is_wrong = d.fault is not None and d.fault.moved is None and not d.fault_is_rival
+    right = [Command("put the set right first, and diagnose again", again)] if is_wrong else []
     if d.verdict is Verdict.UNKNOWN:
         look = Command("look at where the model fails", compared)
-        return [look, *([] if d.law_sought else [_for_a_law(data)])]
+        return [*right, look, *([] if d.law_sought else [_for_a_law(data)])]
     if d.verdict is Verdict.EXPLAINED:
         noise = [Command("give the noise as it is, and diagnose again", again)] if d.noise is not None else []
         return [*noise, _use("the model", known, data, gripper)]
@@ -79,8 +81,8 @@ def after_diagnosis(
             Command(f"see what {more.effect.name} does besides",
                     _line("add", f"data={data}", f"model={found}", f"effect={more.effect.name}", "out=better.yaml"))
         ]  # fmt: skip
-        return [look, *tried, *([] if d.law_sought else [_for_a_law(data)]), added]
-    return [_use(with_all, found, data, gripper), added]
+        return [*right, look, *tried, *([] if d.law_sought else [_for_a_law(data)]), added]
+    return [*right, _use(with_all, found, data, gripper), added]
 
 
 def _for_a_law(data: str | Path) -> Command:

@@ -11,6 +11,7 @@ import yaml
 from forcegrasp.diagnosis.faults import Fault
 from forcegrasp.diagnosis.odd_grasps import OddGrasp
 from forcegrasp.diagnosis.result import Diagnosis
+from forcegrasp.diagnosis.tolerance import Moved
 from forcegrasp.effects import get_effect
 from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.identify.fitted_model import model_of
@@ -227,6 +228,16 @@ def test_a_set_that_was_put_right_is_judged_by_what_that_leaves(made_up):
         ).rows
     )
     assert told["How sure"].startswith("Judged on grasps held out of the fit: with the set put right 20% of the error")
+
+
+@pytest.mark.parametrize("verdict", ["effect", "unknown"])
+def test_what_a_set_says_wrongly_is_put_right_before_a_model_is_looked_at(made_up, verdict):
+    found = made_up.diagnosis(verdict)
+    fault = Fault("late_side", "one is late", "the rows", found.fit)
+    purposes = [one.purpose for one in box(dataclasses.replace(found, fault=fault)).commands]
+    assert purposes == ["put the set right first, and diagnose again", *(one.purpose for one in box(found).commands)]
+    moved = dataclasses.replace(found, fault=dataclasses.replace(fault, moved=Moved((), np.array([]))))
+    assert "put the set right" not in after_diagnosis(moved, None, "s", "b.yaml", "m.yaml")[0].purpose
 
 
 def test_a_comparison_says_where_and_what_to_do(made_up):
