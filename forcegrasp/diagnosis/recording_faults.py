@@ -24,8 +24,8 @@ from forcegrasp.measure.schema import PERIOD_STD_SHARE, MeasuredGrasp
 from forcegrasp.replay.replay import Replay
 
 #: What may be otherwise besides settings: efforts by a factor, positions and commands by where they are zero; and time
-#: stamps of all recordings by a factor.
-EFFORT, CLOCK, ZERO = "effort", "clock", "zero"
+#: stamps of all recordings by a factor. No setting has a name of several words.
+EFFORT, CLOCK, ZERO = "scale of efforts", "rate of the clock", "place of zero"
 # With fewer recordings nobody tells which one is odd.
 _LEAST_RECORDINGS = 3
 # Changes are shares of what was said, of the motor's range for where zero is. A slope is taken over the first; the
@@ -145,13 +145,14 @@ class _Search:
 
     def __init__(self, target: Target, fit: Fit) -> None:
         self._target, self._fit, self._background = target, fit, Background(fit, ())
+        self._as_said = _predicted(target, (fit.problem, fit.vector), EFFORT, 0.0)
         self._slopes: dict[str, np.ndarray] = {}
         self._before = rms(self._left(fit.residual), target)
 
     def step(self, what: str, members: np.ndarray) -> _Step:
         """What a change of these windows would do."""
         if what not in self._slopes:
-            self._slopes[what] = _slope(self._target, self._fit, what)
+            self._slopes[what] = self._slope(what)
         column = np.zeros((*self._slopes[what].shape, 1))
         column[members, ..., 0] = self._slopes[what][members]
         if not column.any():
@@ -159,6 +160,11 @@ class _Search:
         size, _ = linear_step(self._target, self._fit, self._background, column)
         left = self._left(self._fit.residual - self._target.change(column[..., 0] * size, 0.0))
         return _Step(float(size[0]), explained_share(self._before, rms(left, self._target)))
+
+    def _slope(self, what: str) -> np.ndarray:
+        """What a change of each recording adds to its signals, ``(G, S, C)``."""
+        changed = _predicted(self._target, (self._fit.problem, self._fit.vector), what, _STEP)
+        return (changed - self._as_said) / _STEP
 
     def _left(self, residual: np.ndarray) -> np.ndarray:
         """What of residuals no parameter follows, ``(G, S, C)``."""
@@ -201,12 +207,6 @@ def _best_change(part: Target, known: tuple[Problem, np.ndarray], what: str) -> 
     if what == EFFORT:  # noise was scaled as well
         residual[..., part.axis.forces] /= 1 + change
     return change, rms(residual, part)
-
-
-def _slope(target: Target, fit: Fit, what: str) -> np.ndarray:
-    """What a change of each recording adds to its signals, ``(G, S, C)``."""
-    known = fit.problem, fit.vector
-    return (_predicted(target, known, what, _STEP) - _predicted(target, known, what, 0.0)) / _STEP
 
 
 def _predicted(target: Target, known: tuple[Problem, np.ndarray], what: str, change: float) -> np.ndarray:

@@ -11,6 +11,7 @@ import numpy as np
 from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.identify.predict import Case
 from forcegrasp.measure.schema import MeasuredGrasp
+from forcegrasp.measure.servo_set import settings_of
 from forcegrasp.physics.gripper import FORCE_SKEW, MASS, SKEW, Gripper
 from forcegrasp.short_repr import ShortRepr
 
@@ -72,7 +73,7 @@ class Problem:
         self._given = (
             {
                 name: np.array([g.settings[name] for g in grasps])
-                for name in dict.fromkeys((*gripper.settings, *self._multiplied))
+                for name in settings_of(gripper)
                 if all(name in g.settings for g in grasps)
             }
             if gripper.is_servo
