@@ -76,8 +76,9 @@ def concluded(begun: Begun, study: Study, steps: Sequence[Step], fit: Fit, in_a_
     came_to_an_end = base.converged or led_on or (base.settled and not found)
     if left and not came_to_an_end and (not found or leaves_more):
         return Diagnosis(
-            Verdict.NOT_FITTED, (), (), base, base.fit, target, begun.folds, error_before, error_before, odd=begun.odd
-        )
+            Verdict.NOT_FITTED, (), (), base, base.fit, target, begun.folds, error_before, error_before,
+            begun.numerical, odd=begun.odd,
+        )  # fmt: skip
     verdict = conclude(
         [s.verdict for s in found if s.verdict],
         share,

@@ -26,6 +26,7 @@ from forcegrasp.identify.intervals import listed
 from forcegrasp.identify.loading import Loaded
 from forcegrasp.identify.target import Target
 from forcegrasp.measure.check_givens import Tare, clock_factor, find_tare, times
+from forcegrasp.measure.force_units import find_odd_unit
 from forcegrasp.measure.schema import MeasuredGrasp, MeasurementSet
 from forcegrasp.short_repr import ShortRepr, cut
 
@@ -137,6 +138,10 @@ def suspects(loaded: Loaded[MeasurementSet], target: Target, fit: Fit) -> list[F
         right = _changed(loaded, lambda index, g: drift.taken_out(g, order[index]))
         words = drift.words(measured.columns.force)
         found.append(Fault(f"force_{drift.of}_drift", words, check, right, worth=LEAST_SHARE))
+    if (unit := find_odd_unit(measured)) is not None:
+        words = f"{measured.columns.force[unit.channel]} {unit.words(measured.grasps)}"
+        right = _changed(loaded, lambda index, g: unit.put_right(g) if index in unit.grasps else g)
+        found.append(Fault("force_unit", words, "the unit of that column in the logs of these grasps", right))
     early = _early_readings(target, fit)
     if early:
         late = ", or commands stand one row late" if len(early) > 1 else ""

@@ -1,7 +1,8 @@
 """Whether what effects leave may be that the gripper's act in another form.
 
 Friction is no formula, nor is play, or a finger that bends: an effect that is there differs from the catalogue's by
-some share of what it does. What another one would explain within that share can't be told from it.
+some share of what it does. What another one would explain within that share can't be told from it, unless that one
+explains all of it.
 """
 
 from __future__ import annotations

@@ -21,6 +21,7 @@ from forcegrasp.diagnosis.needless import chained, drop_needless, simplify
 from forcegrasp.diagnosis.odd_grasps import odd_grasps
 from forcegrasp.diagnosis.result import Diagnosis, Step, kept_steps
 from forcegrasp.diagnosis.screen import Screen
+from forcegrasp.diagnosis.several import share_of_one
 from forcegrasp.diagnosis.so_far import SoFar
 from forcegrasp.diagnosis.split import split
 from forcegrasp.diagnosis.stalled_base import better_without
@@ -41,6 +42,9 @@ from forcegrasp.identify.weights import reweigh
 
 #: Whether what a set gives, moved within its tolerance, may explain what a fit leaves.
 MayBeGiven = Callable[[Target, Fit], bool]
+# What is left within the forms of what was found may be another effect's if that explains so much of it. It is found
+# if it leaves nothing, and otherwise told as one that may be there besides.
+_OF_ANOTHER = 0.5
 #: Largest number of effects that are looked for one by one.
 MOST_EFFECTS = 8
 
@@ -116,19 +120,26 @@ def _add_effects(
     screen, screened, tried_anyway, several = Screen(effects, study), fit, False, AtOnce(so_far, begun, rng)
     for _ in range(MOST_EFFECTS):
         others, richer = left_to_try(effects, fit, steps), list(families.extensions(fit, effects))
-        forms = begun.may_be_forms(study, fit)  # another effect could not be told from those of what was found
-        if forms:
-            study.progress("what is left may be the form of what was found: no other effect is looked for beside it")
-        untried = () if several.done or forms else others
+        little = leaves_little(study, fit, begun.error, begun.floor)
+        forms = little or begun.may_be_forms(study, fit)  # what explains a part of it could not be told from those
+        untried = () if several.done else others
         if not (untried or richer or forms) or (several.done and begun.left(study, fit) > MUCH):
             break  # with a dozen effects and much left, all that could be asked takes long and says little
         study = with_few(study, fit)
+        if forms:  # nor could those of one family, which act alike
+            own = {one.effect.family for one in fit.problem.effects}
+            untried = [effect for effect in untried if effect.family not in own]
+        if forms and not (untried and share_of_one(study, fit, screen, untried) > _OF_ANOTHER):
+            study.progress("what is left may be the form of what was found: no other effect explains half of it")
+            untried = ()
         if several.that_add_up(study, steps, fit, screen, untried) or (
             several.are_likely(study, fit, screen, untried) and several.found(study, steps, fit, EXPLAINED)
         ):
             _, steps, fit = so_far.all
             continue
         step = look_further(study, fit, screen, untried, rng, richer, most if fit is begun.fit else np.inf)
+        if forms and step.effects and not step.candidates[0].replaces and left_over(study, step.candidates[0].fit)[0]:
+            step = dataclasses.replace(step, effects=(), error_after=step.error_before)
         # what is on trial has no look-alikes that are worth the time, and what was found together takes too long
         much = (step.of_many or not step.effects) and so_far.believed is None and not several.done
         much = much and step.error_before > AS_GOOD_AS_NOTHING * begun.floor
@@ -166,7 +177,8 @@ def _add_effects(
         step, fit = drop_needless(study, step, fit, begun.given)
         steps = [*steps, step]
         so_far.all = study, steps, fit
-        if not is_worth_looking(study, fit) or leaves_little(study, fit, begun.error, begun.floor):
+        little = study.target.gripper.is_servo and leaves_little(study, fit, begun.error, begun.floor)
+        if little or not is_worth_looking(study, fit):
             break
     return None
 

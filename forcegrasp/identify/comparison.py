@@ -25,6 +25,8 @@ _BINS = 12
 # A reading went wrong that is so many σ off while those before and after it are within so many, or this share of it: no
 # motion is so short.
 _WRONG, _FIT, _NEXT_TO_IT = 20.0, 5.0, 0.1
+# And that is beyond both of these by this share of what it is off, where none is foretold that is.
+_ALONE = 0.5
 
 
 @dataclass(frozen=True)
@@ -78,12 +80,15 @@ class Comparison(ShortRepr):
     def wrong_readings(self) -> np.ndarray:
         """Grasp, sample and signal of single readings that are far off while those beside them fit, ``(n, 3)``.
 
-        Those that are furthest off come first.
+        They leap from those beside them, where what is foretold does not: a step or a blow that comes a sample early or
+        late is no wrong reading. Those that are furthest off come first.
         """
         size = np.where(self.target.mask[..., None], np.abs(np.nan_to_num(self.residual)), 0.0)
         around = np.pad(size, ((0, 0), (1, 1), (0, 0)))
         beside = np.maximum(around[:, :-2], around[:, 2:])
-        found = np.argwhere((size > _WRONG) & (beside < np.maximum(_FIT, _NEXT_TO_IT * size)))
+        foretold = self.predicted / self.target.sigma
+        leaps = (_leaps(foretold + self.residual) > _ALONE * size) & (_leaps(foretold) < _NEXT_TO_IT * size)
+        found = np.argwhere((size > _WRONG) & (beside < np.maximum(_FIT, _NEXT_TO_IT * size)) & leaps)
         return found[np.argsort(-size[tuple(found.T)], kind="stable")]
 
     def by_grasp(self) -> np.ndarray:
@@ -207,3 +212,9 @@ def _binned_share(values: np.ndarray, residual: np.ndarray, mask: np.ndarray) ->
     bins = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, max(0, len(edges) - 2))
     sums, counts = np.bincount(bins, weights=y), np.bincount(bins)
     return float(np.sum(sums[counts > 0] ** 2 / counts[counts > 0]) / total)
+
+
+def _leaps(values: np.ndarray) -> np.ndarray:
+    """By how much each sample is beyond both that before it and that after it, ``(G, S, C)``; 0 on the way between."""
+    before, after = values[:, [0, *range(values.shape[1] - 1)]], values[:, [*range(1, values.shape[1]), -1]]
+    return np.maximum(np.maximum(values - np.maximum(before, after), np.minimum(before, after) - values), 0.0)

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from forcegrasp.measure.check_liveness import force_noise
+from forcegrasp.measure.check_liveness import LEAST_ROWS, force_noise, zero_force
 from forcegrasp.measure.folder import show
+from forcegrasp.measure.force_units import check_force_units
 from forcegrasp.measure.samples import place, samples_file
 from forcegrasp.measure.schema import MeasurementSet
 
@@ -15,15 +16,11 @@ from forcegrasp.measure.schema import MeasurementSet
 _OTHER_CLOCK = 1.2
 # Commands come at most that often if this share of them does, for steps are further apart. Fewer tell nothing.
 _OFTEN, _LEAST_COMMANDS = 0.05, 40
-# Rows at the start of a grasp, before anything is touched, that a zero is read from: seconds, and rows at least.
-_FREE_S, _LEAST_ROWS = 0.25, 5
 # A zero has changed if it differs by so many standard deviations of a grasp's own, with two grasps at least on either
 # side, of which this share lies nearer to its own side's median: a drift from grasp to grasp has neither.
 _CHANGED, _EITHER_SIDE, _STAYS = 5.0, 2, 0.8
 # The standard deviation over the median absolute deviation, of a normal distribution.
 _MAD = 1.4826
-# Two channels press on the same object: one that reads so many times the other is in another unit.
-_OTHER_UNIT, _SAMPLES = 5.0, 20
 
 
 @dataclass(frozen=True)
@@ -53,7 +50,7 @@ def check_givens(measured: MeasurementSet, period_s: float) -> list[str]:
         changed = zip(measured.columns.force, tare.change_n, strict=True)
         told = ", ".join(f"{name} by {change:+.3g} N" for name, change in changed if change)
         warnings.append(f"{where}: from here on forces are shifted ({told}); was the zero set anew between two grasps?")
-    return warnings + _units_apart(measured)
+    return warnings + check_force_units(measured)
 
 
 def times(factor: float) -> str:
@@ -93,11 +90,11 @@ def command_period_s(measured: MeasurementSet) -> float | None:
 
 def find_tare(measured: MeasurementSet) -> Tare | None:
     """Where the zeros of the forces change for good; None if they scatter as much, or there are too few grasps."""
-    zeros = np.array([_zero(grasp.time_s, grasp.force_n) for grasp in measured.grasps])
+    zeros = np.array([zero_force(grasp.time_s, grasp.force_n) for grasp in measured.grasps])
     if measured.columns.read_effort or not zeros.size or len(zeros) < 2 * _EITHER_SIDE:
         return None
     noise = np.median([[force_noise(f) for f in grasp.force_n.T] for grasp in measured.grasps], axis=0)
-    least = np.maximum(noise / np.sqrt(_LEAST_ROWS), 1e-9)
+    least = np.maximum(noise / np.sqrt(LEAST_ROWS), 1e-9)
     # the split about whose sides' medians readings lie closest: a grasp that starts in contact moves no median
     splits = range(_EITHER_SIDE, len(zeros) - _EITHER_SIDE + 1)
     first = min(splits, key=lambda first: float((np.abs(zeros - _sides(zeros, first)) / least).sum()))
@@ -114,26 +111,3 @@ def _sides(zeros: np.ndarray, first: int) -> np.ndarray:
     """Each grasp's median zero of its side of a split, ``(grasps, channels)``."""
     before, after = np.median(zeros[:first], axis=0), np.median(zeros[first:], axis=0)
     return np.where(np.arange(len(zeros))[:, None] < first, before, after)
-
-
-def _zero(time: np.ndarray, force: np.ndarray) -> np.ndarray:
-    """What the channels read at the start of a grasp, ``(channels,)``."""
-    rows = max(_LEAST_ROWS, int(np.searchsorted(time, time[0] + _FREE_S)))
-    return np.median(force[:rows], axis=0)
-
-
-def _units_apart(measured: MeasurementSet) -> list[str]:
-    """Warns where one of two force channels reads many times what the other does."""
-    names = measured.columns.force
-    if len(names) != 2:
-        return []
-    both = np.concatenate([g.force_n - _zero(g.time_s, g.force_n) for g in measured.grasps])
-    pressed = np.all(both > 0.2 * both.max(axis=0), axis=1)
-    if pressed.sum() < _SAMPLES:
-        return []
-    ratio = float(np.median(both[pressed, 1] / both[pressed, 0]))
-    if 1 / _OTHER_UNIT < ratio < _OTHER_UNIT:
-        return []
-    large, small, by = (*names[::-1], ratio) if ratio > 1 else (*names, 1 / ratio)
-    where = f"{samples_file(measured.path)}: column {large}"
-    return [f"{where}: reads {by:.3g} times what {small} does; are both in newtons?"]

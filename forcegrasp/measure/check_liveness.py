@@ -11,6 +11,8 @@ from forcegrasp.measure.schema import MeasurementSet, side_of
 #: Means of blocks of the force must vary this many times as much as noise would make them to be contact.
 _CONTACT = 2.5
 _BLOCKS = 10
+# Rows at the start of a grasp, before anything is touched, that a zero is read from: seconds, and rows at least.
+_FREE_S, LEAST_ROWS = 0.25, 5
 
 
 def check_liveness(measured: MeasurementSet, reach: float) -> list[str]:
@@ -60,9 +62,9 @@ def _check_forces(measured: MeasurementSet, where: str) -> list[str]:
         for channel, column in enumerate(columns)
         if not felt[:, channel].any()
     ]
-    unseen = "no contact"
+    unseen = "forces show no contact, for they do no more than drift and jitter"
     if measured.columns.read_effort:
-        unseen += ", which an effort shows only while the motor stands"
+        unseen = "no contact, which an effort shows only while the motor stands"
     return warnings + [
         f"{place(measured.path, grasp)}: {unseen}"
         for grasp, some in zip(grasps, np.any(felt, axis=1), strict=True)
@@ -83,6 +85,12 @@ def force_noise(force: np.ndarray, std: float | None = None) -> float:
     quantised = np.sum(steps > 0) >= 5 and np.mean(steps == 0) > 0.2  # many equal neighbours
     resolution = float(steps[steps > 0].min()) / np.sqrt(12) if quantised else 0.0
     return max(std or 0.0, jitter, resolution)
+
+
+def zero_force(time: np.ndarray, force: np.ndarray) -> np.ndarray:
+    """What force channels ``(T, channels)`` read at the start of a grasp, ``(channels,)``."""
+    rows = max(LEAST_ROWS, int(np.searchsorted(time, time[0] + _FREE_S)))
+    return np.median(force[:rows], axis=0)
 
 
 def without_trend(values: np.ndarray, time: np.ndarray) -> np.ndarray:

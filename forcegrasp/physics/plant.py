@@ -326,14 +326,19 @@ class Plant(ContributedFields):
         ranges = self.field("actuator_forcerange")
         if self._force_range is None:
             self._force_range = ranges[:, self.actuators].copy()
-        allowed = self._force_range
+        low, high = self._force_range[..., 0], self._force_range[..., 1]
         if self.effects.limit_motors:
-            turned = self._drive_signs < 0  # those whose force closes where it is positive
-            low, high = allowed[..., 0], allowed[..., 1]
-            low, high = np.where(turned, -high, low), np.where(turned, -low, high)
-            low, high = self.effects.motor_range(low, high)
-            allowed = np.stack([np.where(turned, -high, low), np.where(turned, -low, high)], axis=-1)
-        ranges[:, self.actuators] = np.where(self._enabled[:, None, None], allowed, 0.0)
+            low, high = self._along_the_drives(*self.effects.motor_range(*self._along_the_drives(low, high)))
+        enabled = self._enabled[:, None]
+        ranges[:, self.actuators, 0], ranges[:, self.actuators, 1] = (
+            np.where(enabled, low, 0),
+            np.where(enabled, high, 0),
+        )
+
+    def _along_the_drives(self, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """A range of forces that open as one of forces of the actuators, or the other way round, ``(n, motors)``."""
+        turned = self._drive_signs < 0  # those whose force closes where it is positive
+        return (np.where(turned, -high, low), np.where(turned, -low, high)) if turned.any() else (low, high)
 
     def _apply_actions(self) -> None:
         if self.effects.limit_motors:

@@ -151,7 +151,8 @@ def answer(comparison: Comparison) -> str:
     total = f"{error}; up to {floor:.2f} is {noise}."
     if at_floor(value, floor):
         if round(value, 2) > round(floor, 2):
-            total = f"{error}; up to {floor:.2f} is {noise}, and up to {most_at_floor(floor):.2f} next to nothing."
+            near = f"up to {most_at_floor(floor):.2f} is too close to tell from it"
+            total = f"{error}; up to {floor:.2f} is {noise}, and {near}."
         return f"{total} These measurements show no failure of the model."
     label, less = comparison.without_worst()
     alone = f" Without {comparison.target.part} {label} it would be {less:.2f}." if at_floor(less, floor) else ""

@@ -62,6 +62,7 @@ from forcegrasp.reports.findings import (
 from forcegrasp.reports.fit import ADVICE, rounding_words, steps_picture, symptom_picture
 from forcegrasp.reports.html import Picture, Section, Table, Text
 from forcegrasp.reports.law import law_json, law_section, law_words
+from forcegrasp.reports.physics_step import shorter_step
 from forcegrasp.reports.symptom import symptom_of
 from forcegrasp.reports.view import view_section
 
@@ -177,6 +178,8 @@ def _of_model(diagnosis: Diagnosis) -> str:
             missing = "Something is missing"
         if d.is_uneven_noise:
             missing += ", or the noise grows with speed or force"
+        if shorter_step(d) is not None:
+            missing += ", as far as the scene's physics step lets me tell"
         return (
             f"{missing}: the error on held-out {d.target.part}s is"
             f" {d.error_of_base:.2f} × the sensor noise, and {best}. Look at {place}."

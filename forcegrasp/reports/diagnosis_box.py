@@ -27,6 +27,7 @@ from forcegrasp.reports.diagnosis_words import (
 )
 from forcegrasp.reports.html import Answer, Command
 from forcegrasp.reports.law import law_words
+from forcegrasp.reports.physics_step import step_warning
 
 # Below so many times the floor noise of another kind may be all that is left.
 _SURELY = 1.2
@@ -67,6 +68,7 @@ def answer_box(diagnosis: Diagnosis, advice: Advice | None, commands: Sequence[C
         ("Perhaps", f"{more}." if (more := besides_sentence(d)) else ""),
         ("A law", f"{law_words(d.law)}." if d.law is not None else ""),
         ("Noise", noise_words(d) if found else ""),
+        ("Physics step", f"{step[:1].upper()}{step[1:]}." if (step := step_warning(d)) else ""),
         ("Look first at", f"{odd_words(d)}." if d.odd and d.steps else ""),
         ("Record next", f"{record}." if record else ""),
         ("Note", note),

@@ -262,11 +262,11 @@ def left_sentence(diagnosis: Diagnosis) -> str:
 
 
 def _forms_words(diagnosis: Diagnosis) -> str:
-    """Why no other effect was looked for: what is left may be the forms of those that were found."""
+    """Why no other effect is named: what is left may be the forms of those that were found."""
     what, act = ("this effect does", "it acts") if len(diagnosis.preferred) == 1 else ("these effects do", "they act")
     return (
         f". That is within {FORM_TOLERANCE:.0%} of what {what}, and may be that {act} in another form than the"
-        " catalogue's; another effect could not be told from that, and none was looked for"
+        " catalogue's; no other effect was found that explains all of it"
     )
 
 

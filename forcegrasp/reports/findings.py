@@ -13,6 +13,7 @@ from forcegrasp.identify.fitted_model import effects_of_fit
 from forcegrasp.identify.intervals import standard_errors, warnings
 from forcegrasp.models.model_file import Fitted
 from forcegrasp.reports.comparison import worst_cell
+from forcegrasp.reports.physics_step import step_warning
 
 
 def remaining(diagnosis: Diagnosis) -> Comparison:
@@ -75,7 +76,8 @@ def candidate_parameters(candidate: Candidate, diagnosis: Diagnosis) -> dict[str
 
 def final_warnings(diagnosis: Diagnosis) -> list[str]:
     """What to bear in mind about the final model's parameters."""
-    return warnings(diagnosis.fit, standard_errors(diagnosis.fit, diagnosis.target, diagnosis.numerical))
+    errors, too_long = standard_errors(diagnosis.fit, diagnosis.target, diagnosis.numerical), step_warning(diagnosis)
+    return [*([too_long] if too_long else []), *warnings(diagnosis.fit, errors)]
 
 
 def noise_json(diagnosis: Diagnosis) -> dict[str, Any] | None:

@@ -19,6 +19,7 @@ from forcegrasp.measure import MeasurementSet
 from forcegrasp.physics.gripper import Gripper
 from forcegrasp.reports.diagnosis_words import besides, is_not_all
 from forcegrasp.reports.html import Command
+from forcegrasp.reports.physics_step import shorter_step
 
 
 def train_command(model: str | Path, gripper: str) -> str:
@@ -44,8 +45,11 @@ def after_diagnosis(
         return [Command("go on from what was found", _line("diagnose", f"data={data}", f"model={found}"))]
     if d.stopped:
         return [Command("give it more time", again)]
+    shorter = shorter_step(d)
+    finer = [] if shorter is None else [Command(f"make the scene's timestep {shorter:g} s, and diagnose again", again)]
     if d.verdict is Verdict.NOT_FITTED:
-        return [Command("look for what went wrong in single recordings" if gripper.is_servo
+        return [*finer,
+                Command("look for what went wrong in single recordings" if gripper.is_servo
                         else "look for grasps that went wrong", _line("compare", f"data={data}"))]  # fmt: skip
     if d.verdict is Verdict.DATA:
         return [Command("put the set right, and diagnose again", again)]
@@ -53,7 +57,7 @@ def after_diagnosis(
     right = [Command("put the set right first, and diagnose again", again)] if is_wrong else []
     if d.verdict is Verdict.UNKNOWN:
         look = Command("look at where the model fails", compared)
-        return [*right, look, *([] if d.law_sought else [_for_a_law(data)])]
+        return [*right, *finer, look, *([] if d.law_sought else [_for_a_law(data)])]
     if d.verdict is Verdict.EXPLAINED:
         noise = [Command("give the noise as it is, and diagnose again", again)] if d.noise is not None else []
         return [*noise, _use("the model", known, data, gripper)]
@@ -71,6 +75,7 @@ def after_diagnosis(
         tied = next((step.effects for step in kept_steps(d.steps) if len(step.effects) > 1), ())
         joined = _line("diagnose", f"data=[{str(data).strip('[]')},next]") if advice is not None and tied else again
         return [
+            *finer,
             Command(_to_tell_apart(d, tied, advice), joined),
             *([] if effect_of(first, gripper).of_set else [preferred]),
         ]
@@ -81,7 +86,7 @@ def after_diagnosis(
             Command(f"see what {more.effect.name} does besides",
                     _line("add", f"data={data}", f"model={found}", f"effect={more.effect.name}", "out=better.yaml"))
         ]  # fmt: skip
-        return [*right, look, *tried, *([] if d.law_sought else [_for_a_law(data)]), added]
+        return [*right, *finer, look, *tried, *([] if d.law_sought else [_for_a_law(data)]), added]
     return [*right, _use(with_all, found, data, gripper), added]
 
 

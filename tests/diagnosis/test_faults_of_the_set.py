@@ -244,6 +244,12 @@ def row_early(values: np.ndarray) -> np.ndarray:
             lambda i, g: {"time_s": g.time_s + np.random.default_rng(i).uniform(-0.009, 0.009, len(g.time_s))},
         ),
         ("sound", "force_tare", "at grasp 4", lambda i, g: {"force_n": g.force_n - [0.2 * (i >= 4), 0.0]}),
+        (
+            "sound",
+            "force_unit",
+            "10 times in",
+            lambda i, g: {"force_n": g.force_n * [1.0, 10.0 if i in (3, 5, 7) else 1]},
+        ),
         ("sound", "force_zero_drift", "f_l_n by -0.06", lambda i, g: {"force_n": g.force_n - [0.03 * (i % 3), 0.0]}),
         (
             "pressed_harder",

@@ -1,4 +1,4 @@
-"""What effects leave may be that they act in another form; then no other effect is looked for."""
+"""What effects leave may be that they act in another form; then another effect must explain all of it."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def test_what_an_effect_does_is_what_leaving_it_out_undoes(other_form):
     assert not len(done_by_each(study, base.fit))
 
 
-def test_a_search_asks_for_no_other_effect_and_says_so(other_form, monkeypatch):
+def test_a_search_asks_for_no_other_effect_where_none_explains_half_of_it_and_says_so(other_form, monkeypatch):
     study, base, _ = other_form
     asked, look_further = [], search.look_further
 
@@ -93,14 +93,32 @@ def test_a_search_asks_for_no_other_effect_and_says_so(other_form, monkeypatch):
         return look_further(study, fit, screen, effects, *args, **kwargs)
 
     monkeypatch.setattr(search, "look_further", looked)
-    rng = np.random.default_rng(0)
-    found = search.diagnose(study.target, base, study.simulators, [FRICTION, BIAS, LAG], rng)
+    found = searched(study, base)
     assert found.preferred == ("coulomb_friction",)
     assert found.left
     assert found.may_be_forms
     assert asked == [["coulomb_friction", "force_bias", "force_lag"], []]
     assert "may be that it acts in another form" in left_sentence(found)
     assert "another form" not in left_sentence(dataclasses.replace(found, may_be_forms=False))
+
+
+def searched(study, base, effects=(FRICTION, BIAS, LAG)):
+    return search.diagnose(study.target, base, study.simulators, list(effects), np.random.default_rng(0))
+
+
+def test_another_effect_that_explains_all_of_it_is_found():
+    """A gain of each sensor of its own was passed over beside a finger that bends, which does ten times as much."""
+    study, base, fit = study_of("coulomb_friction force_n=0.06", "force_bias left_n=0.005 right_n=-0.005")
+    assert may_be_forms(study, fit)
+    found = searched(study, base)
+    assert found.preferred == ("coulomb_friction", "force_bias")
+    assert not found.left
+
+
+def test_another_effect_that_leaves_something_is_not(monkeypatch):
+    study, base, _ = study_of("coulomb_friction force_n=0.06", "force_bias left_n=0.005 right_n=-0.005")
+    monkeypatch.setattr(search, "left_over", lambda study, fit: ("in all", None))
+    assert searched(study, base).preferred == ("coulomb_friction",)
 
 
 def test_the_floor_is_higher_by_what_is_tolerated(other_form):

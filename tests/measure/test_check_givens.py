@@ -100,18 +100,3 @@ def test_a_small_change_of_zero_amid_noise_and_grasps_that_start_pressed(sound):
 )
 def test_a_zero_that_drifts_is_none_that_was_set(sound, drift):
     assert find_tare(pressed(sound, drift)) is None
-
-
-@pytest.mark.parametrize(("channel", "factor"), [(1, 1000.0), (0, 0.102), (1, 9.81)])
-def test_channels_in_different_units(sound, channel, factor):
-    def other(_, force):
-        force[:, channel] *= factor
-        return force
-
-    (warning,) = check_givens(pressed(sound, other), PERIOD_S)
-    assert "are both in newtons?" in warning
-    assert f"column f_{'lr'[channel if factor > 1 else 1 - channel]}_n: reads " in warning
-
-
-def test_channels_that_differ_by_their_gain_are_not_doubted(sound):
-    assert check_givens(pressed(sound, lambda _, f: f * [1.0, 2.0]), PERIOD_S) == []

@@ -344,3 +344,21 @@ def test_axes_of_hinges_are_in_angles_and_keep_their_names(made_up, monkeypatch)
     page = figures.dependence(comparison.covariates(), comparison.residual, comparison.target)
     labels = {axes.get_xlabel() for axes in page.axes}
     assert {"command [mrad]", "velocity [mrad/s]"} <= labels
+
+
+@pytest.mark.parametrize(("measured", "foretold", "wrong"), [
+    ([0, 0, 90, 0, 0], [0, 0, 0, 0, 0], True),
+    ([0, 90, 90, 90, 90], [0, 0, 90, 90, 90], False),  # a step that comes a sample early
+    ([0, 40, 90, 95, 99], [0, 35, 40, 91, 99], False),  # a ramp that is late
+    ([0, 0, 90, 0, 0], [0, 0, 30, 0, 0], False),  # a blow that the model knows, too, if weaker
+    ([0, 0, 0, 0, 0], [0, 0, 60, 0, 0], False),  # and one that it alone has
+])  # fmt: skip
+def test_what_comes_a_sample_early_or_late_is_no_wrong_reading(made_up, measured, foretold, wrong):
+    """Of a gripper whose commands act late, the first reading after each step of a hard object's force was told so."""
+    comparison = made_up.comparison
+    predicted, residual = np.zeros((2, *comparison.predicted.shape))
+    sigma = np.broadcast_to(comparison.target.sigma, predicted.shape)
+    predicted[1, 40:45, 0] = foretold
+    residual[1, 40:45, 0] = np.subtract(measured, foretold)
+    told = dataclasses.replace(comparison, predicted=predicted * sigma, residual=residual).wrong_readings()
+    assert [tuple(place) for place in told] == ([(1, 42, 0)] if wrong else [])
