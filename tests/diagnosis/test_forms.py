@@ -28,7 +28,11 @@ from tests.light_set import light_gripper, light_set
 #: Ten per cent more friction left than right, which dry friction of both alike can't have.
 HIDDEN = "friction_asymmetry force_n=0.06 share=0.1"
 BESIDES = "force_bias left_n=0.06 right_n=-0.05"
-FRICTION, BIAS, LAG = (effect_of(name, light_gripper()) for name in ("coulomb_friction", "force_bias", "force_lag"))
+#: A gain of each sensor of its own, which does a tenth of what friction does.
+SMALL = ("coulomb_friction force_n=0.06", "force_gain_asymmetry share=0.04")
+FRICTION, BIAS, LAG, GAIN = (
+    effect_of(name, light_gripper()) for name in ("coulomb_friction", "force_bias", "force_lag", "force_gain_asymmetry")
+)
 
 
 def study_of(*hidden: str):
@@ -93,7 +97,7 @@ def test_a_search_asks_for_no_other_effect_where_none_explains_half_of_it_and_sa
         return look_further(study, fit, screen, effects, *args, **kwargs)
 
     monkeypatch.setattr(search, "look_further", looked)
-    found = searched(study, base)
+    found = searched(study, base, FRICTION, BIAS, LAG)
     assert found.preferred == ("coulomb_friction",)
     assert found.left
     assert found.may_be_forms
@@ -102,23 +106,34 @@ def test_a_search_asks_for_no_other_effect_where_none_explains_half_of_it_and_sa
     assert "another form" not in left_sentence(dataclasses.replace(found, may_be_forms=False))
 
 
-def searched(study, base, effects=(FRICTION, BIAS, LAG)):
+def searched(study, base, *effects):
     return search.diagnose(study.target, base, study.simulators, list(effects), np.random.default_rng(0))
 
 
-def test_another_effect_that_explains_all_of_it_is_found():
-    """A gain of each sensor of its own was passed over beside a finger that bends, which does ten times as much."""
-    study, base, fit = study_of("coulomb_friction force_n=0.06", "force_bias left_n=0.005 right_n=-0.005")
+@pytest.fixture(scope="module")
+def small():
+    return study_of(*SMALL)
+
+
+def test_another_effect_that_explains_all_of_it_is_found(small):
+    study, base, fit = small
     assert may_be_forms(study, fit)
-    found = searched(study, base)
-    assert found.preferred == ("coulomb_friction", "force_bias")
+    found = searched(study, base, FRICTION, GAIN, LAG)
+    assert found.preferred == ("coulomb_friction", "force_gain_asymmetry")
     assert not found.left
 
 
-def test_another_effect_that_leaves_something_is_not(monkeypatch):
-    study, base, _ = study_of("coulomb_friction force_n=0.06", "force_bias left_n=0.005 right_n=-0.005")
+def test_another_effect_that_leaves_something_is_not(small, monkeypatch):
+    study, base, _ = small
     monkeypatch.setattr(search, "left_over", lambda study, fit: ("in all", None))
-    assert searched(study, base).preferred == ("coulomb_friction",)
+    assert searched(study, base, FRICTION, GAIN, LAG).preferred == ("coulomb_friction",)
+
+
+def test_nor_is_one_of_the_same_family(small, monkeypatch):
+    """Of a sensor that lags in its own way two members of that family were named, each a part of it."""
+    study, base, _ = small
+    monkeypatch.setattr(GAIN, "family", FRICTION.family)
+    assert searched(study, base, FRICTION, GAIN, LAG).preferred == ("coulomb_friction",)
 
 
 def test_the_floor_is_higher_by_what_is_tolerated(other_form):

@@ -292,20 +292,29 @@ def test_a_search_fits_anyway_once_and_judges_odd_grasps_again(creeping, monkeyp
     assert len(diagnosis.odd) == (error > 10)
 
 
-@pytest.mark.parametrize(("little", "looks"), [(0.1, 1), (-1.0, 2)])
-def test_a_search_ends_where_little_is_left(creeping, monkeypatch, little, looks):
+@pytest.mark.parametrize(("little", "tried"), [(0.1, []), (-1.0, [DELAY])])
+def test_no_effect_is_tried_beside_what_leaves_little_unless_it_explains_half_of_that(
+    creeping, monkeypatch, little, tried
+):
     """What takes the rest makes up for the form of what was found: an object ten times too light, behind a lag."""
     study, base = creeping
     found, asked = looked(creeping, [SMOOTH, DELAY], anyway=True), []
     nothing = Step((), (), (), 1.05, 1.05)
-    monkeypatch.setattr(search, "look_further", lambda *_, **__: asked.append(1) or (nothing if asked[1:] else found))
+
+    def look_further(study, fit, screen, effects, *_, **__):
+        asked.append(effects)
+        return nothing if asked[1:] else found
+
+    monkeypatch.setattr(search, "look_further", look_further)
+    monkeypatch.setattr(search, "share_of_one", lambda *_: 0.4)
+    monkeypatch.setattr(conclusion, "may_be_forms", lambda *_: False)
     for module in (search, conclusion):
         monkeypatch.setattr(module, "odd_grasps", lambda *_: ())
     monkeypatch.setattr("forcegrasp.diagnosis.left_over.left_over", lambda *_: ("somewhere", None))
     monkeypatch.setattr("forcegrasp.diagnosis.left_over._LITTLE", little)
     diagnosis = search.diagnose(study.target, base, study.simulators, [SMOOTH, DELAY], np.random.default_rng(0))
     assert diagnosis.preferred == (("smooth_friction",))
-    assert len(asked) == looks
+    assert list(asked[1]) == tried
 
 
 @pytest.mark.parametrize(
