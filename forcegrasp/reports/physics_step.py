@@ -39,7 +39,7 @@ def step_warning(diagnosis: Diagnosis) -> str:
     return (
         f"half the scene's physics step of {1e3 * step_of_scene(diagnosis):g} ms changes what the model foretells by"
         f" {_of_half(diagnosis):.2g} × noise: what is missing may hide behind that, or look like something else. With"
-        f' <option timestep="{shorter:g}"/> in the scene it would be about {_SHORT_ENOUGH:g}'
+        f' <option timestep="{shorter:g}"/> in the scene it would be {_SHORT_ENOUGH:g} at most, as it falls with it'
     )
 
 
