@@ -139,7 +139,7 @@ def suspects(loaded: Loaded[MeasurementSet], target: Target, fit: Fit) -> list[F
         words = drift.words(measured.columns.force)
         found.append(Fault(f"force_{drift.of}_drift", words, check, right, worth=LEAST_SHARE))
     if (unit := find_odd_unit(measured)) is not None:
-        words = f"{measured.columns.force[unit.channel]} {unit.words(measured.grasps)}"
+        words = f"column {measured.columns.force[unit.channel]} {unit.words(measured.grasps)}"
         right = _changed(loaded, lambda index, g: unit.put_right(g) if index in unit.grasps else g)
         found.append(Fault("force_unit", words, "the unit of that column in the logs of these grasps", right))
     early = _early_readings(target, fit)
@@ -157,7 +157,7 @@ def suspects(loaded: Loaded[MeasurementSet], target: Target, fit: Fit) -> list[F
 
         found.append(Fault("late_side", words, check, _changed(loaded, right_side)))
     if positions_are_swapped(target, fit):
-        words = f"{listed(measured.columns.position)} stand for one another"
+        words = f"columns {listed(measured.columns.position)} stand for one another"
         check = "which encoder each column is written from: move one finger by hand"
         found.append(Fault("swapped_positions", words, check, _changed(loaded, lambda _, g: with_positions_swapped(g))))
     # rows that do not keep step with commands make a clock seem off: that must not hide the rest
