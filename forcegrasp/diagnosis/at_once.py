@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,7 +17,10 @@ from forcegrasp.diagnosis.study import Study
 from forcegrasp.diagnosis.verdict import EXPLAINED_FAR, explained_share
 from forcegrasp.effects import Effect
 from forcegrasp.identify.fit import Fit
+from forcegrasp.identify.target import Target
 
+#: Whether what a set gives, moved within its tolerance, may explain what a fit leaves.
+MayBeGiven = Callable[[Target, Fit], bool]
 # Beyond so many times the floor, beside an effect that was found, several others are added at once if none of them
 # stands out; or whether one does or not.
 _MUCH_LEFT, _VERY_MUCH_LEFT = 3.0, 5.0
@@ -32,9 +35,18 @@ class AtOnce:
     so_far: SoFar
     begun: Begun
     rng: np.random.Generator
+    given_first: MayBeGiven | None  #: see :func:`.search.diagnose`
     done: bool = False  #: whether it was: no other effect promises anything beside what it found
     _asked: Fit | None = None  #: the fit that it was last tried for
     _added_up: Fit | None = None  #: the same of effects that add up
+
+    def given_is_first(self, study: Study, fit: Fit) -> bool:
+        """Whether what the set gives is to be moved before anything is looked for beside the effects that were found.
+
+        Sizes of objects that are off by a little each, either way, look like effects that make up for one another.
+        """
+        found_some = len(fit.problem.effects) > self.begun.given
+        return found_some and self.given_first is not None and self.given_first(study.target, fit)
 
     def are_likely(self, study: Study, fit: Fit, screen: Screen, untried: Sequence[type[Effect]]) -> bool:
         """Whether what is left, beside an effect that was found, is not that of one other."""
@@ -61,7 +73,8 @@ class AtOnce:
         def keep(found: list[Step], further: Fit) -> bool:
             if enough(further):
                 self.so_far.all = study, found, further
-            return leaves_little(study, further, begun.error, begun.floor)
+            little = leaves_little(study, further, begun.error, begun.floor)
+            return little or (enough(further) and self.given_is_first(study, further))
 
         found = add_several(study, fit, steps, begun.effects, begun.given, self.rng, keep, straight=screen)
         if found is None or not enough(found[1]) or one > _AS_WELL * share_of_all(study, fit, found[1]):

@@ -113,10 +113,13 @@ class _Ways:
         start: tuple[Fit, Sequence[Step]] | None = None,
         may_be_given: MayBeGiven | None = None,
         most: float = np.inf,
+        given_first: MayBeGiven | None = None,
     ) -> Diagnosis:
         """See :func:`.search.diagnose`."""
         rng = np.random.default_rng(self.seed + 1)
-        return diagnose(target, base, simulators, self.effects, rng, self.progress, start, may_be_given, most)
+        return diagnose(
+            target, base, simulators, self.effects, rng, self.progress, start, may_be_given, most, given_first
+        )
 
     def moved(self, found: Diagnosis, loaded: Loaded[MeasurementSet], briefly: bool = False) -> Found | None:
         """The diagnosis with what the set gives moved within its tolerance; None if nothing asks for that.
@@ -147,7 +150,8 @@ class _Ways:
             move = moves is not None and moves(target, fit)
             return leave_out(target, fit) or move
 
-        found = self.search(*fitted, may_be_given=something_else_first)
+        given_first = None if moves is None else moves.before_more
+        found = self.search(*fitted, may_be_given=something_else_first, given_first=given_first)
         if found.stopped:
             return found, None
         try:

@@ -6,6 +6,7 @@ import dataclasses
 
 import numpy as np
 
+from forcegrasp.diagnosis.stray_readings import without_spikes
 from forcegrasp.diagnosis.study import Few, Study
 from forcegrasp.identify.fit import Fit
 from forcegrasp.identify.simulators import Simulators, cheap_tier
@@ -36,9 +37,9 @@ def with_few(study: Study, fit: Fit) -> Study:
 def few_grasps(target: Target, fit: Fit) -> np.ndarray:
     """Indices of a third of each object's grasps, or of each recording's windows; of at least six in all.
 
-    The one that a fit leaves most of is among them, the others are spread over all.
+    The one that a fit leaves most of is among them, not counting spikes; the others are spread over all.
     """
-    squares = np.sum((fit.weight * fit.residual) ** 2, axis=(1, 2))
+    squares = np.sum((fit.weight * without_spikes(fit.residual)) ** 2, axis=(1, 2))
     owner = np.array([g.session if target.gripper.is_servo else g.object for g in target.grasps])
     share = min(1.0, max(_SHARE, _LEAST / len(owner)))
     chosen: list[int] = []

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from forcegrasp.diagnosis.evidence import LEAST_LEAD, LEAST_SHARE_OF_MANY, is_beyond_chance, rivals_in
-from forcegrasp.diagnosis.families import refit_without, roughly_as
+from forcegrasp.diagnosis.families import refit_without, roughly_as, roughly_without
 from forcegrasp.diagnosis.faults import Fault, besides, within_tolerance
 from forcegrasp.diagnosis.few import with_few
 from forcegrasp.diagnosis.judge import judged
@@ -19,7 +19,7 @@ from forcegrasp.diagnosis.needless import drop_all_needless
 from forcegrasp.diagnosis.result import Candidate, Diagnosis, Step, kept_steps
 from forcegrasp.diagnosis.signatures import direction
 from forcegrasp.diagnosis.study import Study
-from forcegrasp.diagnosis.tolerance import Moved, all_radii, may_be_moved, time_of_reading
+from forcegrasp.diagnosis.tolerance import WORTH, Moved, all_radii, first_move, time_of_reading
 from forcegrasp.diagnosis.verdict import LEAST_SHARE
 from forcegrasp.effects import Effect
 from forcegrasp.effects.object_size import ObjectSize
@@ -42,6 +42,8 @@ SearchOn = Callable[[Target, Simulators, BaseFit, Fit, Sequence[Step]], Diagnosi
 # Where a move within the tolerance would take off this share of what a model leaves, it comes before unlikely effects:
 # they are then looked for in what it leaves.
 _COMES_FIRST = 0.25
+# Squares that one more number costs, as a move's price has it.
+_OF_SIZE = 2.0
 
 
 @dataclass(eq=False)
@@ -52,7 +54,18 @@ class MovesFirst:
     asked: bool = False  #: whether they were, of any fit
 
     def __call__(self, target: Target, fit: Fit) -> bool:
-        first = may_be_moved(self.loaded.measured, target, fit, _COMES_FIRST)
+        step = first_move(self.loaded.measured, target, fit, _COMES_FIRST)
+        first = step is not None and step.is_within
+        self.asked |= first
+        return first
+
+    def before_more(self, target: Target, fit: Fit) -> bool:
+        """Whether moves explain most of what effects leave, so that no more are looked for before them.
+
+        Not where radii are moved down alike: pads that stand further out, or lost motion, would have them so.
+        """
+        step = first_move(self.loaded.measured, target, fit, WORTH)
+        first = step is not None and step.is_within and not step.smaller_m
         self.asked |= first
         return first
 
@@ -130,6 +143,9 @@ def go_on_with_moved(
         return None
     models = [_with_move(model, loaded) for model in _models(found)]
     best = min((one for one in models if one.fault is not None), key=lambda one: one.price, default=None)
+    sizeless = None if best is None else _without_size(found, loaded)
+    if sizeless is not None and best is not None and sizeless.price < best.price + _OF_SIZE:
+        best, models = sizeless, [sizeless]
     if best is None or best.fault is None:
         return None
     progress(f"fitting with {best.fault.words}")
@@ -188,6 +204,24 @@ def _models(found: Diagnosis) -> Iterator[_Model]:
             first = dataclasses.replace(step, effects=effects, candidates=candidates)
             fit = roughly_as([rival.setting], found.fit, step.effects[0], study)
             yield _Model(fit, found.target, [*steps[:place], first, *steps[place + 1 :]], place)
+
+
+def _without_size(found: Diagnosis, loaded: Loaded[MeasurementSet]) -> _Model | None:
+    """The final model on the set as moved, without one size that all objects are off by; None if it has none.
+
+    Where each radius is a little off that is their mean, and hides that each is within its tolerance.
+    """
+    steps = kept_steps(found.steps)
+    others = [step for step in steps if step.effects[0] != ObjectSize.name]
+    if len(others) == len(steps):
+        return None
+    study = Study(found.target, Simulators(found.fit.problem), found.folds)
+    fit = roughly_without(ObjectSize.name, found.fit, study)
+    moved = _with_move(_Model(fit, found.target, others), loaded)
+    if moved.fault is None:
+        return None
+    again = _with_move(moved, loaded, moved.fault.moved)  # slopes led from where sizes were, which is further off
+    return min([moved, again], key=lambda one: one.price)
 
 
 def _with_move(model: _Model, loaded: Loaded[MeasurementSet], start: Moved | None = None) -> _Model:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from forcegrasp.diagnosis import families
-from forcegrasp.diagnosis.at_once import AtOnce
+from forcegrasp.diagnosis.at_once import AtOnce, MayBeGiven
 from forcegrasp.diagnosis.conclusion import Begun, concluded
 from forcegrasp.diagnosis.cut_short import REASONS, cut_short
 from forcegrasp.diagnosis.evidence import LEAST_SHARE_TOGETHER
@@ -21,7 +21,7 @@ from forcegrasp.diagnosis.needless import chained, drop_needless, simplify
 from forcegrasp.diagnosis.odd_grasps import odd_grasps
 from forcegrasp.diagnosis.result import Diagnosis, Step, kept_steps
 from forcegrasp.diagnosis.screen import Screen
-from forcegrasp.diagnosis.several import share_of_one
+from forcegrasp.diagnosis.several import most_gained_by_one, usual_on_few
 from forcegrasp.diagnosis.so_far import SoFar
 from forcegrasp.diagnosis.split import split
 from forcegrasp.diagnosis.stalled_base import better_without
@@ -40,10 +40,8 @@ from forcegrasp.identify.target import Target
 from forcegrasp.identify.verdict import Verdict
 from forcegrasp.identify.weights import reweigh
 
-#: Whether what a set gives, moved within its tolerance, may explain what a fit leaves.
-MayBeGiven = Callable[[Target, Fit], bool]
-# What is left within the forms of what was found may be another effect's if that explains so much of it. It is found
-# if it leaves nothing, and otherwise told as one that may be there besides.
+# What is left within the forms of what was found may be another effect's if that explains so much of it, on few grasps
+# and then on held-out ones, unless it leaves nothing there.
 _OF_ANOTHER = 0.5
 #: Largest number of effects that are looked for one by one.
 MOST_EFFECTS = 8
@@ -59,6 +57,7 @@ def diagnose(
     start: tuple[Fit, Sequence[Step]] | None = None,
     may_be_given: MayBeGiven | None = None,
     most: float = np.inf,
+    given_first: MayBeGiven | None = None,
 ) -> Diagnosis:
     """Adds effects to a fitted base model for as long as the evidence holds.
 
@@ -73,6 +72,8 @@ def diagnose(
       may_be_given: whether what the set gives, moved within its tolerance, may explain what a fit leaves: then effects
         that promise too little are not fitted.
       most: cost that the first effect must come down to; one that is too far from it is not looked for.
+      given_first: whether what the set gives, moved within its tolerance, explains most of what a fit with effects
+        leaves: then no more are looked for, and what was found is told without rivals, for the set to be moved first.
 
     Ctrl-C, or the end of a time limit, ends the search with what was found by then.
     """
@@ -96,14 +97,18 @@ def diagnose(
     so_far = SoFar((study, steps, first))
     try:
         if start is None or is_worth_looking(study, first):
-            better = _add_effects(so_far, begun, rng, may_be_given, most)
+            better = _add_effects(so_far, begun, rng, may_be_given, most, given_first)
             if better is not None:
                 progress(f"without it the model fits as well from there: {rms_error(better, target):.2f} × noise")
                 if start is None:
                     base = dataclasses.replace(base, fit=better)
                 else:
                     start = better, before
-                return diagnose(target, base, simulators, effects, rng, progress, start, may_be_given, most)
+                return diagnose(
+                    target, base, simulators, effects, rng, progress, start, may_be_given, most, given_first
+                )
+        if so_far.given_first:
+            return concluded(begun, *so_far.all, in_a_hurry=True)
         _tidy_up(so_far, begun)
         return _believed(so_far, begun)
     except REASONS as reason:
@@ -112,13 +117,19 @@ def diagnose(
 
 
 def _add_effects(
-    so_far: SoFar, begun: Begun, rng: np.random.Generator, may_be_given: MayBeGiven | None, most: float
-) -> Fit | None:
+    so_far: SoFar, begun: Begun, rng: np.random.Generator, may_be_given: MayBeGiven | None, most: float,
+    given_first: MayBeGiven | None,
+) -> Fit | None:  # fmt: skip
     """Adds one effect after the other; or returns a better fit without any, where the one to begin with had stalled."""
     effects = begun.effects
     study, steps, fit = so_far.all
-    screen, screened, tried_anyway, several = Screen(effects, study), fit, False, AtOnce(so_far, begun, rng)
+    screen, screened, tried_anyway = Screen(effects, study), fit, False
+    several = AtOnce(so_far, begun, rng, given_first)
     for _ in range(MOST_EFFECTS):
+        if several.given_is_first(study, fit):
+            study.progress("what the set gives, moved within its tolerance, explains most of what is left")
+            so_far.given_first = True
+            break
         others, richer = left_to_try(effects, fit, steps), list(families.extensions(fit, effects))
         little = leaves_little(study, fit, begun.error, begun.floor)
         forms = little or begun.may_be_forms(study, fit)  # what explains a part of it could not be told from those
@@ -126,10 +137,10 @@ def _add_effects(
         if not (untried or richer or forms) or (several.done and begun.left(study, fit) > MUCH):
             break  # with a dozen effects and much left, all that could be asked takes long and says little
         study = with_few(study, fit)
-        if forms:  # nor could those of one family, which act alike
-            own = {one.effect.family for one in fit.problem.effects}
-            untried = [effect for effect in untried if effect.family not in own]
-        if forms and not (untried and share_of_one(study, fit, screen, untried) > _OF_ANOTHER):
+        if forms:  # nor could look-alikes of one family, which act alike
+            known = [one.effect for one in fit.problem.effects]
+            untried = [e for e in untried if not any(e.family == k.family and families.look_alike(e, k) for k in known)]
+        if forms and not (untried and _may_be_another(study, fit, screen, untried)):
             study.progress("what is left may be the form of what was found: no other effect explains half of it")
             untried = ()
         if several.that_add_up(study, steps, fit, screen, untried) or (
@@ -138,8 +149,7 @@ def _add_effects(
             _, steps, fit = so_far.all
             continue
         step = look_further(study, fit, screen, untried, rng, richer, most if fit is begun.fit else np.inf)
-        if forms and step.effects and not step.candidates[0].replaces and left_over(study, step.candidates[0].fit)[0]:
-            step = dataclasses.replace(step, effects=(), error_after=step.error_before)
+        step = _of_another(step, study) if forms else step
         # what is on trial has no look-alikes that are worth the time, and what was found together takes too long
         much = (step.of_many or not step.effects) and so_far.believed is None and not several.done
         much = much and step.error_before > AS_GOOD_AS_NOTHING * begun.floor
@@ -147,6 +157,7 @@ def _add_effects(
         if much and untried and screened is not fit:  # beside what was found since, others may do something else
             screen, screened = Screen(effects, study), fit
             step = look_further(study, fit, screen, untried, rng, before=step.candidates)
+            step = _of_another(step, study) if forms else step
         much = much and not leaves_forms(study, fit, begun.error, begun.floor)
         if much and not step.effects:
             worth_it = untried and not tried_anyway and step.error_before < FAR
@@ -181,6 +192,19 @@ def _add_effects(
         if little or not is_worth_looking(study, fit):
             break
     return None
+
+
+def _may_be_another(study: Study, fit: Fit, screen: Screen, effects: Sequence[type[Effect]]) -> bool:
+    """Whether one of these effects alone explains so much of what may be forms that it is another one."""
+    return most_gained_by_one(study, fit, screen, effects) > _OF_ANOTHER * usual_on_few(study, fit)
+
+
+def _of_another(step: Step, study: Study) -> Step:
+    """A step from what may be forms: it found nothing if too much is left for it to be another effect's."""
+    best = step.candidates[0] if step.effects else None
+    if best is None or best.replaces or best.share > _OF_ANOTHER or not left_over(study, best.fit)[0]:
+        return step
+    return dataclasses.replace(step, effects=(), error_after=step.error_before)
 
 
 def _tidy_up(so_far: SoFar, begun: Begun) -> None:

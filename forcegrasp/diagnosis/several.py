@@ -75,8 +75,8 @@ def add_up(study: Study, fit: Fit, screen: Screen, effects: Sequence[type[Effect
     return len(gains) > 1 and together > _NEARLY_ALL * beyond and gains[0] < _ONE_ALONE * together
 
 
-def share_of_one(study: Study, fit: Fit, screen: Screen, effects: Sequence[type[Effect]]) -> float:
-    """Share of the squares beyond the noise that one effect alone gains, fitted to few grasps: large ones bend.
+def most_gained_by_one(study: Study, fit: Fit, screen: Screen, effects: Sequence[type[Effect]]) -> float:
+    """Squares that one effect alone gains on few grasps, fitted to them: large ones bend.
 
     Args:
       study, fit, screen, effects: as for :func:`none_stands_out`.
@@ -85,8 +85,22 @@ def share_of_one(study: Study, fit: Fit, screen: Screen, effects: Sequence[type[
     groups, _ = screen.on_few(study, some, part, effects)
     best = of_best_effects(sorted((group[0] for group in groups), key=lambda score: -score.gain), _AT_ONCE)
     alone = refine(best, some, part, Background(part, some.numerical))
-    gained = max((part.cost - one.fit.cost for one in alone), default=0.0)
-    return gained / max(some.target.beyond_noise(part.residual), 1e-9)
+    return max((part.cost - one.fit.cost for one in alone), default=0.0)
+
+
+def usual_on_few(study: Study, fit: Fit) -> float:
+    """Squares beyond the noise that as many grasps as the few leave on average.
+
+    The few show more than others, and where one reading is far off by a heavy tail of the noise, much more.
+    """
+    some, _ = study.on_few(fit)
+    return max(study.target.beyond_noise(fit.residual), 0.0) * some.target.readings / study.target.readings
+
+
+def share_of_one(study: Study, fit: Fit, screen: Screen, effects: Sequence[type[Effect]]) -> float:
+    """The same gain as a share of the squares that few grasps leave beyond the noise."""
+    some, part = study.on_few(fit)
+    return most_gained_by_one(study, fit, screen, effects) / max(some.target.beyond_noise(part.residual), 1e-9)
 
 
 def share_of_all(study: Study, fit: Fit, further: Fit) -> float:

@@ -18,6 +18,7 @@ class SoFar:
 
     all: Found
     believed: Found | None = None  #: what is, if the rest explains too little in the end
+    given_first: bool = False  #: whether what the set gives is to be moved before more effects are looked for
 
     @property
     def sure(self) -> Found:

@@ -33,6 +33,16 @@ def stray_readings(residual: np.ndarray, partitions: Sequence[Sequence[np.ndarra
     return stray
 
 
+def without_spikes(residual: np.ndarray) -> np.ndarray:
+    """Residuals ``(G, S, C)`` of which none is further off than 4 σ, or than the neighbour that is further off.
+
+    What a model misses lasts; of noise with heavy tails one reading may outweigh its whole grasp.
+    """
+    size = np.pad(np.abs(residual), ((0, 0), (1, 1), (0, 0)))
+    most = np.maximum(_FAR, np.maximum(size[:, :-2], size[:, 2:]))
+    return np.clip(residual, -most, most)
+
+
 def _is_even(stray: np.ndarray, there: np.ndarray, groups: Sequence[np.ndarray]) -> bool:
     """Whether stray readings are as frequent in each group of samples; of all signals, each with groups of its own."""
     count = 1 + max(int(group.max()) for group in groups)

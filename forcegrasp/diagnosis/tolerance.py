@@ -223,10 +223,10 @@ def _led_by(fit: Fit, problem: Problem, vector: np.ndarray, target: Target) -> F
     return dataclasses.replace(fit, problem=problem, vector=vector, predicted=predicted, residual=residual)
 
 
-def may_be_moved(measured: MeasurementSet, target: Target, fit: Fit, worth: float = WORTH) -> bool:
-    """Whether the first step of :func:`wanted_moves` explains enough, within the tolerance."""
+def first_move(measured: MeasurementSet, target: Target, fit: Fit, worth: float = WORTH) -> Moved | None:
+    """The first step of :func:`wanted_moves`, if that explains enough."""
     first = _first_step(measured, target, fit, worth)
-    return first is not None and first[1].moved.is_within
+    return None if first is None else first[1].moved
 
 
 @dataclass(frozen=True, eq=False)

@@ -66,6 +66,15 @@ def six(made_up) -> SimpleNamespace:
     return SimpleNamespace(fit=fit, study=Study(made_up.target.subset(keep), Simulators(fit.problem), ()))
 
 
+def test_a_spike_makes_no_grasp_the_worst(many):
+    left = only(many.fit, np.array([5])).residual
+    left[5] /= 5.0  # 2 σ everywhere
+    left[7, 3, 0] = 60.0
+    keep = few_grasps(many.target, dataclasses.replace(many.fit, residual=left))
+    assert many.target.grasps[5].object == many.target.grasps[7].object
+    assert 5 in keep
+
+
 def test_of_few_grasps_all_are_taken(six):
     assert with_few(six.study, six.fit) is six.study
     assert six.study.on_few(six.fit) == (six.study, six.fit)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from forcegrasp.diagnosis.conclusion import Begun
 from forcegrasp.diagnosis.forms import done_by_each, may_be_forms
 from forcegrasp.diagnosis.left_over import is_worth_looking
 from forcegrasp.diagnosis.refine import fit_with
+from forcegrasp.diagnosis.result import Step
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.effects.for_gripper import effect_of
 from forcegrasp.effects.setting import EffectSetting
@@ -123,17 +125,26 @@ def test_another_effect_that_explains_all_of_it_is_found(small):
     assert not found.left
 
 
-def test_another_effect_that_leaves_something_is_not(small, monkeypatch):
-    study, base, _ = small
-    monkeypatch.setattr(search, "left_over", lambda study, fit: ("in all", None))
-    assert searched(study, base, FRICTION, GAIN, LAG).preferred == ("coulomb_friction",)
+@pytest.mark.parametrize(
+    ("share", "left", "replaces", "is_found"),
+    [(0.4, "in all", "", False), (0.6, "in all", "", True), (0.4, "", "", True), (0.4, "in all", "stiction", True)],
+)
+def test_one_that_leaves_something_must_explain_half_of_it(monkeypatch, share, left, replaces, is_found):
+    best = cast(Any, SimpleNamespace(fit=None, share=share, replaces=replaces))
+    step = Step(("force_lag",), (best,), (), 1.5, 1.2)
+    monkeypatch.setattr(search, "left_over", lambda study, fit: (left, None))
+    found = search._of_another(step, cast(Any, None))
+    assert found == (step if is_found else Step((), (best,), (), 1.5, 1.5))
 
 
-def test_nor_is_one_of_the_same_family(small, monkeypatch):
+@pytest.mark.parametrize(("family", "alike"), [(True, True), (True, False), (False, True)])
+def test_nor_is_a_look_alike_of_the_same_family(small, monkeypatch, family, alike):
     """Of a sensor that lags in its own way two members of that family were named, each a part of it."""
     study, base, _ = small
-    monkeypatch.setattr(GAIN, "family", FRICTION.family)
-    assert searched(study, base, FRICTION, GAIN, LAG).preferred == ("coulomb_friction",)
+    monkeypatch.setattr(GAIN, "family", FRICTION.family if family else GAIN.family)
+    monkeypatch.setattr(GAIN, "look_alikes", (FRICTION.name,) if alike else ())
+    one, both = (FRICTION.name,), (FRICTION.name, GAIN.name)
+    assert searched(study, base, FRICTION, GAIN, LAG).preferred == (one if family and alike else both)
 
 
 def test_the_floor_is_higher_by_what_is_tolerated(other_form):

@@ -9,13 +9,22 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from forcegrasp.diagnosis import at_once, search, several
+from forcegrasp.diagnosis import at_once, conclusion, search, several
 from forcegrasp.diagnosis.families import roughly_without
+from forcegrasp.diagnosis.few import with_few
 from forcegrasp.diagnosis.judge import judged
 from forcegrasp.diagnosis.refine import fit_with
 from forcegrasp.diagnosis.result import Step
 from forcegrasp.diagnosis.screen import Screen
-from forcegrasp.diagnosis.several import _needed, add_several, add_up, none_stands_out, share_of_all, share_of_one
+from forcegrasp.diagnosis.several import (
+    _needed,
+    add_several,
+    add_up,
+    none_stands_out,
+    share_of_all,
+    share_of_one,
+    usual_on_few,
+)
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.effects.for_gripper import effect_of
 from forcegrasp.effects.setting import EffectSetting
@@ -155,6 +164,26 @@ def test_effects_that_add_up_are_found_at_once(small, monkeypatch):
         assert diagnosis.fit.effect(name).values == pytest.approx(true, rel=0.15), name
 
 
+def test_no_more_are_looked_for_where_what_is_given_explains_most_of_what_they_leave(small, monkeypatch):
+    """Then that is moved first, and what was found is told as it is."""
+    study, base = small
+    asked = []
+
+    def given_first(target, fit):
+        asked.append({one.effect.name for one in fit.problem.effects})
+        return True
+
+    for module, name in ((search, "look_further"), (search, "merge"), (conclusion, "ask_again")):
+        monkeypatch.setattr(module, name, lambda *_, **__: pytest.fail("looked for more"))
+    monkeypatch.setattr(several, "_AT_ONCE", 2)
+    monkeypatch.setattr(at_once, "EXPLAINED_FAR", 0.5)
+    rng = np.random.default_rng(0)
+    diagnosis = search.diagnose(study.target, base, study.simulators, CATALOGUE, rng, given_first=given_first)
+    assert len(diagnosis.preferred) == 2
+    assert asked == [set(diagnosis.preferred)] * 2  # the base model is not asked
+    assert diagnosis.left
+
+
 def test_one_effect_alone_is_not_several(small, monkeypatch):
     """It was looked for by itself before."""
     study, base = small
@@ -219,6 +248,18 @@ def test_one_of_several_effects_explains_little_and_one_that_is_alone_all(small)
     one = fit_with([setting("coulomb_friction")], base.fit.vector, study, base.fit)
     assert share_of_all(study, base.fit, one) == pytest.approx(0.55, abs=0.05)
     assert share_of_one(*at_first(*study_of("force_lag time_constant_s=0.06"))) == pytest.approx(1.0, abs=0.02)
+
+
+def test_what_is_usual_on_few_grasps_is_no_matter_of_one_reading(small):
+    study, base = small
+    study = dataclasses.replace(with_few(study, base.fit), folds=())
+    some, part = study.on_few(base.fit)
+    usual = usual_on_few(study, base.fit)
+    assert usual == pytest.approx(some.target.beyond_noise(part.residual), rel=0.3)
+    residual = base.fit.residual.copy()
+    residual[study.few.keep[0], 0, 0] += 60.0
+    assert usual_on_few(study, dataclasses.replace(base.fit, residual=residual)) - usual < 0.8 * 60**2
+    assert usual_on_few(study, dataclasses.replace(base.fit, residual=0 * residual)) == 0
 
 
 def test_what_explains_next_to_nothing_is_not_needed(small):

@@ -306,7 +306,7 @@ def test_no_effect_is_tried_beside_what_leaves_little_unless_it_explains_half_of
         return nothing if asked[1:] else found
 
     monkeypatch.setattr(search, "look_further", look_further)
-    monkeypatch.setattr(search, "share_of_one", lambda *_: 0.4)
+    monkeypatch.setattr(search, "most_gained_by_one", lambda *_: 0.0)
     monkeypatch.setattr(conclusion, "may_be_forms", lambda *_: False)
     for module in (search, conclusion):
         monkeypatch.setattr(module, "odd_grasps", lambda *_: ())

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from forcegrasp.diagnosis.stray_readings import stray_readings
+from forcegrasp.diagnosis.stray_readings import stray_readings, without_spikes
 
 G, S, C = 24, 150, 4
 PHASE = np.tile(np.arange(S) // 30, (G, 1))
@@ -52,3 +52,9 @@ def test_samples_that_there_are_not_count_as_none():
     residual = with_spikes(PHASE < 4)
     residual[:, PHASE[0] == 4] = np.nan
     assert stray_readings(residual, [(np.where(PHASE < 4, PHASE, -1), HALF)] * C).sum() >= 35
+
+
+def test_a_spike_is_cut_to_its_neighbours_and_what_lasts_is_not():
+    residual = np.array([0.5, -30.0, 6.0, 0.0, 3.0, 20.0, 25.0, 21.0, 0.0, 0.0, -9.0])[None, :, None]
+    cut = [0.5, -6.0, 6.0, 0.0, 3.0, 20.0, 21.0, 21.0, 0.0, 0.0, -4.0]
+    assert without_spikes(residual)[0, :, 0].tolist() == cut

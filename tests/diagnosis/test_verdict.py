@@ -392,7 +392,7 @@ def found_by(made_up, monkeypatch):
         for module in (search, conclusion):
             monkeypatch.setattr(module, "numerical_error", lambda fit, target: (0 * fit.residual + 0.1,) * 2)
         monkeypatch.setattr(search, "Screen", lambda *a: None)
-        monkeypatch.setattr(search, "share_of_one", lambda *a: 0.0)
+        monkeypatch.setattr(search, "_may_be_another", lambda *a: False)
         monkeypatch.setattr(at_once, "add_up", lambda *a: False)
         monkeypatch.setattr(conclusion, "may_be_forms", lambda *a: forms)
         monkeypatch.setattr(search, "with_few", lambda study, fit: study)

@@ -1,0 +1,35 @@
+"""What a set gives is moved within its tolerance before more effects are looked for than leave most to it."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from forcegrasp.diagnosis.moved_set import MovesFirst
+from forcegrasp.diagnosis.refine import fit_with
+from forcegrasp.diagnosis.study import Study
+from forcegrasp.effects.for_gripper import effect_of
+from forcegrasp.effects.setting import EffectSetting
+from forcegrasp.identify.fit_set import fit_model
+from forcegrasp.identify.progress import silent
+from tests.light_set import light_set
+
+
+@pytest.mark.parametrize(
+    ("by_m", "first"),
+    [((1e-4, -1e-4, 1e-4), True), ((-1e-4, -1e-4, -1e-4), False), ((5e-4, -5e-4, 5e-4), False)],
+)
+def test_radii_that_are_off_either_way_come_before_more_effects(by_m, first):
+    """Alike it may be lost motion that holds pads apart; and by five times as much it is no tolerance."""
+    loaded = light_set("force_bias left_n=0.05 right_n=-0.02", grasps=9)
+    off = dict(zip(dict.fromkeys(grasp.object for grasp in loaded.measured.grasps), by_m, strict=True))
+    grasps = tuple(dataclasses.replace(g, radius_m=g.radius_m - off[g.object]) for g in loaded.measured.grasps)
+    given = dataclasses.replace(loaded, measured=dataclasses.replace(loaded.measured, grasps=grasps))
+    target, simulators, base = fit_model(given, 0, silent)
+    bias = EffectSetting(effect_of("force_bias", given.gripper), "", np.array([0.05, -0.02]))
+    fit = fit_with([bias], base.fit.vector, Study(target, simulators, ()), base.fit)
+    moves = MovesFirst(given)
+    assert moves.before_more(target, fit) is first
+    assert moves.asked is first
