@@ -20,7 +20,7 @@ from forcegrasp.diagnosis.result import Candidate, Diagnosis, Step, kept_steps
 from forcegrasp.diagnosis.signatures import direction
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.diagnosis.tolerance import WORTH, Moved, all_radii, first_move, time_of_reading
-from forcegrasp.diagnosis.verdict import LEAST_SHARE
+from forcegrasp.diagnosis.verdict import LEAST_SHARE, MUCH
 from forcegrasp.effects import Effect
 from forcegrasp.effects.object_size import ObjectSize
 from forcegrasp.effects.readout_skew import ReadoutSkew
@@ -55,17 +55,17 @@ class MovesFirst:
 
     def __call__(self, target: Target, fit: Fit) -> bool:
         step = first_move(self.loaded.measured, target, fit, _COMES_FIRST)
-        first = step is not None and step.is_within
+        first = step is not None and step[0].is_within
         self.asked |= first
         return first
 
     def before_more(self, target: Target, fit: Fit) -> bool:
-        """Whether moves explain most of what effects leave, so that no more are looked for before them.
+        """Whether moves explain most of what effects leave, and leave little, so that they come before more effects.
 
         Not where radii are moved down alike: pads that stand further out, or lost motion, would have them so.
         """
         step = first_move(self.loaded.measured, target, fit, WORTH)
-        first = step is not None and step.is_within and not step.smaller_m
+        first = step is not None and step[0].is_within and not step[0].smaller_m and step[1] < MUCH
         self.asked |= first
         return first
 

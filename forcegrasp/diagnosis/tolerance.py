@@ -223,10 +223,10 @@ def _led_by(fit: Fit, problem: Problem, vector: np.ndarray, target: Target) -> F
     return dataclasses.replace(fit, problem=problem, vector=vector, predicted=predicted, residual=residual)
 
 
-def first_move(measured: MeasurementSet, target: Target, fit: Fit, worth: float = WORTH) -> Moved | None:
-    """The first step of :func:`wanted_moves`, if that explains enough."""
+def first_move(measured: MeasurementSet, target: Target, fit: Fit, worth: float = WORTH) -> tuple[Moved, float] | None:
+    """The first step of :func:`wanted_moves`, if that explains enough, and the rms error ÷ noise that it leaves."""
     first = _first_step(measured, target, fit, worth)
-    return None if first is None else first[1].moved
+    return None if first is None else (first[1].moved, float(np.sqrt(first[1].left / target.readings)))
 
 
 @dataclass(frozen=True, eq=False)

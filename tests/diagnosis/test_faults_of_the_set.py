@@ -503,7 +503,7 @@ def test_what_was_sought_in_vain_is_not_sought_again_after_a_small_move(sound, m
     monkeypatch.setattr(module, "diagnose", diagnosed)
     monkeypatch.setattr(module, "suspects", lambda *_: [])
     monkeypatch.setattr(module, "go_on_with_moved", moved)
-    monkeypatch.setattr("forcegrasp.diagnosis.moved_set.first_move", lambda *_: SimpleNamespace(is_within=True))
+    monkeypatch.setattr("forcegrasp.diagnosis.moved_set.first_move", lambda *_: (SimpleNamespace(is_within=True), 1.0))
     monkeypatch.setattr("forcegrasp.diagnosis.left_out.most_missed", lambda *_: ())
     for name in ("may_be_late_rows", "timing_within_tolerance_after_all"):
         monkeypatch.setattr(module, name, lambda one, *_: one)

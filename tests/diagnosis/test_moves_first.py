@@ -33,3 +33,5 @@ def test_radii_that_are_off_either_way_come_before_more_effects(by_m, first):
     moves = MovesFirst(given)
     assert moves.before_more(target, fit) is first
     assert moves.asked is first
+    if first:
+        assert not moves.before_more(target, base.fit)  # without the effect much would be left
