@@ -42,8 +42,8 @@ def check_givens(measured: MeasurementSet, period_s: float) -> list[str]:
     if (factor := clock_factor(measured, period_s)) is not None:
         warnings.append(
             f"{samples_file(measured.path)}: column t_s: commands are {factor * period_s:.3g} s apart where"
-            f" {show(measured.gripper)} takes one every {period_s:g} s: are time stamps {times(factor)}? else correct"
-            " the description's period_s"
+            f" {show(measured.gripper)} takes one every {period_s:g} s: are time stamps {times(factor)}? else name"
+            f" a description of your gripper whose period_s is {factor * period_s:.3g}"
         )
     if (tare := find_tare(measured)) is not None:
         where = place(measured.path, measured.grasps[tare.first])

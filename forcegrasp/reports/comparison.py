@@ -36,6 +36,8 @@ PHASE_WORDS = {
 }
 # Share of the error below which what it goes with is no news.
 _WORTH_TELLING = 0.05
+# Errors by phase are of all that the model was fitted to: said where held-out ones differ from them by this share.
+_OTHERWISE = 0.1
 _GOES_WITH = "what it goes with"
 #: What single readings are called that no motion explains.
 WRONG = "readings that went wrong"
@@ -210,6 +212,9 @@ def _rows(comparison: Comparison) -> list[tuple[str, str]]:
     name, kind, share = comparison.explanations()[0]
     if share >= _WORTH_TELLING and not at_floor(comparison.floor_ratio(), comparison.floor):
         rows.append((_GOES_WITH, f"{share:.0%} of the {kind} error goes with {covariate_words(name)}"))
+    fitted, held = rms(comparison.residual, target), comparison.floor_ratio()
+    if abs(held - fitted) > _OTHERWISE * held:
+        rows.append(("errors by phase", f"of the fit to all {target.part}s, {fitted:.2f} × noise in all"))
     noise, _, sizes = noise_sentence(target).partition(": ")
     return [*rows, (noise, sizes)]
 

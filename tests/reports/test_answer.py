@@ -333,6 +333,15 @@ def test_single_readings_that_went_wrong_are_told_by_their_place(made_up):
     assert told in diagnosis_report.lines(with_residual(found, left), None)
 
 
+@pytest.mark.parametrize(("times", "is_told"), [(1.05, False), (1.3, True)])
+def test_where_held_out_grasps_are_missed_by_more_it_is_said_what_errors_by_phase_are_of(made_up, times, is_told):
+    comparison = made_up.comparison
+    further = dataclasses.replace(comparison, heldout=times * comparison.residual)
+    fitted = dataclasses.replace(comparison, heldout=comparison.residual).floor_ratio()
+    told = [line for line in comparison_report.details(further) if line.startswith("errors by phase: ")]
+    assert told == [f"errors by phase: of the fit to all grasps, {fitted:.2f} × noise in all"] * is_told
+
+
 def with_residual(diagnosis: Diagnosis, residual: np.ndarray) -> Diagnosis:
     """The same with a final fit that leaves something else."""
     return dataclasses.replace(diagnosis, fit=dataclasses.replace(diagnosis.fit, residual=residual))
