@@ -196,7 +196,8 @@ def _add_effects(
 
 def _may_be_another(study: Study, fit: Fit, screen: Screen, effects: Sequence[type[Effect]]) -> bool:
     """Whether one of these effects alone explains so much of what may be forms that it is another one."""
-    return most_gained_by_one(study, fit, screen, effects) > _OF_ANOTHER * usual_on_few(study, fit)
+    least = _OF_ANOTHER * usual_on_few(study, fit)
+    return most_gained_by_one(study, fit, screen, effects, least) > least
 
 
 def _of_another(step: Step, study: Study) -> Step:

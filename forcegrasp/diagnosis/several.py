@@ -21,7 +21,7 @@ from forcegrasp.diagnosis.left_over import is_worth_looking
 from forcegrasp.diagnosis.needless import chained
 from forcegrasp.diagnosis.refine import fit_with, refine
 from forcegrasp.diagnosis.result import Step
-from forcegrasp.diagnosis.screen import Screen
+from forcegrasp.diagnosis.screen import MAX_GAIN_FACTOR, Screen
 from forcegrasp.diagnosis.signatures import Background, Score, direction, null_gains, of_best_effects
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.diagnosis.verdict import EXPLAINED
@@ -75,15 +75,19 @@ def add_up(study: Study, fit: Fit, screen: Screen, effects: Sequence[type[Effect
     return len(gains) > 1 and together > _NEARLY_ALL * beyond and gains[0] < _ONE_ALONE * together
 
 
-def most_gained_by_one(study: Study, fit: Fit, screen: Screen, effects: Sequence[type[Effect]]) -> float:
+def most_gained_by_one(
+    study: Study, fit: Fit, screen: Screen, effects: Sequence[type[Effect]], least: float = 0.0
+) -> float:
     """Squares that one effect alone gains on few grasps, fitted to them: large ones bend.
 
     Args:
       study, fit, screen, effects: as for :func:`none_stands_out`.
+      least: what is asked for; effects whose signatures promise too little for that are not fitted.
     """
     some, part = study.on_few(fit)
     groups, _ = screen.on_few(study, some, part, effects)
-    best = of_best_effects(sorted((group[0] for group in groups), key=lambda score: -score.gain), _AT_ONCE)
+    promising = [group[0] for group in groups if group[0].gain > MAX_GAIN_FACTOR * least]
+    best = of_best_effects(sorted(promising, key=lambda score: -score.gain), _AT_ONCE)
     alone = refine(best, some, part, Background(part, some.numerical))
     return max((part.cost - one.fit.cost for one in alone), default=0.0)
 

@@ -161,12 +161,14 @@ class _Start:
 
     def refit_richer(self, richer: Sequence[tuple[str, type[Effect]]], null: np.ndarray) -> list[Candidate]:
         """Fits with effects in the place of those in the model that they contain."""
-        candidates = []
-        for name, effect in richer if excess(self.held, self._study.numerical, self._study.target) else ():
-            if not self._may_explain_enough(effect, name):
-                continue
+        pairs = richer if excess(self.held, self._study.numerical, self._study.target) else ()
+        enough = side_by_side([partial(self._may_explain_enough, effect, name) for name, effect in pairs])
+        pairs = [pair for pair, may in zip(pairs, enough, strict=True) if may]
+        for name, effect in pairs:
             self._study.progress(f"refitting with {effect.name} in place of {name}")
-            refit = families.refit_as_richer(effect, self._fit, name, self._study)
+        tasks = [partial(families.refit_as_richer, effect, self._fit, name, self._study) for name, effect in pairs]
+        candidates = []
+        for (name, effect), refit in zip(pairs, side_by_side(tasks), strict=True):
             if not any(families.falls_back(refit, nested) for nested in effect.contains):
                 candidates.append(self._judge_by_gain(refit, null, name))
         return candidates

@@ -20,6 +20,7 @@ from forcegrasp.diagnosis.several import (
     _needed,
     add_several,
     add_up,
+    most_gained_by_one,
     none_stands_out,
     share_of_all,
     share_of_one,
@@ -247,6 +248,7 @@ def test_one_of_several_effects_explains_little_and_one_that_is_alone_all(small)
     assert share_of_one(*at_first(study, base)) == pytest.approx(0.55, abs=0.05)
     one = fit_with([setting("coulomb_friction")], base.fit.vector, study, base.fit)
     assert share_of_all(study, base.fit, one) == pytest.approx(0.55, abs=0.05)
+    assert most_gained_by_one(*at_first(study, base), least=1e9) == 0  # none promises so much, and none is fitted
     assert share_of_one(*at_first(*study_of("force_lag time_constant_s=0.06"))) == pytest.approx(1.0, abs=0.02)
 
 
