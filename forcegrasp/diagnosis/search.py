@@ -137,9 +137,9 @@ def _add_effects(
         if not (untried or richer or forms) or (several.done and begun.left(study, fit) > MUCH):
             break  # with a dozen effects and much left, all that could be asked takes long and says little
         study = with_few(study, fit)
-        if forms:  # nor could look-alikes of one family, which act alike
-            known = [one.effect for one in fit.problem.effects]
-            untried = [e for e in untried if not any(e.family == k.family and families.look_alike(e, k) for k in known)]
+        if forms:  # nor could those of one family, which act alike
+            own = {one.effect.family for one in fit.problem.effects}
+            untried = [effect for effect in untried if effect.family not in own]
         if forms and not (untried and _may_be_another(study, fit, screen, untried)):
             study.progress("what is left may be the form of what was found: no other effect explains half of it")
             untried = ()

@@ -12,7 +12,7 @@ class ForceCrosstalk(Effect):
 
     name = "force_crosstalk"
     stage = "sensor"
-    family = "force sensor"
+    family = "sensor gain"
     symptom = "one finger reads a force when only the other touches"
     formula = "f'_l = f_l + c f_r, f'_r = f_r + c f_l"
     source = "shared wiring or structure"

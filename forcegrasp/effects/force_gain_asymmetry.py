@@ -13,7 +13,7 @@ class ForceGainAsymmetry(Effect):
 
     name = "force_gain_asymmetry"
     stage = "sensor"
-    family = "force sensor"
+    family = "sensor gain"
     symptom = "left and right forces differ by a factor"
     formula = "f'_l = (1 + a) f_l, f'_r = (1 − a) f_r"
     source = "calibration of each sensor"

@@ -137,14 +137,11 @@ def test_one_that_leaves_something_must_explain_half_of_it(monkeypatch, share, l
     assert found == (step if is_found else Step((), (best,), (), 1.5, 1.5))
 
 
-@pytest.mark.parametrize(("family", "alike"), [(True, True), (True, False), (False, True)])
-def test_nor_is_a_look_alike_of_the_same_family(small, monkeypatch, family, alike):
+def test_nor_is_one_of_the_same_family(small, monkeypatch):
     """Of a sensor that lags in its own way two members of that family were named, each a part of it."""
     study, base, _ = small
-    monkeypatch.setattr(GAIN, "family", FRICTION.family if family else GAIN.family)
-    monkeypatch.setattr(GAIN, "look_alikes", (FRICTION.name,) if alike else ())
-    one, both = (FRICTION.name,), (FRICTION.name, GAIN.name)
-    assert searched(study, base, FRICTION, GAIN, LAG).preferred == (one if family and alike else both)
+    monkeypatch.setattr(GAIN, "family", FRICTION.family)
+    assert searched(study, base, FRICTION, GAIN, LAG).preferred == ("coulomb_friction",)
 
 
 def test_the_floor_is_higher_by_what_is_tolerated(other_form):
