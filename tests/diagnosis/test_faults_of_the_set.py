@@ -131,7 +131,7 @@ def test_in_place_of_a_fault_that_leaves_next_to_nothing_an_effect_must_do_as_we
     monkeypatch.setattr(module, "with_fault", with_some_left)
     monkeypatch.setattr(module, "diagnose", lambda *asked: searched.append(asked) or diagnose(*asked))
     diagnose_set(wrong, None, ["backlash"], 0, silent)
-    (right, *_, unlimited), *_, (said, *_, may_be_given, most) = searched
+    (right, *_, unlimited, _), *_, (said, *_, may_be_given, most, _) = searched
     assert [None in {g.radius_m for g in target.grasps} for target in (right, said)] == [True, False]
     assert unlimited == np.inf
     assert (may_be_given is not None) == limited
