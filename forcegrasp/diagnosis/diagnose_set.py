@@ -24,7 +24,7 @@ from forcegrasp.diagnosis.moved_set import (
 )
 from forcegrasp.diagnosis.result import Diagnosis, Step
 from forcegrasp.diagnosis.search import MayBeGiven, diagnose
-from forcegrasp.diagnosis.verdict import EXPLAINED_FAR, explained_share
+from forcegrasp.diagnosis.verdict import EXPLAINED_FAR, MUCH, explained_share
 from forcegrasp.effects import Effect
 from forcegrasp.effects.for_gripper import effect_of, effects_of
 from forcegrasp.errors import MeasurementError
@@ -155,6 +155,8 @@ class _Ways:
         if found.stopped:
             return found, None
         try:
+            if moves is not None and moves.beyond and (further := self.put_right_besides(found, loaded, least=1.0)):
+                return found, further
             further = self.moved(found, loaded, briefly=moves is not None and not (moves.asked or leave_out.names))
             if further is None and leave_out.names:
                 rest = self.without_missed(loaded, fitted[0], leave_out.names)
@@ -180,15 +182,15 @@ class _Ways:
         found, simulators = further or (found, simulators)
         return told_of(found, names, target), simulators
 
-    def put_right_besides(self, found: Diagnosis, loaded: Loaded[MeasurementSet]) -> Found | None:
+    def put_right_besides(self, found: Diagnosis, loaded: Loaded[MeasurementSet], least: float = MUCH) -> Found | None:
         """See :func:`.with_givens_put_right`."""
 
         def put_right(fault: Fault, said: Fitted) -> tuple[Fault, Fitted] | None:
-            model = model_of(found.fit, found.target, loaded, ())
+            model = fault.begun_from(model_of(found.fit, found.target, loaded, ()))
             return dataclasses.replace(self, model=model).put_right(fault, said)
 
         try:
-            return with_givens_put_right(found, loaded, put_right, self._search_on, self.progress)
+            return with_givens_put_right(found, loaded, put_right, self._search_on, self.progress, least)
         except REASONS as reason:
             return dataclasses.replace(found, stopped=cut_short(reason, self.progress)), Simulators(found.fit.problem)
 

@@ -28,6 +28,7 @@ from forcegrasp.identify.target import Target
 from forcegrasp.measure.check_givens import Tare, clock_factor, find_tare, times
 from forcegrasp.measure.force_units import find_odd_unit
 from forcegrasp.measure.schema import MeasuredGrasp, MeasurementSet
+from forcegrasp.models.model_file import Fitted, Model
 from forcegrasp.short_repr import ShortRepr, cut
 
 # What a linear step makes of a change of zero is believed if it differs by no more than this share.
@@ -49,6 +50,7 @@ class Fault(ShortRepr):
     moved: Moved | None = None  #: what was moved within the tolerance of what is given, so that it is no fault
     #: What is given and is fitted instead, such as ``radius_m of sponge``, as the set has it.
     fitted: dict[str, float] = field(default_factory=dict)
+    moves: dict[str, float] = field(default_factory=dict)  #: by how much a linear step moves what is given, by name
     least: float = SEEN_M  #: by how much less it is as given
     worth: float = EXPLAINED  #: least share of what is left beyond the noise that it must explain
     of_most: bool = False  #: radii of most objects are doubted, so that an effect may do as well, unless few were wrong
@@ -74,6 +76,19 @@ class Fault(ShortRepr):
         """The same with what a fit of the set put right makes of what is fitted."""
         told = [_told(name, value, said) for name, (value, said) in self._still_wrong(fit).items()]
         return dataclasses.replace(self, words="; ".join(told)) if told else self
+
+    def begun_from(self, model: Model) -> Model:
+        """A model with radii as the set says and a linear step leads, for a fit of them to begin there.
+
+        No slope leads from far away; and where a fit without them ended, none leads on.
+        """
+        objects = {name: dict(values) for name, values in model.objects.items()}
+        for name, said in self.fitted.items():
+            what, _, whose = name.partition(" of ")
+            if what == "radius_m":
+                begin = said + self.moves.get(name, 0.0)
+                objects.setdefault(whose, {})[what] = Fitted(begin, begin, begin, "m")
+        return dataclasses.replace(model, objects=objects)
 
     def summary(self) -> str:
         return cut(f"{self.name}: {self.words}", 100)
@@ -166,8 +181,8 @@ def suspects(loaded: Loaded[MeasurementSet], target: Target, fit: Fit) -> list[F
     if wrong := doubtful_radii(target, fit, measured.radius_std_m):
         wider = most if most is not None and set(most.fitted) > {f"radius_m of {name}" for name in wrong} else None
         found.append(dataclasses.replace(_wrong_radii(loaded, wrong), wider=wider))
-    elif most is not None:
-        found.append(most)
+    elif most is not None and moved is not None:
+        found.append(dataclasses.replace(most, moves=moved.moves))
     elif moved is not None and moved.is_within:
         found.append(_moved(loaded, moved))
     return found

@@ -28,8 +28,9 @@ PutRight = Callable[[Fault, Fitted], tuple[Fault, Fitted] | None]
 
 
 def with_givens_put_right(
-    found: Diagnosis, loaded: Loaded[MeasurementSet], put_right: PutRight, search_on: SearchOn, progress: Progress
-) -> tuple[Diagnosis, Simulators] | None:
+    found: Diagnosis, loaded: Loaded[MeasurementSet], put_right: PutRight, search_on: SearchOn, progress: Progress,
+    least: float = MUCH,
+) -> tuple[Diagnosis, Simulators] | None:  # fmt: skip
     """The diagnosis with radii, or a recording's setting, put right beside effects; None if little is left, or a tie.
 
     Args:
@@ -38,10 +39,11 @@ def with_givens_put_right(
       put_right: fits the effects that were found to the set without the fault.
       search_on: looks for further effects.
       progress: told what is going on.
+      least: error ÷ floor from which on it is asked.
     """
     steps = kept_steps(found.steps)
     plain = bool(steps) and all(len(step.effects) == 1 and step.candidates for step in steps)
-    little = not found.left or found.error_after < MUCH * found.floor
+    little = not found.left or found.error_after < least * found.floor
     if not plain or little or found.fault is not None or found.stopped:
         return None
     said = found.target, Simulators(found.fit.problem), dataclasses.replace(found.base, fit=found.fit)

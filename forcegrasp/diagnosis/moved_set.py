@@ -19,7 +19,7 @@ from forcegrasp.diagnosis.needless import drop_all_needless
 from forcegrasp.diagnosis.result import Candidate, Diagnosis, Step, kept_steps
 from forcegrasp.diagnosis.signatures import direction
 from forcegrasp.diagnosis.study import Study
-from forcegrasp.diagnosis.tolerance import WORTH, Moved, all_radii, first_move, time_of_reading
+from forcegrasp.diagnosis.tolerance import MOST, WORTH, Moved, all_radii, first_move, time_of_reading
 from forcegrasp.diagnosis.verdict import LEAST_SHARE, MUCH
 from forcegrasp.effects import Effect
 from forcegrasp.effects.object_size import ObjectSize
@@ -42,6 +42,8 @@ SearchOn = Callable[[Target, Simulators, BaseFit, Fit, Sequence[Step]], Diagnosi
 # Where a move within the tolerance would take off this share of what a model leaves, it comes before unlikely effects:
 # they are then looked for in what it leaves.
 _COMES_FIRST = 0.25
+# Standard deviation of radii that a ruler measured, metres.
+_RULER_M = 3e-4
 # Squares that one more number costs, as a move's price has it.
 _OF_SIZE = 2.0
 
@@ -52,6 +54,7 @@ class MovesFirst:
 
     loaded: Loaded[MeasurementSet]
     asked: bool = False  #: whether they were, of any fit
+    beyond: bool = False  #: whether radii are to be moved beyond their tolerance, as if a ruler had measured them
 
     def __call__(self, target: Target, fit: Fit) -> bool:
         step = first_move(self.loaded.measured, target, fit, _COMES_FIRST)
@@ -64,10 +67,20 @@ class MovesFirst:
 
         Not where radii are moved down alike: pads that stand further out, or lost motion, would have them so.
         """
-        step = first_move(self.loaded.measured, target, fit, WORTH)
-        first = step is not None and step[0].is_within and not step[0].smaller_m and step[1] < MUCH
+        measured = self.loaded.measured
+        by_ruler = dataclasses.replace(measured, radius_std_m=max(measured.radius_std_m, _RULER_M))
+        first = _most_explained(measured, target, fit) is not None
+        if not first and (moved := _most_explained(by_ruler, target, fit)) is not None:
+            # if all are off alike it may be an effect
+            first = self.beyond = moved.radii_differ_by_m > MOST * measured.radius_std_m
         self.asked |= first
         return first
+
+
+def _most_explained(measured: MeasurementSet, target: Target, fit: Fit) -> Moved | None:
+    """A move within the tolerance that explains most of what effects leave, and leaves little; None if none does."""
+    moved, left = first_move(measured, target, fit, WORTH) or (None, np.inf)
+    return None if moved is None or not moved.is_within or moved.smaller_m or left > MUCH else moved
 
 
 def within_tolerance_after_all(found: Diagnosis, loaded: Loaded[MeasurementSet]) -> Diagnosis:

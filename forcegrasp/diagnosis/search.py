@@ -127,7 +127,7 @@ def _add_effects(
     several = AtOnce(so_far, begun, rng, given_first)
     for _ in range(MOST_EFFECTS):
         if several.given_is_first(study, fit):
-            study.progress("what the set gives, moved within its tolerance, explains most of what is left")
+            study.progress("what the set gives explains most of what is left, moved by a little")
             so_far.given_first = True
             break
         others, richer = left_to_try(effects, fit, steps), list(families.extensions(fit, effects))

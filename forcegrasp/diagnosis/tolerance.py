@@ -104,6 +104,11 @@ class Moved:
         return [] if alike else [name for name, move in sizes.items() if abs(move) >= MOST]
 
     @property
+    def radii_differ_by_m(self) -> float:
+        """By how much more one radius was moved than another, metres."""
+        return float(np.ptp([by_m for name, by_m in self.moves.items() if name.startswith("radius_m")] or [0.0]))
+
+    @property
     def smaller_m(self) -> float:
         """By how much radii were moved down on average, metres, where chance would hardly do it to all; else 0."""
         radii = [(n.std, move) for n, move in zip(self.numbers, self.deviations, strict=True) if n.kind == "radius_m"]

@@ -9,6 +9,7 @@ import pytest
 from forcegrasp.diagnosis import givens_besides
 from forcegrasp.diagnosis.diagnose_set import diagnose_set
 from forcegrasp.diagnosis.result import Diagnosis
+from forcegrasp.identify.fitted_model import model_of
 from forcegrasp.identify.loading import Loaded
 from forcegrasp.reports.diagnosis import answer
 from tests.light_set import light_set
@@ -62,3 +63,13 @@ def test_radii_are_not_doubted_where_little_is_left_or_what_was_found_is_tied(di
         asked.clear()
         assert givens_besides.with_givens_put_right(other, limited(), None, None, silent) is None  # pyright: ignore
         assert bool(asked) == doubted
+
+
+def test_radii_that_are_fitted_begin_where_a_linear_step_leads(diagnosis):
+    fitted, moves = {"radius_m of thing_0": 0.018, "load_kg of log": 0.1}, {"radius_m of thing_0": 0.001}
+    fault = dataclasses.replace(diagnosis.fault, fitted=fitted, moves=moves)
+    known = model_of(diagnosis.fit, diagnosis.target, limited(), ())
+    begun = fault.begun_from(known)
+    assert begun.objects["thing_0"]["radius_m"].value == pytest.approx(0.019)
+    assert set(begun.objects["thing_0"]) == {*known.objects["thing_0"], "radius_m"}
+    assert set(begun.objects) == set(known.objects)

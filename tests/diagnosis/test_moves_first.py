@@ -19,10 +19,10 @@ from tests.light_set import light_set
 
 @pytest.mark.parametrize(
     ("by_m", "first"),
-    [((1e-4, -1e-4, 1e-4), True), ((-1e-4, -1e-4, -1e-4), False), ((5e-4, -5e-4, 5e-4), False)],
+    [((1e-4, -1e-4, 1e-4), True), ((-1e-4, -1e-4, -1e-4), False), ((4e-4, -4e-4, 4e-4), True)],
 )
 def test_radii_that_are_off_either_way_come_before_more_effects(by_m, first):
-    """Alike it may be lost motion that holds pads apart; and by five times as much it is no tolerance."""
+    """Alike it may be lost motion that holds pads apart; and four times as much is no tolerance of a calliper."""
     loaded = light_set("force_bias left_n=0.05 right_n=-0.02", grasps=9)
     off = dict(zip(dict.fromkeys(grasp.object for grasp in loaded.measured.grasps), by_m, strict=True))
     grasps = tuple(dataclasses.replace(g, radius_m=g.radius_m - off[g.object]) for g in loaded.measured.grasps)
@@ -33,5 +33,6 @@ def test_radii_that_are_off_either_way_come_before_more_effects(by_m, first):
     moves = MovesFirst(given)
     assert moves.before_more(target, fit) is first
     assert moves.asked is first
+    assert moves.beyond is (max(by_m) > 3e-4)
     if first:
         assert not moves.before_more(target, base.fit)  # without the effect much would be left
