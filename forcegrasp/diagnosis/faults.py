@@ -78,15 +78,15 @@ class Fault(ShortRepr):
         return dataclasses.replace(self, words="; ".join(told)) if told else self
 
     def begun_from(self, model: Model) -> Model:
-        """A model with radii as the set says and a linear step leads, for a fit of them to begin there.
+        """A model with radii where a linear step leads from what the set says, for a fit of them to begin there.
 
         No slope leads from far away; and where a fit without them ended, none leads on.
         """
         objects = {name: dict(values) for name, values in model.objects.items()}
         for name, said in self.fitted.items():
             what, _, whose = name.partition(" of ")
-            if what == "radius_m":
-                begin = said + self.moves.get(name, 0.0)
+            if what == "radius_m" and name in self.moves:
+                begin = said + self.moves[name]
                 objects.setdefault(whose, {})[what] = Fitted(begin, begin, begin, "m")
         return dataclasses.replace(model, objects=objects)
 
@@ -177,12 +177,12 @@ def suspects(loaded: Loaded[MeasurementSet], target: Target, fit: Fit) -> list[F
         found.append(Fault("swapped_positions", words, check, _changed(loaded, lambda _, g: with_positions_swapped(g))))
     # rows that do not keep step with commands make a clock seem off: that must not hide the rest
     moved = wanted_moves(measured, target, fit) if all(one.name == "time_scale" for one in found) else None
-    most = None if moved is None or moved.is_within else _most_radii(loaded, moved.radii_apart())
+    most = None if moved is None or moved.is_within else _most_radii(loaded, moved)
     if wrong := doubtful_radii(target, fit, measured.radius_std_m):
         wider = most if most is not None and set(most.fitted) > {f"radius_m of {name}" for name in wrong} else None
-        found.append(dataclasses.replace(_wrong_radii(loaded, wrong), wider=wider))
-    elif most is not None and moved is not None:
-        found.append(dataclasses.replace(most, moves=moved.moves))
+        found.append(dataclasses.replace(_wrong_radii(loaded, wrong, moved), wider=wider))
+    elif most is not None:
+        found.append(most)
     elif moved is not None and moved.is_within:
         found.append(_moved(loaded, moved))
     return found
@@ -200,24 +200,25 @@ def _of_recording(loaded: Loaded[MeasurementSet], wrong: RecordingFault) -> Faul
     return Fault(wrong.name, wrong.words(loaded.measured.columns.unit), wrong.check, right, fitted=fitted, least=least)
 
 
-def _wrong_radii(loaded: Loaded[MeasurementSet], wrong: dict[str, float]) -> Fault:
-    """Given radii, by object, are to be fitted instead."""
+def _wrong_radii(loaded: Loaded[MeasurementSet], wrong: dict[str, float], moved: Moved | None) -> Fault:
+    """Given radii, by object, are to be fitted instead, from where they are moved to."""
     words = f"fingers met {listed(list(wrong))} elsewhere than the set says"
     right = _changed(loaded, lambda _, g: dataclasses.replace(g, radius_m=None) if g.object in wrong else g)
     check = f"the radius of {listed(list(wrong))}, with a calliper: it may be another object's, or a diameter"
     fitted = {f"radius_m of {name}": said for name, said in wrong.items()}
     # what fingers felt is seen in the readings themselves: as much is enough as of an effect
-    return Fault("object_radius", words, check, right, fitted=fitted, worth=LEAST_SHARE)
+    moves = {} if moved is None else moved.moves
+    return Fault("object_radius", words, check, right, fitted=fitted, moves=moves, worth=LEAST_SHARE)
 
 
-def _most_radii(loaded: Loaded[MeasurementSet], apart: Sequence[str]) -> Fault | None:
+def _most_radii(loaded: Loaded[MeasurementSet], moved: Moved) -> Fault | None:
     """Radii that are beyond their tolerance, some more and some less."""
-    measured = loaded.measured
+    measured, apart = loaded.measured, moved.radii_apart()
     said = {g.object: g.radius_m for g in measured.grasps if g.object in apart and g.radius_m is not None}
     if not said:
         return None
     check = "the radii, with a calliper; were they measured by a ruler, meta.yaml may say object_radius_std_m"
-    most = dataclasses.replace(_wrong_radii(loaded, said), check=check, of_most=True)
+    most = dataclasses.replace(_wrong_radii(loaded, said, moved), check=check, of_most=True)
     return dataclasses.replace(most, least=MOST * measured.radius_std_m)
 
 

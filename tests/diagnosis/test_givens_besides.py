@@ -66,10 +66,12 @@ def test_radii_are_not_doubted_where_little_is_left_or_what_was_found_is_tied(di
 
 
 def test_radii_that_are_fitted_begin_where_a_linear_step_leads(diagnosis):
-    fitted, moves = {"radius_m of thing_0": 0.018, "load_kg of log": 0.1}, {"radius_m of thing_0": 0.001}
+    fitted = {"radius_m of thing_0": 0.018, "radius_m of thing_1": 0.02, "load_kg of log": 0.1}
+    moves = {"radius_m of thing_0": 0.001, "offset_m of g000": 0.002}
     fault = dataclasses.replace(diagnosis.fault, fitted=fitted, moves=moves)
     known = model_of(diagnosis.fit, diagnosis.target, limited(), ())
     begun = fault.begun_from(known)
     assert begun.objects["thing_0"]["radius_m"].value == pytest.approx(0.019)
     assert set(begun.objects["thing_0"]) == {*known.objects["thing_0"], "radius_m"}
+    assert begun.objects["thing_1"].keys() == known.objects["thing_1"].keys()  # no step says where
     assert set(begun.objects) == set(known.objects)
