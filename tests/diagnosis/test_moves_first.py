@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
 
+from forcegrasp.diagnosis import moved_set
 from forcegrasp.diagnosis.moved_set import MovesFirst
 from forcegrasp.diagnosis.refine import fit_with
 from forcegrasp.diagnosis.study import Study
@@ -34,5 +37,13 @@ def test_radii_that_are_off_either_way_come_before_more_effects(by_m, first):
     assert moves.before_more(target, fit) is first
     assert moves.asked is first
     assert moves.beyond is (max(by_m) > 3e-4)
-    if first:
-        assert not moves.before_more(target, base.fit)  # without the effect much would be left
+
+
+@pytest.mark.parametrize(("left", "first"), [(1.4, True), (1.6, False)])
+def test_they_do_not_where_they_leave_much(monkeypatch, left, first):
+    """An effect that is not known yet has its part in the move then."""
+    moved = SimpleNamespace(is_within=True, smaller_m=0.0, radii_differ_by_m=0.0)
+    monkeypatch.setattr(moved_set, "first_move", lambda *_: (moved, left))
+    moves = MovesFirst(light_set())
+    assert moves.before_more(cast(Any, None), cast(Any, None)) is first
+    assert not moves.beyond
