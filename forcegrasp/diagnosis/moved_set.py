@@ -68,11 +68,11 @@ class MovesFirst:
         Not where radii are moved down alike: pads that stand further out, or lost motion, would have them so.
         """
         measured = self.loaded.measured
-        by_ruler = dataclasses.replace(measured, radius_std_m=max(measured.radius_std_m, _RULER_M))
         first = _most_explained(measured, target, fit) is not None
-        if not first and (moved := _most_explained(by_ruler, target, fit)) is not None:
+        if not first and measured.radius_std_m < _RULER_M:
+            moved = _most_explained(dataclasses.replace(measured, radius_std_m=_RULER_M), target, fit)
             # if all are off alike it may be an effect
-            first = self.beyond = moved.radii_differ_by_m > MOST * measured.radius_std_m
+            first = self.beyond = moved is not None and moved.radii_differ_by_m > MOST * measured.radius_std_m
         self.asked |= first
         return first
 
@@ -156,10 +156,12 @@ def go_on_with_moved(
         return None
     models = [_with_move(model, loaded) for model in _models(found)]
     best = min((one for one in models if one.fault is not None), key=lambda one: one.price, default=None)
-    sizeless = None if best is None else _without_size(found, loaded)
-    if sizeless is not None and best is not None and sizeless.price < best.price + _OF_SIZE:
+    if best is None:
+        return None
+    sizeless = _without_size(found, loaded)
+    if sizeless is not None and sizeless.price < best.price + _OF_SIZE:
         best, models = sizeless, [sizeless]
-    if best is None or best.fault is None:
+    if best.fault is None:
         return None
     progress(f"fitting with {best.fault.words}")
     target, simulators = best.target, Simulators(best.fit.problem)

@@ -1,4 +1,4 @@
-"""What a set gives is moved within its tolerance before more effects are looked for than leave most to it."""
+"""Moves of what a set gives come before further effects, where they explain most of what the known ones leave."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def test_radii_that_are_off_either_way_come_before_more_effects(by_m, first):
 
 
 @pytest.mark.parametrize(("left", "first"), [(1.4, True), (1.6, False)])
-def test_they_do_not_where_they_leave_much(monkeypatch, left, first):
+def test_moves_that_leave_much_do_not_come_first(monkeypatch, left, first):
     """An effect that is not known yet has its part in the move then."""
     moved = SimpleNamespace(is_within=True, smaller_m=0.0, radii_differ_by_m=0.0)
     monkeypatch.setattr(moved_set, "first_move", lambda *_: (moved, left))
