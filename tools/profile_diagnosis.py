@@ -13,20 +13,12 @@ from types import FrameType
 from mujoco.batch import Batch
 
 from forcegrasp.cli.measuring import refuse_table
-from forcegrasp.diagnosis import (
-    exchange,
-    faults,
-    merge,
-    moved_set,
-    needless,
-    odd_grasps,
-    signatures,
-    split,
-    step,
-    tolerance,
-)
+from forcegrasp.diagnosis import signatures
 from forcegrasp.diagnosis.diagnose_set import diagnose_set
-from forcegrasp.diagnosis.refine import refine, refine_anyway
+from forcegrasp.diagnosis.faults import odd_grasps, suspects, tolerance
+from forcegrasp.diagnosis.givens import moved_set
+from forcegrasp.diagnosis.search import exchange, merge, needless, split, step
+from forcegrasp.diagnosis.search.refine import refine, refine_anyway
 from forcegrasp.identify.base_fit import fit_base
 from forcegrasp.identify.cross_validation import heldout_residual
 from forcegrasp.identify.loading import load
@@ -52,7 +44,7 @@ PARTS = {
     merge.merge.__code__: "one effect in place of two",
     needless.simplify.__code__: "simpler effects",
     moved_set.go_on_with_moved.__code__: "what is given, moved",
-    faults.suspects.__code__: "mistakes of the set",
+    suspects.suspects.__code__: "mistakes of the set",
     tolerance.wanted_moves.__code__: "how far what is given is to be moved",
 }
 

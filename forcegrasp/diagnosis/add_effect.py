@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from forcegrasp.diagnosis.look_beside import look_beside
-from forcegrasp.diagnosis.refine import refine
+from forcegrasp.diagnosis.search.look_beside import look_beside
+from forcegrasp.diagnosis.search.refine import refine
 from forcegrasp.diagnosis.signatures import Background, Signatures, trials
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.effects import Effect

@@ -10,20 +10,20 @@ from functools import partial
 import numpy as np
 
 from forcegrasp.diagnosis.cut_short import REASONS, cut_short
-from forcegrasp.diagnosis.doubt import leaves_less, more_likely, with_fault
-from forcegrasp.diagnosis.faults import Fault, besides, leaves_nothing, suspects
-from forcegrasp.diagnosis.givens_besides import Fitted, with_givens_put_right
-from forcegrasp.diagnosis.late_rows import may_be_late_rows
-from forcegrasp.diagnosis.law import find_law
-from forcegrasp.diagnosis.left_out import LeaveOutFirst, is_answer, told_of, without
-from forcegrasp.diagnosis.moved_set import (
+from forcegrasp.diagnosis.faults.suspects import Fault, besides, leaves_nothing, suspects
+from forcegrasp.diagnosis.givens.doubt import leaves_less, more_likely, with_fault
+from forcegrasp.diagnosis.givens.givens_besides import Fitted, with_givens_put_right
+from forcegrasp.diagnosis.givens.late_rows import may_be_late_rows
+from forcegrasp.diagnosis.givens.left_out import LeaveOutFirst, is_answer, told_of, without
+from forcegrasp.diagnosis.givens.moved_set import (
     MovesFirst,
     go_on_with_moved,
     timing_within_tolerance_after_all,
     within_tolerance_after_all,
 )
+from forcegrasp.diagnosis.law.law import find_law
 from forcegrasp.diagnosis.result import Diagnosis, Step
-from forcegrasp.diagnosis.search import MayBeGiven, diagnose
+from forcegrasp.diagnosis.search.search import MayBeGiven, diagnose
 from forcegrasp.diagnosis.verdict import EXPLAINED_FAR, MUCH, explained_share
 from forcegrasp.effects import Effect
 from forcegrasp.effects.for_gripper import effect_of, effects_of

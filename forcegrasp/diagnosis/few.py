@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 
-from forcegrasp.diagnosis.stray_readings import without_spikes
+from forcegrasp.diagnosis.noise.stray_readings import without_spikes
 from forcegrasp.diagnosis.study import Few, Study
 from forcegrasp.identify.fit import Fit
 from forcegrasp.identify.simulators import Simulators, cheap_tier

@@ -9,10 +9,10 @@ from functools import cached_property
 
 import numpy as np
 
-from forcegrasp.diagnosis.faults import Fault
+from forcegrasp.diagnosis.faults.odd_grasps import OddGrasp
+from forcegrasp.diagnosis.faults.suspects import Fault
 from forcegrasp.diagnosis.found_law import FoundLaw
-from forcegrasp.diagnosis.noise_check import Noise, is_uneven_noise
-from forcegrasp.diagnosis.odd_grasps import OddGrasp
+from forcegrasp.diagnosis.noise.noise_check import Noise, is_uneven_noise
 from forcegrasp.diagnosis.signatures import Score
 from forcegrasp.diagnosis.verdict import explained_share
 from forcegrasp.effects import Effect

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from forcegrasp.diagnosis.slow_noise import through_filter
+from forcegrasp.diagnosis.noise.slow_noise import through_filter
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.effects import Effect
 from forcegrasp.effects.setting import EffectSetting

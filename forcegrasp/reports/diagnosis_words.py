@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from forcegrasp.diagnosis.evidence import may_be_besides
-from forcegrasp.diagnosis.faults import Fault
-from forcegrasp.diagnosis.forms import FORM_TOLERANCE
-from forcegrasp.diagnosis.late_rows import row_s
+from forcegrasp.diagnosis.faults.suspects import Fault
+from forcegrasp.diagnosis.givens.late_rows import row_s
 from forcegrasp.diagnosis.result import Candidate, Diagnosis, Step, kept_steps
+from forcegrasp.diagnosis.search.forms import FORM_TOLERANCE
 from forcegrasp.diagnosis.verdict import EXPLAINED_FAR, MUCH
 from forcegrasp.effects.for_gripper import effect_of
 from forcegrasp.identify.cross_validation import heldout_residual, rms_of_recordings

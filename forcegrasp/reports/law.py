@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from forcegrasp.diagnosis.found_law import FoundLaw
-from forcegrasp.diagnosis.law_terms import along
+from forcegrasp.diagnosis.law.law_terms import along
 from forcegrasp.identify.intervals import listed
 from forcegrasp.identify.target import Target
 from forcegrasp.reports import figures

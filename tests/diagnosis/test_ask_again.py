@@ -9,9 +9,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from forcegrasp.diagnosis.ask_again import ask_again
-from forcegrasp.diagnosis.moved_set import _models, _with_rivals_that_do_as_well
+from forcegrasp.diagnosis.givens.moved_set import _models, _with_rivals_that_do_as_well
 from forcegrasp.diagnosis.result import Step
+from forcegrasp.diagnosis.search.ask_again import ask_again
 from forcegrasp.effects import get_effect
 from forcegrasp.effects.for_gripper import effect_of
 from forcegrasp.effects.setting import EffectSetting
@@ -93,7 +93,7 @@ def test_one_of_its_family_that_does_better_takes_the_place(found):
 
 def test_of_the_last_step_all_was_in_the_model(found, monkeypatch):
     study, steps, fit = tied(found, FRICTION, DEADBAND)
-    monkeypatch.setattr("forcegrasp.diagnosis.ask_again._asked", lambda *_: pytest.fail("asked again"))
+    monkeypatch.setattr("forcegrasp.diagnosis.search.ask_again._asked", lambda *_: pytest.fail("asked again"))
     alone = [dataclasses.replace(steps[0], effects=(FRICTION,)), dataclasses.replace(steps[1], effects=(LAG, DEADBAND))]
     assert ask_again(study, alone, fit) == (alone, fit)
 
@@ -106,15 +106,15 @@ def test_what_was_found_at_once_is_asked_among_look_alikes_of_any_family(found, 
         asked.append((step.effects[0], [one.effect.name for one in rivals]))
         return step, fit
 
-    monkeypatch.setattr("forcegrasp.diagnosis.ask_again._asked", with_rivals)
+    monkeypatch.setattr("forcegrasp.diagnosis.search.ask_again._asked", with_rivals)
     at_once = [dataclasses.replace(s, candidates=(dataclasses.replace(s.candidates[0], without=fit),)) for s in steps]
     alike = [effect_of(name, fit.problem.gripper) for name in (DEADBAND, "command_delay")]
     ask_again(study, at_once, fit, alike)
     assert (FRICTION, [DEADBAND]) not in asked
-    monkeypatch.setattr("forcegrasp.diagnosis.ask_again._AS_GOOD", np.inf)
+    monkeypatch.setattr("forcegrasp.diagnosis.search.ask_again._AS_GOOD", np.inf)
     ask_again(study, at_once, fit, alike)
     assert (FRICTION, [DEADBAND]) not in asked  # its signature promises too little
-    monkeypatch.setattr("forcegrasp.diagnosis.ask_again.promising", lambda study, fit, name, effects: effects)
+    monkeypatch.setattr("forcegrasp.diagnosis.search.ask_again.promising", lambda study, fit, name, effects: effects)
     ask_again(study, at_once, fit, alike)
     assert (FRICTION, [DEADBAND]) in asked
     assert (LAG, ["command_delay"]) in asked  # the last of them, too
@@ -132,7 +132,7 @@ def test_where_noise_alone_is_left_only_the_set_is_asked_in_the_place_of_what_wa
         asked.append((step.effects[0], [one.name for one in effects]))
         return []
 
-    monkeypatch.setattr("forcegrasp.diagnosis.ask_again._in_its_place", in_its_place)
+    monkeypatch.setattr("forcegrasp.diagnosis.search.ask_again._in_its_place", in_its_place)
     if at_once:
         steps = [dataclasses.replace(s, candidates=(dataclasses.replace(s.candidates[0], without=fit),)) for s in steps]
     others = [get_effect(name) for name in (DEADBAND, "object_size")]

@@ -11,10 +11,10 @@ import pytest
 from forcegrasp.cli.diagnose import sigterm_as_ctrl_c
 from forcegrasp.diagnosis.cut_short import INTERRUPTED
 from forcegrasp.diagnosis.diagnose_set import diagnose_set
-from forcegrasp.diagnosis.faults import Fault
-from forcegrasp.diagnosis.search import diagnose
-from forcegrasp.diagnosis.so_far import SoFar
-from forcegrasp.diagnosis.step import look_further
+from forcegrasp.diagnosis.faults.suspects import Fault
+from forcegrasp.diagnosis.search.search import diagnose
+from forcegrasp.diagnosis.search.so_far import SoFar
+from forcegrasp.diagnosis.search.step import look_further
 from forcegrasp.effects.for_gripper import effect_of
 from forcegrasp.identify.verdict import Verdict
 from forcegrasp.replay.time_limit import OutOfTimeError, check_time, time_limit
@@ -25,7 +25,7 @@ from tests.diagnosis.test_exchange import rubbing as rubbing  # a fixture
 from tests.diagnosis.test_families import silent
 
 REASONS = [(KeyboardInterrupt(), INTERRUPTED), (OutOfTimeError(3), "its 3 min were over")]
-SEARCH = importlib.import_module("forcegrasp.diagnosis.search")
+SEARCH = importlib.import_module("forcegrasp.diagnosis.search.search")
 OF_SET = importlib.import_module("forcegrasp.diagnosis.diagnose_set")
 
 
@@ -51,7 +51,7 @@ def test_what_was_found_is_kept(rubbing, monkeypatch, when, reason, words):
 
     monkeypatch.setattr(SEARCH, "look_further", look)
     monkeypatch.setattr(SEARCH, "simplify", raising(reason))
-    monkeypatch.setattr("forcegrasp.diagnosis.conclusion.ask_again", None)  # takes simulations
+    monkeypatch.setattr("forcegrasp.diagnosis.search.conclusion.ask_again", None)  # takes simulations
     with time_limit(3):
         found = diagnose(
             target, base, simulators, [effect_of("coulomb_friction", target.gripper)], np.random.default_rng(0)

@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from forcegrasp.diagnosis.even_stamps import are_even_in_truth, evenly
+from forcegrasp.diagnosis.faults.even_stamps import are_even_in_truth, evenly
 from forcegrasp.identify.fit_set import fit_model
 from forcegrasp.identify.predict import predict
 from forcegrasp.identify.progress import silent
@@ -52,5 +52,5 @@ def test_only_a_log_that_scatters_by_itself_is_doubted(of_log):
 
 def test_even_stamps_are_not_looked_at(monkeypatch):
     target, _, base = fit_model(light_set(grasps=6), 0, silent)
-    monkeypatch.setattr("forcegrasp.diagnosis.even_stamps.predict", lambda *_: pytest.fail("simulated"))
+    monkeypatch.setattr("forcegrasp.diagnosis.faults.even_stamps.predict", lambda *_: pytest.fail("simulated"))
     assert not are_even_in_truth(target, base.fit)

@@ -8,13 +8,13 @@ import functools
 import numpy as np
 import pytest
 
-from forcegrasp.diagnosis.exchange import are_alike, exchange
 from forcegrasp.diagnosis.families import roughly_without
-from forcegrasp.diagnosis.noise_check import Noise
+from forcegrasp.diagnosis.noise.noise_check import Noise
 from forcegrasp.diagnosis.result import Step, kept_steps
-from forcegrasp.diagnosis.screen import Screen
-from forcegrasp.diagnosis.search import diagnose
-from forcegrasp.diagnosis.step import look_further
+from forcegrasp.diagnosis.search.exchange import are_alike, exchange
+from forcegrasp.diagnosis.search.screen import Screen
+from forcegrasp.diagnosis.search.search import diagnose
+from forcegrasp.diagnosis.search.step import look_further
 from forcegrasp.effects import catalogue, get_effect
 from forcegrasp.effects.for_gripper import effect_of, effects_of
 from forcegrasp.identify.fit_set import fit_model
@@ -66,7 +66,7 @@ def test_what_is_true_stays(found):
 
 def test_the_only_effect_was_chosen_with_all_there_is_in_the_model(found, monkeypatch):
     monkeypatch.setattr(
-        "forcegrasp.diagnosis.exchange.look_further", lambda *_, **__: pytest.fail("looked for another")
+        "forcegrasp.diagnosis.search.exchange.look_further", lambda *_, **__: pytest.fail("looked for another")
     )
     assert exchanged(found, "position_deadband", only_last=True)[0] is None
 
@@ -80,7 +80,7 @@ def test_look_alikes_are_tried_and_mistakes_of_the_set(found, monkeypatch, other
         asked.extend(effects)
         return Step((), (), (), 1.0, 1.0)
 
-    monkeypatch.setattr("forcegrasp.diagnosis.exchange.look_further", nothing)
+    monkeypatch.setattr("forcegrasp.diagnosis.search.exchange.look_further", nothing)
     study, step, fit = found("actuator_lag", "position_deadband")
     steps = [dataclasses.replace(step, effects=("position_deadband",)), step]
     one = get_effect(other)
@@ -124,7 +124,7 @@ def test_a_search_that_ends_with_more_than_noise_looks_for_exchanges_and_goes_on
         calls.append(arguments)
         return dataclasses.replace(taken, candidates=(candidate,)) if len(calls) == 1 else None
 
-    monkeypatch.setattr("forcegrasp.diagnosis.search.exchange", recorded)
+    monkeypatch.setattr("forcegrasp.diagnosis.search.search.exchange", recorded)
     steps = [dataclasses.replace(step, effects=(name,)) for name in names]
     other = [effect_of("motor_offset", target.gripper)]
     diagnosis = diagnose(target, base, simulators, other, np.random.default_rng(0), start=(fit, steps))
@@ -139,14 +139,14 @@ def test_the_search_goes_on_where_noise_seems_to_be_stronger_than_said(rubbing, 
     _, target, simulators, base = rubbing
     signals = np.ones(target.signals.shape[-1])
     noise = Noise(times * signals, times * signals, signals > 0, 0 * signals, 0 * signals)
-    monkeypatch.setattr("forcegrasp.diagnosis.left_over.left_over", lambda *_: ("", noise))
+    monkeypatch.setattr("forcegrasp.diagnosis.search.left_over.left_over", lambda *_: ("", noise))
     looked = []
 
     def recorded(*arguments, anyway: bool = False, **more) -> Step:
         looked.extend([] if anyway else [arguments])
         return look_further(*arguments, anyway=anyway, **more)
 
-    monkeypatch.setattr("forcegrasp.diagnosis.search.look_further", recorded)
+    monkeypatch.setattr("forcegrasp.diagnosis.search.search.look_further", recorded)
     chosen = [effect_of(name, target.gripper) for name in ("coulomb_friction", "motor_offset")]
     diagnosis = diagnose(target, base, simulators, chosen, np.random.default_rng(0))
     assert diagnosis.preferred[0] == "coulomb_friction"

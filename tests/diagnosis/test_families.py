@@ -8,13 +8,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from forcegrasp.diagnosis import families, step
+from forcegrasp.diagnosis import families
 from forcegrasp.diagnosis.add_effect import add_effect
 from forcegrasp.diagnosis.diagnose_set import diagnose_set
 from forcegrasp.diagnosis.evidence import add_nothing
 from forcegrasp.diagnosis.result import kept_steps
-from forcegrasp.diagnosis.search import left_to_try
-from forcegrasp.diagnosis.step import _Start
+from forcegrasp.diagnosis.search import step
+from forcegrasp.diagnosis.search.search import left_to_try
+from forcegrasp.diagnosis.search.step import _Start
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.effects import get_effect
 from forcegrasp.effects.for_gripper import effect_of, effects_of

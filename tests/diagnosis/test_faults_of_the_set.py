@@ -10,17 +10,17 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from forcegrasp.diagnosis import doubt
-from forcegrasp.diagnosis import odd_grasps as odd_grasps_module
 from forcegrasp.diagnosis.diagnose_set import diagnose_set
-from forcegrasp.diagnosis.doubt import with_fault
-from forcegrasp.diagnosis.faults import suspects
-from forcegrasp.diagnosis.felt_sizes import doubtful_radii
-from forcegrasp.diagnosis.moved_set import go_on_with_moved, within_tolerance_after_all
-from forcegrasp.diagnosis.odd_grasps import odd_grasps
+from forcegrasp.diagnosis.faults import odd_grasps as odd_grasps_module
+from forcegrasp.diagnosis.faults.felt_sizes import doubtful_radii
+from forcegrasp.diagnosis.faults.odd_grasps import odd_grasps
+from forcegrasp.diagnosis.faults.suspects import suspects
+from forcegrasp.diagnosis.faults.tolerance import move_given, wanted_moves
+from forcegrasp.diagnosis.givens import doubt
+from forcegrasp.diagnosis.givens.doubt import with_fault
+from forcegrasp.diagnosis.givens.moved_set import go_on_with_moved, within_tolerance_after_all
 from forcegrasp.diagnosis.result import Diagnosis
-from forcegrasp.diagnosis.search import diagnose
-from forcegrasp.diagnosis.tolerance import move_given, wanted_moves
+from forcegrasp.diagnosis.search.search import diagnose
 from forcegrasp.effects import get_effect
 from forcegrasp.effects.for_gripper import effect_of
 from forcegrasp.effects.setting import EffectSetting
@@ -503,8 +503,9 @@ def test_what_was_sought_in_vain_is_not_sought_again_after_a_small_move(sound, m
     monkeypatch.setattr(module, "diagnose", diagnosed)
     monkeypatch.setattr(module, "suspects", lambda *_: [])
     monkeypatch.setattr(module, "go_on_with_moved", moved)
-    monkeypatch.setattr("forcegrasp.diagnosis.moved_set.first_move", lambda *_: (SimpleNamespace(is_within=True), 1.0))
-    monkeypatch.setattr("forcegrasp.diagnosis.left_out.most_missed", lambda *_: ())
+    within = SimpleNamespace(is_within=True), 1.0
+    monkeypatch.setattr("forcegrasp.diagnosis.givens.moved_set.first_move", lambda *_: within)
+    monkeypatch.setattr("forcegrasp.diagnosis.givens.left_out.most_missed", lambda *_: ())
     for name in ("may_be_late_rows", "timing_within_tolerance_after_all"):
         monkeypatch.setattr(module, name, lambda one, *_: one)
     diagnose_set(sound[0], sound[1], [], 0, silent)

@@ -11,8 +11,8 @@ import pytest
 
 from forcegrasp.diagnosis import signatures
 from forcegrasp.diagnosis.few import few_grasps, with_few
-from forcegrasp.diagnosis.refine import _adds_nothing, _in_the_race
-from forcegrasp.diagnosis.screen import Screen
+from forcegrasp.diagnosis.search.refine import _adds_nothing, _in_the_race
+from forcegrasp.diagnosis.search.screen import Screen
 from forcegrasp.diagnosis.signatures import Background
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.effects import get_effect

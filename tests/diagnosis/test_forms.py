@@ -9,12 +9,12 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from forcegrasp.diagnosis import forms, search
-from forcegrasp.diagnosis.conclusion import Begun
-from forcegrasp.diagnosis.forms import done_by_each, may_be_forms
-from forcegrasp.diagnosis.left_over import is_worth_looking
-from forcegrasp.diagnosis.refine import fit_with
 from forcegrasp.diagnosis.result import Step
+from forcegrasp.diagnosis.search import forms, search
+from forcegrasp.diagnosis.search.conclusion import Begun
+from forcegrasp.diagnosis.search.forms import done_by_each, may_be_forms
+from forcegrasp.diagnosis.search.left_over import is_worth_looking
+from forcegrasp.diagnosis.search.refine import fit_with
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.effects.for_gripper import effect_of
 from forcegrasp.effects.setting import EffectSetting

@@ -6,8 +6,8 @@ import dataclasses
 
 import pytest
 
-from forcegrasp.diagnosis import givens_besides
 from forcegrasp.diagnosis.diagnose_set import diagnose_set
+from forcegrasp.diagnosis.givens import givens_besides
 from forcegrasp.diagnosis.result import Diagnosis
 from forcegrasp.identify.fitted_model import model_of
 from forcegrasp.identify.loading import Loaded

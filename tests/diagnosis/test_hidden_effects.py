@@ -10,7 +10,7 @@ import pytest
 
 from forcegrasp.diagnosis.add_effect import add_effect
 from forcegrasp.diagnosis.diagnose_set import diagnose_set
-from forcegrasp.diagnosis.law import find_law
+from forcegrasp.diagnosis.law.law import find_law
 from forcegrasp.effects import get_effect
 from forcegrasp.errors import ConfigError, MeasurementError
 from forcegrasp.identify.fit_set import fit_model

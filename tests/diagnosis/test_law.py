@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from forcegrasp.diagnosis.diagnose_set import diagnose_set
-from forcegrasp.diagnosis.law_terms import LIBRARY, along, likely_periods, terms
+from forcegrasp.diagnosis.law.law_terms import LIBRARY, along, likely_periods, terms
 from forcegrasp.effects.law import make_law
 from forcegrasp.errors import ConfigError
 from forcegrasp.identify.verdict import Verdict

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from forcegrasp.diagnosis.diagnose_set import diagnose_set
-from forcegrasp.diagnosis.left_out import is_answer, most_missed, without
+from forcegrasp.diagnosis.givens.left_out import is_answer, most_missed, without
 from forcegrasp.identify.verdict import Verdict
 from forcegrasp.reports.diagnosis import answer, diagnosis_json
 from forcegrasp.reports.diagnosis_box import answer_box

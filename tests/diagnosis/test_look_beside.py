@@ -7,10 +7,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from forcegrasp.diagnosis import look_beside as module
-from forcegrasp.diagnosis import search
-from forcegrasp.diagnosis.look_beside import look_beside
 from forcegrasp.diagnosis.result import Step
+from forcegrasp.diagnosis.search import look_beside as module
+from forcegrasp.diagnosis.search import search
+from forcegrasp.diagnosis.search.look_beside import look_beside
 
 TRUE, READINGS = 8.0, 50
 

@@ -7,11 +7,11 @@ import dataclasses
 import numpy as np
 import pytest
 
-from forcegrasp.diagnosis.faults import Fault
-from forcegrasp.diagnosis.lost_motion import with_lost_motion
-from forcegrasp.diagnosis.moved_set import _Model, _with_lost_motion
+from forcegrasp.diagnosis.faults.suspects import Fault
+from forcegrasp.diagnosis.faults.tolerance import Moved, _limits, _Number, _numbers
+from forcegrasp.diagnosis.givens.lost_motion import with_lost_motion
+from forcegrasp.diagnosis.givens.moved_set import _Model, _with_lost_motion
 from forcegrasp.diagnosis.study import Study
-from forcegrasp.diagnosis.tolerance import Moved, _limits, _Number, _numbers
 from forcegrasp.effects import get_effect
 from forcegrasp.identify.cross_validation import evidence_folds
 from forcegrasp.identify.fit_set import fit_model

@@ -7,8 +7,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from forcegrasp.diagnosis.merge import merge, promising
 from forcegrasp.diagnosis.result import Candidate, Step
+from forcegrasp.diagnosis.search.merge import merge, promising
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.effects import get_effect
 from forcegrasp.effects.for_gripper import effect_of, effects_of
@@ -68,7 +68,7 @@ def test_what_promises_less_than_half_of_what_both_explain_is_not_fitted(late, m
     study, _, fit = late
     delay, *others = (effect_of(name, light_gripper()) for name in ("command_delay", "force_bias", "force_drift"))
     assert promising(study, fit, LATE, [delay, *others]) == [delay]
-    monkeypatch.setattr("forcegrasp.diagnosis.merge._PROMISE", -1.0)
+    monkeypatch.setattr("forcegrasp.diagnosis.search.merge._PROMISE", -1.0)
     assert set(promising(study, fit, LATE, [delay, *others])) > {delay}
 
 

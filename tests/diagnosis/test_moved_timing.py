@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from forcegrasp.diagnosis.moved_set import timing_within_tolerance_after_all
+from forcegrasp.diagnosis.givens.moved_set import timing_within_tolerance_after_all
 from forcegrasp.effects import get_effect
 from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.identify.problem import Problem

@@ -9,9 +9,9 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from forcegrasp.diagnosis import moved_set
-from forcegrasp.diagnosis.moved_set import MovesFirst
-from forcegrasp.diagnosis.refine import fit_with
+from forcegrasp.diagnosis.givens import moved_set
+from forcegrasp.diagnosis.givens.moved_set import MovesFirst
+from forcegrasp.diagnosis.search.refine import fit_with
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.effects.for_gripper import effect_of
 from forcegrasp.effects.setting import EffectSetting

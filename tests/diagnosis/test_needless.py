@@ -8,9 +8,9 @@ import functools
 import numpy as np
 import pytest
 
-from forcegrasp.diagnosis import needless
-from forcegrasp.diagnosis.needless import drop_all_needless, drop_needless, simplify
 from forcegrasp.diagnosis.result import Candidate, Step, kept_steps
+from forcegrasp.diagnosis.search import needless
+from forcegrasp.diagnosis.search.needless import drop_all_needless, drop_needless, simplify
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.effects.for_gripper import effect_of
 from forcegrasp.effects.setting import EffectSetting

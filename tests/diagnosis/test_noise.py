@@ -8,8 +8,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from forcegrasp.diagnosis.left_over import left_by_many, left_over
-from forcegrasp.diagnosis.noise_check import Noise, is_uneven_noise, unexpected_noise
+from forcegrasp.diagnosis.noise.noise_check import Noise, is_uneven_noise, unexpected_noise
+from forcegrasp.diagnosis.search.left_over import left_by_many, left_over
 from forcegrasp.diagnosis.signatures import Score, null_gains
 from forcegrasp.effects import get_effect
 from forcegrasp.effects.setting import EffectSetting

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from forcegrasp.diagnosis.other_starts import other_starts
+from forcegrasp.diagnosis.search.other_starts import other_starts
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.effects.for_gripper import effect_of
 from forcegrasp.effects.setting import EffectSetting

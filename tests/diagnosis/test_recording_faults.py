@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from forcegrasp.diagnosis.diagnose_set import diagnose_set
-from forcegrasp.diagnosis.faults import suspects
+from forcegrasp.diagnosis.faults.suspects import suspects
 from forcegrasp.identify.cross_validation import rms
 from forcegrasp.identify.fit import Fit, fit_exactly
 from forcegrasp.identify.loading import Loaded

@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from forcegrasp.diagnosis.session_drift import session_drift
+from forcegrasp.diagnosis.faults.session_drift import session_drift
 from forcegrasp.identify.fit_set import apply_model
 from tests.diagnosis.test_faults_of_the_set import changed, silent, with_model
 from tests.light_set import light_set

@@ -9,14 +9,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from forcegrasp.diagnosis import at_once, conclusion, search, several
 from forcegrasp.diagnosis.families import roughly_without
 from forcegrasp.diagnosis.few import with_few
-from forcegrasp.diagnosis.judge import judged
-from forcegrasp.diagnosis.refine import fit_with
 from forcegrasp.diagnosis.result import Step
-from forcegrasp.diagnosis.screen import Screen
-from forcegrasp.diagnosis.several import (
+from forcegrasp.diagnosis.search import at_once, conclusion, search, several
+from forcegrasp.diagnosis.search.judge import judged
+from forcegrasp.diagnosis.search.refine import fit_with
+from forcegrasp.diagnosis.search.screen import Screen
+from forcegrasp.diagnosis.search.several import (
     _needed,
     add_several,
     add_up,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from forcegrasp.diagnosis.slow_noise import fit_slow_part, innovations, through_filter
+from forcegrasp.diagnosis.noise.slow_noise import fit_slow_part, innovations, through_filter
 
 
 def noise(memory: float, share: float, grasps: int = 200, samples: int = 150) -> np.ndarray:

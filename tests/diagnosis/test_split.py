@@ -7,9 +7,9 @@ import pytest
 
 from forcegrasp.diagnosis.families import roughly_without
 from forcegrasp.diagnosis.few import with_few
-from forcegrasp.diagnosis.screen import Screen
-from forcegrasp.diagnosis.split import split
-from forcegrasp.diagnosis.step import look_further
+from forcegrasp.diagnosis.search.screen import Screen
+from forcegrasp.diagnosis.search.split import split
+from forcegrasp.diagnosis.search.step import look_further
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.effects.for_gripper import effect_of
 from forcegrasp.identify.cross_validation import make_folds

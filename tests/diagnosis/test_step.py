@@ -8,18 +8,18 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from forcegrasp.diagnosis import at_once, conclusion, search
-from forcegrasp.diagnosis import step as step_module
 from forcegrasp.diagnosis.families import look_alike
+from forcegrasp.diagnosis.faults.odd_grasps import OddGrasp
 from forcegrasp.diagnosis.few import with_few
-from forcegrasp.diagnosis.left_over import leaves_forms, leaves_little
-from forcegrasp.diagnosis.odd_grasps import OddGrasp
-from forcegrasp.diagnosis.refine import fit_with, refine_anyway
 from forcegrasp.diagnosis.result import Step, kept_steps
-from forcegrasp.diagnosis.screen import Screen
+from forcegrasp.diagnosis.search import at_once, conclusion, search
+from forcegrasp.diagnosis.search import step as step_module
+from forcegrasp.diagnosis.search.left_over import leaves_forms, leaves_little
+from forcegrasp.diagnosis.search.refine import fit_with, refine_anyway
+from forcegrasp.diagnosis.search.screen import Screen
+from forcegrasp.diagnosis.search.stalled_base import better_without
+from forcegrasp.diagnosis.search.step import _Start, look_further
 from forcegrasp.diagnosis.signatures import Score
-from forcegrasp.diagnosis.stalled_base import better_without
-from forcegrasp.diagnosis.step import _Start, look_further
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.effects import catalogue
 from forcegrasp.effects.for_gripper import effect_of
@@ -194,7 +194,7 @@ def test_signatures_that_promise_nothing_ask_for_no_fit_to_the_end_where_rough_f
 
 
 def test_where_noise_alone_is_left_no_look_alike_is_fitted(creeping, monkeypatch):
-    monkeypatch.setattr("forcegrasp.diagnosis.step.refine_anyway", lambda *_: pytest.fail("fitted another"))
+    monkeypatch.setattr("forcegrasp.diagnosis.search.step.refine_anyway", lambda *_: pytest.fail("fitted another"))
     assert looked(creeping, [PRESLIDING, SMOOTH], "smooth_friction").effects == ("smooth_friction",)
 
 
@@ -204,7 +204,9 @@ def test_what_explains_little_may_be_of_the_wrong_family(creeping, monkeypatch, 
     study, base = creeping
     best = dataclasses.replace(looked(creeping, [SMOOTH], anyway=True).candidates[0], share=share)
     tried = []
-    monkeypatch.setattr("forcegrasp.diagnosis.step.refine_anyway", lambda effects, *_: tried.extend(effects) or [])
+    monkeypatch.setattr(
+        "forcegrasp.diagnosis.search.step.refine_anyway", lambda effects, *_: tried.extend(effects) or []
+    )
     effects = list(catalogue().values())
     assert _Start(study, base.fit)._better_look_alikes(best, effects, np.zeros(1)) == []
     alike = {e for e in effects if look_alike(e, SMOOTH) and (of_any_family or e.family == SMOOTH.family)}
@@ -279,7 +281,7 @@ def test_a_search_fits_anyway_once_and_judges_odd_grasps_again(creeping, monkeyp
     monkeypatch.setattr(search, "look_further", step)
     for module in (search, conclusion):
         monkeypatch.setattr(module, "odd_grasps", odd)
-    monkeypatch.setattr("forcegrasp.diagnosis.left_over.left_over", lambda *_: ("somewhere", None))
+    monkeypatch.setattr("forcegrasp.diagnosis.search.left_over.left_over", lambda *_: ("somewhere", None))
     monkeypatch.setattr(search, "leaves_little", lambda *_: False)
     for module, name in ((search, "exchange"), (search, "split"), (at_once, "add_several")):
         monkeypatch.setattr(module, name, lambda *_: None)
@@ -310,8 +312,8 @@ def test_no_effect_is_tried_beside_what_leaves_little_unless_it_explains_half_of
     monkeypatch.setattr(conclusion, "may_be_forms", lambda *_: False)
     for module in (search, conclusion):
         monkeypatch.setattr(module, "odd_grasps", lambda *_: ())
-    monkeypatch.setattr("forcegrasp.diagnosis.left_over.left_over", lambda *_: ("somewhere", None))
-    monkeypatch.setattr("forcegrasp.diagnosis.left_over._LITTLE", little)
+    monkeypatch.setattr("forcegrasp.diagnosis.search.left_over.left_over", lambda *_: ("somewhere", None))
+    monkeypatch.setattr("forcegrasp.diagnosis.search.left_over._LITTLE", little)
     diagnosis = search.diagnose(study.target, base, study.simulators, [SMOOTH, DELAY], np.random.default_rng(0))
     assert diagnosis.preferred == (("smooth_friction",))
     assert list(asked[1]) == tried
@@ -363,7 +365,7 @@ def test_effects_that_promise_little_are_not_fitted_for_what_forms_leave(creepin
     monkeypatch.setattr(search, "look_further", step)
     for module in (search, conclusion):
         monkeypatch.setattr(module, "odd_grasps", lambda *_: ())
-    monkeypatch.setattr("forcegrasp.diagnosis.left_over.left_over", lambda *_: ("somewhere", None))
+    monkeypatch.setattr("forcegrasp.diagnosis.search.left_over.left_over", lambda *_: ("somewhere", None))
     monkeypatch.setattr(search, "leaves_little", lambda *_: False)
     monkeypatch.setattr(search, "leaves_forms", lambda *_: of_forms)
     for module, name in ((search, "exchange"), (search, "split"), (at_once, "add_several")):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from forcegrasp.diagnosis.stray_readings import stray_readings, without_spikes
+from forcegrasp.diagnosis.noise.stray_readings import stray_readings, without_spikes
 
 G, S, C = 24, 150, 4
 PHASE = np.tile(np.arange(S) // 30, (G, 1))

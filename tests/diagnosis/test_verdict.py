@@ -9,7 +9,6 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from forcegrasp.diagnosis import at_once, conclusion, search
 from forcegrasp.diagnosis.evidence import (
     LEAST_SHARE_OF_MANY,
     indistinguishable,
@@ -17,8 +16,9 @@ from forcegrasp.diagnosis.evidence import (
     with_close_rivals,
 )
 from forcegrasp.diagnosis.result import Diagnosis, Step, settle_ties
+from forcegrasp.diagnosis.search import at_once, conclusion, search
+from forcegrasp.diagnosis.search.step import _Start
 from forcegrasp.diagnosis.signatures import Score, _single, of_best_effects, share_together
-from forcegrasp.diagnosis.step import _Start
 from forcegrasp.diagnosis.verdict import conclude, explained_share
 from forcegrasp.effects import get_effect
 from forcegrasp.effects.setting import EffectSetting

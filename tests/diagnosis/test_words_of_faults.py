@@ -7,8 +7,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from forcegrasp.diagnosis.faults import Fault
-from forcegrasp.diagnosis.tolerance import Moved, _Number
+from forcegrasp.diagnosis.faults.suspects import Fault
+from forcegrasp.diagnosis.faults.tolerance import Moved, _Number
 from forcegrasp.effects import get_effect
 from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.identify.problem import Problem

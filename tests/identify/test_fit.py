@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from forcegrasp.diagnosis import refine as refine_module
 from forcegrasp.diagnosis import signatures as score_module
-from forcegrasp.diagnosis.refine import refine
 from forcegrasp.diagnosis.result import Diagnosis
-from forcegrasp.diagnosis.search import diagnose
+from forcegrasp.diagnosis.search import refine as refine_module
+from forcegrasp.diagnosis.search.refine import refine
+from forcegrasp.diagnosis.search.search import diagnose
 from forcegrasp.diagnosis.signatures import Background, Score, Signatures, best_sizes, trials
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.effects import get_effect

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from forcegrasp.diagnosis.diagnose_set import chosen_effects, diagnose_set
-from forcegrasp.diagnosis.noise_check import unexpected_noise
+from forcegrasp.diagnosis.noise.noise_check import unexpected_noise
 from forcegrasp.errors import ConfigError, MeasurementError
 from forcegrasp.identify import loading, windows
 from forcegrasp.identify.comparison import compare

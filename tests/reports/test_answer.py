@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 import yaml
 
-from forcegrasp.diagnosis.faults import Fault
-from forcegrasp.diagnosis.odd_grasps import OddGrasp
+from forcegrasp.diagnosis.faults.odd_grasps import OddGrasp
+from forcegrasp.diagnosis.faults.suspects import Fault
+from forcegrasp.diagnosis.faults.tolerance import Moved
 from forcegrasp.diagnosis.result import Diagnosis
-from forcegrasp.diagnosis.tolerance import Moved
 from forcegrasp.effects import get_effect
 from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.identify.fitted_model import model_of

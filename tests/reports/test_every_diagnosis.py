@@ -9,11 +9,11 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from forcegrasp.diagnosis.faults import Fault
-from forcegrasp.diagnosis.noise_check import Noise
-from forcegrasp.diagnosis.odd_grasps import OddGrasp
+from forcegrasp.diagnosis.faults.odd_grasps import OddGrasp
+from forcegrasp.diagnosis.faults.suspects import Fault
+from forcegrasp.diagnosis.faults.tolerance import Moved, _Number
+from forcegrasp.diagnosis.noise.noise_check import Noise
 from forcegrasp.diagnosis.result import Diagnosis
-from forcegrasp.diagnosis.tolerance import Moved, _Number
 from forcegrasp.identify.verdict import Verdict
 from forcegrasp.reports import diagnosis as report
 from forcegrasp.reports.diagnosis_box import answer_box

@@ -6,7 +6,7 @@ import ast
 
 import pytest
 
-from forcegrasp.diagnosis.law_terms import LIBRARY
+from forcegrasp.diagnosis.law.law_terms import LIBRARY
 from tests.independent.catalogue import OUTSIDE
 from tools.hidden_effects_judge import TERMS, false_names, families, has_right_term, judge, named_of, settled
 

@@ -1,0 +1,1 @@
+"""What a measurement set may say wrongly: objects, columns, rows, clocks and recordings."""

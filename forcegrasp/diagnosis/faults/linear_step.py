@@ -1,0 +1,25 @@
+"""How much of something that the base model lacks there is, by a linear step from its fit."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from forcegrasp.diagnosis.faults.shifted_rows import left_beyond_noise
+from forcegrasp.diagnosis.signatures import Background
+from forcegrasp.identify.fit import Fit
+from forcegrasp.identify.target import Target
+
+
+def linear_step(target: Target, fit: Fit, background: Background, per_unit: np.ndarray) -> tuple[np.ndarray, float]:
+    """The sizes that take most off what a fit leaves, and the sum of squares beyond the noise that they leave.
+
+    Args:
+      target: the measurements.
+      fit: of the base model.
+      background: what its parameters follow.
+      per_unit: what a unit of each thing adds to the signals, m and N, ``(G, S, C, things)``.
+    """
+    columns = np.where(target.mask[..., None, None], per_unit / target.sigma[:, None], 0.0)
+    clean = background.remove((fit.weight[..., None] * columns).reshape(-1, columns.shape[-1]))
+    sizes = np.linalg.lstsq(clean, (fit.weight * fit.residual).ravel(), rcond=None)[0]
+    return sizes, left_beyond_noise(fit.residual - columns @ sizes, background, target)

@@ -1,0 +1,1 @@
+"""A law for what no effect explains."""

@@ -1,0 +1,1 @@
+"""The search for missing effects, step by step, and what is asked again once more are known."""
