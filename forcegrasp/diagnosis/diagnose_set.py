@@ -23,7 +23,8 @@ from forcegrasp.diagnosis.givens.moved_set import (
 )
 from forcegrasp.diagnosis.law.law import find_law
 from forcegrasp.diagnosis.result import Diagnosis, Step
-from forcegrasp.diagnosis.search.search import MayBeGiven, diagnose
+from forcegrasp.diagnosis.search.search import diagnose
+from forcegrasp.diagnosis.search.stop_when import AT_ITS_END, StopWhen, always, never
 from forcegrasp.diagnosis.verdict import EXPLAINED_FAR, MUCH, explained_share
 from forcegrasp.effects import Effect
 from forcegrasp.effects.for_gripper import effect_of, effects_of
@@ -46,6 +47,8 @@ from forcegrasp.physics.gripper import Gripper
 LEAST_GRASPS = 6
 # An effect does not do as well as a set put right if it leaves more than so many times the squares.
 _AS_WELL = 2.0
+# Effects whose signatures promise too little are not fitted.
+_BRIEFLY = StopWhen(may_be_given=always)
 #: A diagnosis, and what simulates its grasps.
 Found = tuple[Diagnosis, Simulators]
 
@@ -111,15 +114,11 @@ class _Ways:
         simulators: Simulators,
         base: BaseFit,
         start: tuple[Fit, Sequence[Step]] | None = None,
-        may_be_given: MayBeGiven | None = None,
-        most: float = np.inf,
-        given_first: MayBeGiven | None = None,
+        stop_when: StopWhen = AT_ITS_END,
     ) -> Diagnosis:
         """See :func:`.search.diagnose`."""
         rng = np.random.default_rng(self.seed + 1)
-        return diagnose(
-            target, base, simulators, self.effects, rng, self.progress, start, may_be_given, most, given_first
-        )
+        return diagnose(target, base, simulators, self.effects, rng, self.progress, start, stop_when)
 
     def moved(self, found: Diagnosis, loaded: Loaded[MeasurementSet], briefly: bool = False) -> Found | None:
         """The diagnosis with what the set gives moved within its tolerance; None if nothing asks for that.
@@ -129,7 +128,7 @@ class _Ways:
           loaded: the set.
           briefly: effects that promise too little are not fitted again: all were, and the move changes little.
         """
-        search_on = partial(self._search_on, may_be_given=_it_is if briefly else None)
+        search_on = partial(self._search_on, stop_when=_BRIEFLY if briefly else AT_ITS_END)
         further = go_on_with_moved(found, loaded, search_on, self.progress, self.effects)
         if further is None and found.bolder is not None:
             further = go_on_with_moved(found.bolder, loaded, search_on, self.progress, self.effects)
@@ -138,9 +137,9 @@ class _Ways:
 
     def _search_on(
         self, target: Target, simulators: Simulators, base: BaseFit, fit: Fit, steps: Sequence[Step],
-        may_be_given: MayBeGiven | None = None,
+        stop_when: StopWhen = AT_ITS_END,
     ) -> Diagnosis:  # fmt: skip
-        return self.search(target, simulators, base, (fit, steps), may_be_given)
+        return self.search(target, simulators, base, (fit, steps), stop_when)
 
     def search_and_move(self, loaded: Loaded[MeasurementSet], fitted: Fitted) -> tuple[Diagnosis, Found | None]:
         """The diagnosis of a set; and that with moves within its tolerance, or without some grasps, if it wants any."""
@@ -150,8 +149,8 @@ class _Ways:
             move = moves is not None and moves(target, fit)
             return leave_out(target, fit) or move
 
-        given_first = None if moves is None else moves.before_more
-        found = self.search(*fitted, may_be_given=something_else_first, given_first=given_first)
+        given_first = never if moves is None else moves.before_more
+        found = self.search(*fitted, stop_when=StopWhen(something_else_first, given_first))
         if found.stopped:
             return found, None
         try:
@@ -177,7 +176,7 @@ class _Ways:
         self.progress(f"fitting the set without {listed(names)}, which the model misses most")
         rest = without(loaded, names)
         of_rest, simulators, base = self.fitted(rest)
-        found = self.search(of_rest, simulators, base, may_be_given=_it_is)
+        found = self.search(of_rest, simulators, base, stop_when=_BRIEFLY)
         further = None if found.stopped else self.moved(found, rest)
         found, simulators = further or (found, simulators)
         return told_of(found, names, target), simulators
@@ -208,11 +207,6 @@ class _Ways:
         return fault, right
 
 
-def _it_is(_target: Target, _fit: Fit) -> bool:
-    """What the set gives explains what is left, so that effects which promise too little are not fitted."""
-    return True
-
-
 def _put_right_or_as_said(ways: _Ways, loaded: Loaded[MeasurementSet], said: Fitted) -> Found:
     """The diagnosis with the first fault put right that makes the set likelier; of the set as it is if none does."""
     for suspect in suspects(loaded, said[0], said[2].fit):
@@ -233,7 +227,8 @@ def _put_right_or_as_said(ways: _Ways, loaded: Loaded[MeasurementSet], said: Fit
             # where next to nothing is left what does as well would show at once
             left = explained_share(likely.error_before, likely.error_after, noise=likely.floor) < EXPLAINED_FAR
             most = np.inf if left else _AS_WELL * further.fit.cost
-            as_it_is = ways.search(*said, may_be_given=None if left and likely.left else _it_is, most=most)
+            given = never if left and likely.left else always
+            as_it_is = ways.search(*said, stop_when=StopWhen(given, most=most))
             likely = dataclasses.replace(more_likely(likely, as_it_is), stopped=as_it_is.stopped)
         return likely, right[1] if likely.target.grasps is right[0].grasps else said[1]
     found, further = ways.search_and_move(loaded, said)

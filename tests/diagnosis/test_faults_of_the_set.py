@@ -21,6 +21,7 @@ from forcegrasp.diagnosis.givens.doubt import with_fault
 from forcegrasp.diagnosis.givens.moved_set import go_on_with_moved, within_tolerance_after_all
 from forcegrasp.diagnosis.result import Diagnosis
 from forcegrasp.diagnosis.search.search import diagnose
+from forcegrasp.diagnosis.search.stop_when import StopWhen, always
 from forcegrasp.effects import get_effect
 from forcegrasp.effects.for_gripper import effect_of
 from forcegrasp.effects.setting import EffectSetting
@@ -131,11 +132,11 @@ def test_in_place_of_a_fault_that_leaves_next_to_nothing_an_effect_must_do_as_we
     monkeypatch.setattr(module, "with_fault", with_some_left)
     monkeypatch.setattr(module, "diagnose", lambda *asked: searched.append(asked) or diagnose(*asked))
     diagnose_set(wrong, None, ["backlash"], 0, silent)
-    (right, *_, unlimited, _), *_, (said, *_, may_be_given, most, _) = searched
+    (right, *_, unlimited), *_, (said, *_, stop_when) = searched
     assert [None in {g.radius_m for g in target.grasps} for target in (right, said)] == [True, False]
-    assert unlimited == np.inf
-    assert (may_be_given is not None) == limited
-    assert (most < np.inf) == limited
+    assert unlimited.most == np.inf
+    assert stop_when.may_be_given(None, None) == limited
+    assert (stop_when.most < np.inf) == limited
 
 
 def test_the_first_effect_must_come_down_to_what_is_asked_for(sound):
@@ -144,7 +145,7 @@ def test_the_first_effect_must_come_down_to_what_is_asked_for(sound):
     target, simulators, base = apply_model(late, model, silent, refit=True)
     delays = [effect_of("command_delay", loaded.gripper)]
     found = [
-        diagnose(target, base, simulators, delays, np.random.default_rng(0), silent, None, lambda *_: True, most)
+        diagnose(target, base, simulators, delays, np.random.default_rng(0), silent, None, StopWhen(always, most=most))
         for most in (np.inf, -np.inf)
     ]
     assert [one.effects for one in found] == [("command_delay",), ()]
@@ -491,10 +492,10 @@ def test_what_was_sought_in_vain_is_not_sought_again_after_a_small_move(sound, m
     asked = []
 
     def diagnosed(*args):
-        *_, may_be_given, _, _ = args
-        asked.append(may_be_given)
+        *_, stop_when = args
+        asked.append(stop_when)
         if len(asked) == 1 and promised_much:
-            may_be_given(found.target, found.fit)
+            stop_when.may_be_given(found.target, found.fit)
         return found
 
     def moved(one, loaded, search_on, *_):
@@ -510,8 +511,7 @@ def test_what_was_sought_in_vain_is_not_sought_again_after_a_small_move(sound, m
         monkeypatch.setattr(module, name, lambda one, *_: one)
     diagnose_set(sound[0], sound[1], [], 0, silent)
     _, again = asked
-    assert (again is None) == promised_much
-    assert promised_much or again(found.target, found.fit)
+    assert again.may_be_given(found.target, found.fit) == (not promised_much)
 
 
 def test_swapped_labels_are_told_and_nothing_else_is_looked_for(sound):

@@ -26,6 +26,7 @@ from forcegrasp.diagnosis.search.several import (
     share_of_one,
     usual_on_few,
 )
+from forcegrasp.diagnosis.search.stop_when import StopWhen
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.effects.for_gripper import effect_of
 from forcegrasp.effects.setting import EffectSetting
@@ -179,7 +180,9 @@ def test_no_more_are_looked_for_where_what_is_given_explains_most_of_what_they_l
     monkeypatch.setattr(several, "_AT_ONCE", 2)
     monkeypatch.setattr(at_once, "EXPLAINED_FAR", 0.5)
     rng = np.random.default_rng(0)
-    diagnosis = search.diagnose(study.target, base, study.simulators, CATALOGUE, rng, given_first=given_first)
+    diagnosis = search.diagnose(
+        study.target, base, study.simulators, CATALOGUE, rng, stop_when=StopWhen(given_first=given_first)
+    )
     assert len(diagnosis.preferred) == 2
     assert asked == [set(diagnosis.preferred)] * 2  # the base model is not asked
     assert diagnosis.left

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,14 +13,12 @@ from forcegrasp.diagnosis.search.left_over import leaves_little, left_over
 from forcegrasp.diagnosis.search.screen import Screen
 from forcegrasp.diagnosis.search.several import add_several, add_up, none_stands_out, share_of_all, share_of_one
 from forcegrasp.diagnosis.search.so_far import SoFar
+from forcegrasp.diagnosis.search.stop_when import Asked
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.diagnosis.verdict import EXPLAINED_FAR, explained_share
 from forcegrasp.effects import Effect
 from forcegrasp.identify.fit import Fit
-from forcegrasp.identify.target import Target
 
-#: Whether what a set gives, moved within its tolerance, may explain what a fit leaves.
-MayBeGiven = Callable[[Target, Fit], bool]
 # Beyond so many times the floor, beside an effect that was found, several others are added at once if none of them
 # stands out; or whether one does or not.
 _MUCH_LEFT, _VERY_MUCH_LEFT = 3.0, 5.0
@@ -35,7 +33,7 @@ class AtOnce:
     so_far: SoFar
     begun: Begun
     rng: np.random.Generator
-    given_first: MayBeGiven | None  #: see :func:`.search.diagnose`
+    given_first: Asked  #: see :class:`.StopWhen`
     done: bool = False  #: whether it was: no other effect promises anything beside what it found
     _asked: Fit | None = None  #: the fit that it was last tried for
     _added_up: Fit | None = None  #: the same of effects that add up
@@ -46,7 +44,7 @@ class AtOnce:
         Sizes of objects that are off by a little each, either way, look like effects that make up for one another.
         """
         found_some = len(fit.problem.effects) > self.begun.given
-        return found_some and self.given_first is not None and self.given_first(study.target, fit)
+        return found_some and self.given_first(study.target, fit)
 
     def are_likely(self, study: Study, fit: Fit, screen: Screen, untried: Sequence[type[Effect]]) -> bool:
         """Whether what is left, beside an effect that was found, is not that of one other."""

@@ -13,7 +13,7 @@ from forcegrasp.diagnosis.evidence import LEAST_SHARE_TOGETHER
 from forcegrasp.diagnosis.faults.odd_grasps import odd_grasps
 from forcegrasp.diagnosis.few import with_few
 from forcegrasp.diagnosis.result import Diagnosis, Step, kept_steps
-from forcegrasp.diagnosis.search.at_once import AtOnce, MayBeGiven
+from forcegrasp.diagnosis.search.at_once import AtOnce
 from forcegrasp.diagnosis.search.conclusion import Begun, concluded
 from forcegrasp.diagnosis.search.exchange import exchange
 from forcegrasp.diagnosis.search.left_over import (
@@ -32,6 +32,7 @@ from forcegrasp.diagnosis.search.so_far import SoFar
 from forcegrasp.diagnosis.search.split import split
 from forcegrasp.diagnosis.search.stalled_base import better_without
 from forcegrasp.diagnosis.search.step import look_further
+from forcegrasp.diagnosis.search.stop_when import AT_ITS_END, StopWhen
 from forcegrasp.diagnosis.search.to_the_end import FAR
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.diagnosis.verdict import EXPLAINED, EXPLAINED_FAR, MUCH, explained_share
@@ -61,9 +62,7 @@ def diagnose(
     rng: np.random.Generator,
     progress: Progress = silent,
     start: tuple[Fit, Sequence[Step]] | None = None,
-    may_be_given: MayBeGiven | None = None,
-    most: float = np.inf,
-    given_first: MayBeGiven | None = None,
+    stop_when: StopWhen = AT_ITS_END,
 ) -> Diagnosis:
     """Adds effects to a fitted base model for as long as the evidence holds.
 
@@ -75,11 +74,7 @@ def diagnose(
       rng: for the null distribution.
       progress: told what is going on.
       start: a fit with the effects that steps have found before, to go on from; the base model by default.
-      may_be_given: whether what the set gives, moved within its tolerance, may explain what a fit leaves: then effects
-        that promise too little are not fitted.
-      most: cost that the first effect must come down to; one that is too far from it is not looked for.
-      given_first: whether what the set gives, moved within its tolerance, explains most of what a fit with effects
-        leaves: then no more are looked for, and what was found is told without rivals, for the set to be moved first.
+      stop_when: what shortens or ends it beside what it finds.
 
     Ctrl-C, or the end of a time limit, ends the search with what was found by then.
     """
@@ -103,16 +98,14 @@ def diagnose(
     so_far = SoFar((study, steps, first))
     try:
         if start is None or is_worth_looking(study, first):
-            better = _add_effects(so_far, begun, rng, may_be_given, most, given_first)
+            better = _add_effects(so_far, begun, rng, stop_when)
             if better is not None:
                 progress(f"without it the model fits as well from there: {rms_error(better, target):.2f} × noise")
                 if start is None:
                     base = dataclasses.replace(base, fit=better)
                 else:
                     start = better, before
-                return diagnose(
-                    target, base, simulators, effects, rng, progress, start, may_be_given, most, given_first
-                )
+                return diagnose(target, base, simulators, effects, rng, progress, start, stop_when)
         if so_far.given_first:
             return concluded(begun, *so_far.all, in_a_hurry=True)
         _tidy_up(so_far, begun)
@@ -122,15 +115,12 @@ def diagnose(
         return dataclasses.replace(concluded(begun, *so_far.sure, in_a_hurry=True), stopped=stopped)
 
 
-def _add_effects(
-    so_far: SoFar, begun: Begun, rng: np.random.Generator, may_be_given: MayBeGiven | None, most: float,
-    given_first: MayBeGiven | None,
-) -> Fit | None:  # fmt: skip
+def _add_effects(so_far: SoFar, begun: Begun, rng: np.random.Generator, stop_when: StopWhen) -> Fit | None:
     """Adds one effect after the other; or returns a better fit without any, where the one to begin with had stalled."""
     effects = begun.effects
     study, steps, fit = so_far.all
     screen, screened, tried_anyway = Screen(effects, study), fit, False
-    several = AtOnce(so_far, begun, rng, given_first)
+    several = AtOnce(so_far, begun, rng, stop_when.given_first)
     for _ in range(MOST_EFFECTS):
         if several.given_is_first(study, fit):
             study.progress("what the set gives explains most of what is left, moved by a little")
@@ -154,12 +144,12 @@ def _add_effects(
         ):
             _, steps, fit = so_far.all
             continue
-        step = look_further(study, fit, screen, untried, rng, richer, most if fit is begun.fit else np.inf)
+        step = look_further(study, fit, screen, untried, rng, richer, stop_when.most if fit is begun.fit else np.inf)
         step = _of_another(step, study) if forms else step
         # what is on trial has no look-alikes that are worth the time, and what was found together takes too long
         much = (step.of_many or not step.effects) and so_far.believed is None and not several.done
         much = much and step.error_before > AS_GOOD_AS_NOTHING * begun.floor
-        much = much and not (may_be_given is not None and may_be_given(study.target, fit))
+        much = much and not stop_when.may_be_given(study.target, fit)
         if much and untried and screened is not fit:  # beside what was found since, others may do something else
             screen, screened = Screen(effects, study), fit
             step = look_further(study, fit, screen, untried, rng, before=step.candidates)
