@@ -304,10 +304,12 @@ def noise_words(diagnosis: Diagnosis) -> str:
     if slow:
         part = "in part " if min(noise.slow_share[slow]) < _ALL_SLOW else ""
         shape = f"{part}slow, as behind a filter ({', '.join(words(names[k]) for k in slow)}), foretold by nothing"
-    return (
-        f"But the noise is not what was {source}: {sizes}. The residuals are {shape} and alike in all phases,"
-        f" which no missing effect makes. To do: {again}."
-    )
+    other = f"is not what was {source}: {sizes}"
+    if noise.has_tails_alone:
+        which = listed([words(names[k]) for k in range(len(names)) if noise.affected[k]])
+        other = f"of {which} has heavy tails, and the size that was {source}"
+    no_effect = f"The residuals are {shape} and alike in all phases, which no missing effect makes."
+    return f"But the noise {other}. {no_effect}" + ("" if noise.has_tails_alone else f" To do: {again}.")
 
 
 def _scatter(what: str, ratio: float, heavy: bool) -> str:

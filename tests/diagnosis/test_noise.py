@@ -19,6 +19,7 @@ from forcegrasp.identify.target import Target
 from forcegrasp.measure import MeasuredGrasp
 from forcegrasp.physics.gripper_file import load_gripper
 from forcegrasp.reports import diagnosis as diagnosis_report
+from forcegrasp.reports.next_step import after_diagnosis
 
 G, S, MANY = 8, 150, 24
 TIAGO = load_gripper("tiago")
@@ -322,6 +323,18 @@ def test_the_answer_tells_the_noise(made_up):
         "slow_share": 1.0,
     }
     assert found["where"]["explainable"] == 0
+
+
+@pytest.mark.parametrize(("times", "tails_alone"), [(0.97, True), (1.2, False)])
+def test_noise_of_the_given_size_with_heavy_tails_is_not_to_be_given_anew(made_up, times, tails_alone):
+    diagnosis = of(made_up, "explained", [times, 1.0, 1.0, 1.0], [0.7] * 4, [True, False, False, False])
+    answer, commands = (
+        diagnosis_report.answer(diagnosis),
+        after_diagnosis(diagnosis, None, "s", "known.yaml", "found.yaml"),
+    )
+    assert ("the noise of position left has heavy tails, and the size that was given" in answer) == tails_alone
+    assert ("To do: give position_std_m" in answer) != tails_alone
+    assert any("give the noise" in command.purpose for command in commands) != tails_alone
 
 
 def test_noise_that_is_slow_in_part_is_called_so(made_up):

@@ -28,6 +28,8 @@ _QUANTILES, _OUTLIER, _LEAST_SHARE = (0.25, 0.5, 0.75, 0.9, 0.97), 4.0, 1e-3
 _SMALLER = 0.8
 # rms ÷ core above which tails are heavy: 1 if the noise is normal, 1.5 with three degrees of freedom.
 _HEAVY = 1.2
+# Whose rms is off by less has the size that was assumed.
+_AS_ASSUMED = 0.05
 # Noise may lean on the reading before it by so much; slower, it can't be told from a model's error. Of noise that does
 # the state may explain this share of the mean square.
 _SLOWEST, _BY_STATE = 0.98, 0.05
@@ -59,6 +61,12 @@ class Noise:
     def heavy_tails(self) -> np.ndarray:
         """Which of these signals have more outliers than a normal distribution, ``(C,)``."""
         return self.affected & (self.has_stray | (self.ratio > _HEAVY * self.core))
+
+    @property
+    def has_tails_alone(self) -> bool:
+        """Whether these signals scatter as much as was assumed, and only have more outliers."""
+        as_assumed = np.abs(self.ratio - 1) < _AS_ASSUMED
+        return bool(np.all((as_assumed & self.heavy_tails)[self.affected]))
 
     @property
     def stronger(self) -> bool:
