@@ -11,6 +11,7 @@ from collections.abc import Collection, Iterator, Sequence
 
 import numpy as np
 
+from forcegrasp.diagnosis.signatures import sizes_around
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.effects import Effect
 from forcegrasp.effects.base import Nested
@@ -27,6 +28,8 @@ _STANDARD_ERRORS = 2.0
 _NEXT_TO_NOTHING = 1e-3
 # A fit has stalled if it is worse than one of what it contains by this share.
 _WORSE = 1e-3
+# Sizes around the best of those that are tried, so many times as large: first far from it, and then near.
+_AROUND = ((0.45, 0.67, 1.4, 1.9, 2.6), (0.8, 0.9, 1.1, 1.25))
 
 
 def is_richer(effect: type[Effect], than: type[Effect]) -> bool:
@@ -207,15 +210,22 @@ def _best_start(
     """The problem with the best of some effects in place of others, where to start, and the slopes of what stays."""
     kept, places = _without(without, fit)
     base, slopes = fit.vector[places], fit.jacobian[..., places]
-    problems = [Problem(fit.problem.gripper, fit.problem.grasps, [*kept, setting]) for setting in settings]
-    starts = [np.r_[base, problem.start()[len(base) :]] for problem in problems]
-    if len(starts) > 1:
-        cases = [problem.case(start) for problem, start in zip(problems, starts, strict=True)]
+
+    def start_of(setting: EffectSetting) -> tuple[Problem, np.ndarray]:
+        problem = Problem(fit.problem.gripper, fit.problem.grasps, [*kept, setting])
+        return problem, np.r_[base, problem.start()[len(base) :]]
+
+    def best_of(tried: Sequence[EffectSetting]) -> EffectSetting:
+        cases = [problem.case(start) for problem, start in map(start_of, tried)]
         left = map(study.target.residual, predict(study.simulators.cheap, cases))
-        errors = [float(np.sum((fit.weight * one) ** 2)) for one in left]
-        best = int(np.argmin(errors))
-        return problems[best], starts[best], slopes
-    return problems[0], starts[0], slopes
+        return tried[int(np.argmin([float(np.sum((fit.weight * one) ** 2)) for one in left]))]
+
+    best = settings[0]
+    if len(settings) > 1:
+        best = best_of(settings)
+        for times in _AROUND:  # from a size far off, what the others make up for leads elsewhere
+            best = best_of([best, *sizes_around(best, times)])
+    return *start_of(best), slopes
 
 
 def extensions(fit: Fit, effects: Sequence[type[Effect]]) -> Iterator[tuple[str, type[Effect]]]:

@@ -151,7 +151,7 @@ def best_sizes(scores: Sequence[Score], study: Study, fit: Fit, background: Back
     Returns:
       Each effect with what its best size gains on all grasps, and what on the few; NaN where no sizes were tried.
     """
-    options = [_sizes(score.setting) for score in scores]
+    options = [sizes_around(score.setting) for score in scores]
     some, part = study.on_few(fit)
     gains = iter(_gains([one for sizes in options for one in sizes], some, part, Background(part, some.numerical)))
     best: list[EffectSetting | None] = []
@@ -177,12 +177,12 @@ def _gains(tried: Sequence[EffectSetting], study: Study, fit: Fit, background: B
     return (np.sum(background.remove(residual) ** 2) - np.sum(left**2, axis=0)).tolist()
 
 
-def _sizes(one: EffectSetting) -> list[EffectSetting]:
-    """Several sizes around a setting; none where signatures are straight."""
+def sizes_around(one: EffectSetting, times: Sequence[float] = _SIZES) -> list[EffectSetting]:
+    """A setting with its first parameter at so many times its value; none where signatures are straight."""
     first = one.effect.parameters[0]
     if _is_linear(one.effect) or first.logarithmic or one.values[0] == 0:
         return []
-    sizes = np.unique(np.clip(one.values[0] * np.array(_SIZES), first.low, first.high))
+    sizes = np.unique(np.clip(one.values[0] * np.array(times), first.low, first.high))
     return [dataclasses.replace(one, values=np.array([size, *one.values[1:]])) for size in sizes]
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from forcegrasp.identify.cross_validation import rms
 from forcegrasp.identify.fit import Fit, descend_roughly, fit_exactly, fit_once
 from forcegrasp.identify.initial_guess import guess
+from forcegrasp.identify.larger_steps import lead_astray
 from forcegrasp.identify.problem import Problem
 from forcegrasp.identify.progress import Progress, silent
 from forcegrasp.identify.side_by_side import side_by_side
@@ -61,6 +62,8 @@ def fit_base(
     """Fits from the nominal parameters, and then looks from random places inside the bounds for a better optimum."""
     first = fit_once(target, problem, simulators, guess(target, problem))
     progress(f"base model, start 1 of {STARTS}: {rms_error(first, target):.2f} × noise")
+    if lead_astray(first, target):
+        return BaseFit(first, (rms_error(first, target),), False, "larger physics steps led it astray")
     few = _few_grasps(target)
     small = Subset(target, few, first)
     contact_estimate = guess(small.target, small.problem)

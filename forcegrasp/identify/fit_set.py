@@ -9,6 +9,7 @@ import numpy as np
 from forcegrasp.errors import ConfigError, PhysicsError
 from forcegrasp.identify.base_fit import BaseFit, check_gradient, cost_tolerance, fit_base
 from forcegrasp.identify.fit import fit_exactly, fit_once
+from forcegrasp.identify.larger_steps import lead_astray, with_own_steps
 from forcegrasp.identify.loading import Loaded
 from forcegrasp.identify.problem import Problem
 from forcegrasp.identify.progress import Progress
@@ -31,6 +32,8 @@ def fit_model(loaded: Loaded[MeasurementSet], seed: int, progress: Progress) -> 
     problem = Problem(loaded.gripper, target.grasps)
     simulators = Simulators(problem)
     base = fit_base(target, problem, simulators, np.random.default_rng(seed), progress)
+    if lead_astray(base.fit, target):
+        return fit_model(_with_own_steps(loaded, progress), seed, progress)
     return _weighed(target, simulators, base)
 
 
@@ -56,6 +59,8 @@ def apply_model(
         progress(f"the model does not say {names}: fitted")
     free = np.ones(len(problem), bool) if refit else unknown
     base = check_gradient(fit_once(target, problem, simulators, vector, free=free), target)
+    if free.any() and lead_astray(base.fit, target):
+        return apply_model(_with_own_steps(loaded, progress), model, progress, refit)
     if refit:
         return _weighed(target, simulators, base)
     _refuse_diverged(base, simulators)
@@ -63,6 +68,11 @@ def apply_model(
     weight = weights(target, base.fit.residual)
     fit = dataclasses.replace(base.fit, weight=weight)
     return dataclasses.replace(target, weight=weight), simulators, dataclasses.replace(base, fit=fit)
+
+
+def _with_own_steps(loaded: Loaded[MeasurementSet], progress: Progress) -> Loaded[MeasurementSet]:
+    progress("with larger physics steps some grasps go another way: fitting with the scene's own, which takes longer")
+    return dataclasses.replace(loaded, gripper=with_own_steps(loaded.gripper))
 
 
 def _weighed(target: Target, simulators: Simulators, base: BaseFit) -> tuple[Target, Simulators, BaseFit]:

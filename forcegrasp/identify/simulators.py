@@ -40,5 +40,7 @@ class Simulators:
 
 def cheap_tier(gripper: Gripper, tier: str = "fitting") -> str:
     """Physics tier that is good enough for slopes, or as rough as another; that of the model where it isn't cheaper."""
+    if gripper.own_steps:
+        return "reference"
     steps = [gripper.compile(name).opt.timestep for name in (tier, "reference")]
     return "reference" if gripper.fast == "none" and steps[0] == steps[1] else tier

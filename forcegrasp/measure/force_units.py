@@ -1,4 +1,4 @@
-"""Are forces in newtons, on either side and in all grasps? Two channels that press on one object tell."""
+"""Are forces in newtons, on either side and in all grasps? Two channels that press on one object tell, or commands."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from forcegrasp.measure.check_liveness import zero_force
+from forcegrasp.measure.effort_units import find_odd_effort
 from forcegrasp.measure.samples import samples_file
 from forcegrasp.measure.schema import MeasuredGrasp, MeasurementSet
 from forcegrasp.short_repr import some
@@ -46,11 +47,14 @@ class OddUnit:
 
 
 def find_odd_unit(measured: MeasurementSet) -> OddUnit | None:
-    """Grasps in which one of two force channels is in another unit than in the others, which are more; None if none.
+    """Grasps in which a force channel is in another unit than in the others, which are more; None if there are none.
 
-    Beside an object that stands off centre one finger may press much more than the other; but not ten times as much as
-    it does in other grasps of that object.
+    Of two channels it is one, of a motor's effort see :mod:`.effort_units`. Beside an object that stands off centre one
+    finger may press much more than the other; but not ten times as much as it does in other grasps of that object.
     """
+    if measured.columns.read_effort:
+        odd = find_odd_effort(measured)
+        return None if odd is None else OddUnit(0, *odd)
     if len(measured.columns.force) != 2:
         return None
     pressed = {i: _both(_loads(grasp)) for i, grasp in enumerate(measured.grasps)}
@@ -86,7 +90,7 @@ def check_force_units(measured: MeasurementSet) -> list[str]:
     names = measured.columns.force
     if (odd := find_odd_unit(measured)) is not None:
         where = f"{samples_file(measured.path)}: column {names[odd.channel]}"
-        return [f"{where}: {odd.words(measured.grasps)}; is it in newtons there?"]
+        return [f"{where}: {odd.words(measured.grasps)}; is it in newtons there, and f ≥ 0 where it presses?"]
     if len(names) != 2:
         return []
     both = _both(np.concatenate([_loads(grasp) for grasp in measured.grasps]))

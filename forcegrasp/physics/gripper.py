@@ -74,6 +74,9 @@ class Gripper(ShortRepr):
     unsigned: bool = False  #: whether the motors' efforts are read as sizes without a sign
     #: Numbers of a mechanism's recordings that the scene takes as they are: name → fields that take them.
     settings: Mapping[str, tuple[FieldWrite, ...]] = field(default_factory=dict[str, tuple[FieldWrite, ...]])
+    own_steps: bool = (
+        False  #: whether fits take the scene's own steps alone, for with larger ones grasps go another way
+    )
 
     def summary(self) -> str:
         return f"{cut(self.name)}, {counted(len(self.parameters), 'parameter')}"

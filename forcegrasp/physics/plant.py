@@ -180,6 +180,8 @@ class Plant(ContributedFields):
         self.batch.reset(ids, stage=mujoco.mjtStage.mjSTAGE_NONE.value, **keyframe)
         if position is not None:
             self._place(ids, position)
+            if self.gripper.command == "position":  # servos hold them there, with no effort
+                self._ctrl[ids[:, None], self.actuators] = position * self._command_scale + self._command_zero
         if velocity is not None:
             self._qvel[ids[:, None], self.motor_dofs] = velocity * self._signs
         if not self.gripper.is_servo:

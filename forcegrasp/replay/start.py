@@ -33,8 +33,9 @@ def encoder_noise(grasps: Sequence[MeasuredGrasp]) -> np.ndarray:
 def start_position(grasp: MeasuredGrasp, stroke: float, noise: np.ndarray) -> np.ndarray:
     """Where the motors stood at the first sample, m or rad, ``(motors,)``.
 
-    An encoder may be off and is noisy: near enough to the open end, or to the first command, motors stood there; unless
-    they are seen to go from where they were first read to another place while the first command is held.
+    An encoder may be off and is noisy: near enough to the open end, or to the first command, motors stood at the nearer
+    of the two; unless they are seen to go from where they were first read to another place while the first command is
+    held.
 
     Args:
       grasp: whose log begins.
@@ -42,10 +43,10 @@ def start_position(grasp: MeasuredGrasp, stroke: float, noise: np.ndarray) -> np
       noise: of their encoders, ``(motors,)``.
     """
     first, command = grasp.position_m[0], grasp.command_m[0]
-    start = np.clip(first, 0.0, stroke)
-    for anchor in (command, np.full(len(first), stroke)):
-        start = np.where(np.abs(first - anchor) < _AT_REST * stroke, anchor, start)
-    to_command = np.abs(first - command) < _AT_REST * stroke
+    from_command, from_open = np.abs(first - command), np.abs(first - stroke)
+    anchor = np.where(from_command < from_open, command, stroke)
+    start = np.where(np.minimum(from_command, from_open) < _AT_REST * stroke, anchor, first)
+    to_command = from_command < _AT_REST * stroke
     return np.where(to_command & _went(grasp, noise), first, np.clip(start, 0.0, stroke))
 
 

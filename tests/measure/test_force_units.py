@@ -70,6 +70,6 @@ def test_a_grasp_that_presses_with_one_finger_is_not_among_them():
 
 
 def test_one_channel_tells_nothing():
-    one = SimpleNamespace(columns=SimpleNamespace(force=("f_n",)), grasps=())
+    one = SimpleNamespace(columns=SimpleNamespace(force=("f_l_n",), read_effort=False), grasps=())
     assert find_odd_unit(one) is None
     assert check_force_units(one) == []

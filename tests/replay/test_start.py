@@ -30,6 +30,7 @@ def test_where_fingers_that_rest_start():
     assert start((0.040, 0.035), (0.030, 0.030)) == [0.040, 0.035]  # on the way
     assert start((0.046, -0.002), (0.010, 0.010)) == [OPEN_M, 0.0]  # within its range
     assert start((0.0302, 0.0451), (0.030, 0.020)) == [0.030, OPEN_M]  # each finger by itself
+    assert start((0.0443, 0.0448), (0.0444, 0.0444)) == [0.0444, OPEN_M]  # at the nearer one, near to both
 
 
 @pytest.mark.parametrize(("held", "seen"), [(20, True), (6, True), (5, False)])

@@ -26,10 +26,13 @@ from forcegrasp.diagnosis.study import Study
 from forcegrasp.effects import Effect
 from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.identify.fit import Fit, fit_once
+from forcegrasp.identify.noise_floor import excess
 from forcegrasp.identify.side_by_side import side_by_side
 
 # Signatures are straight: an effect that does for two promises at least this share of what they explain.
 _PROMISE = 0.5
+# Of so many pairs none is asked for a promise.
+_FEW_PAIRS = 3
 
 
 def merge(
@@ -62,7 +65,10 @@ def _one_for_two(
     searched = {one.effect.name for one in fit.problem.effects[given:]}
     found = [step.effects[0] for step in kept_steps(steps) if step.candidates and step.effects[0] in searched]
     pairs = [(pair, alike) for pair in combinations(found, 2) if (alike := list(_like_both(pair, fit, effects)))]
-    near = side_by_side([partial(promising, *few, pair, alike) for pair, alike in pairs])
+    if len(pairs) > _FEW_PAIRS:
+        near = side_by_side([partial(promising, *few, pair, alike) for pair, alike in pairs])
+    else:  # signatures of what is large say little
+        near = [alike for _, alike in pairs]
     tried = [(pair, effect) for (pair, _), some in zip(pairs, near, strict=True) for effect in some]
     for pair, effect in tried:
         study.progress(f"fitting with {effect.name} in place of {pair[0]} and {pair[1]}")
@@ -105,9 +111,10 @@ def promising(
 
 
 def _roughly_as_good(study: Study, fit: Fit, pair: Collection[str], effect: type[Effect]) -> EffectSetting | None:
-    """The effect as a rough fit has it, unless that says clearly that the others are needed."""
+    """The effect as a rough fit has it, unless that leaves something, and says clearly that the others are needed."""
     less = roughly_as(trials([effect]), fit, pair, study, at_the_end=False)
-    if is_beyond_chance(study.gains(less.residual, fit.residual), SURELY * LEAST_RISE):
+    leaves_more = excess(less.residual, study.numerical, study.target)
+    if leaves_more and is_beyond_chance(study.gains(less.residual, fit.residual), SURELY * LEAST_RISE):
         return None
     without = roughly_without(pair, fit, study, at_the_end=False)
     gain, most = (float(np.nansum(study.gains(without.residual, one.residual))) for one in (less, fit))

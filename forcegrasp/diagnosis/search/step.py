@@ -42,6 +42,8 @@ _REFITTED, _NEAR_THE_BEST = 5, 0.5
 _FITTED_ANYWAY = 12
 # Of these the best ones are fitted to the end.
 _REFINED = 3
+# A rough fit with an effect does as well as one of few grasps with a mistake of the set if it leaves no more than this.
+_AS_GOOD = 1.02
 # Fitted to the end, the cost of a rough fit falls by this share of it at most, or of what the effect gained.
 _FALLS, _GAINS_MORE = 0.2, 0.1
 
@@ -256,6 +258,23 @@ class _Start:
         fits = refine_anyway(alike, self._study, best.fit, name)
         return [self._judge_by_gain(fit, null) for fit in fits]
 
+    def _instead_of_set(self, best: Candidate, effects: Sequence[type[Effect]], null: np.ndarray) -> list[Candidate]:
+        """Rough fits with look-alikes in the place of a mistake of the set, those that leave as little on few grasps.
+
+        A set is not to be called wrong where the gripper may be what differs, however little a signature promised: of
+        backlash behind motors whose effort is read, it is next to nothing.
+
+        Args:
+          best: a mistake of the set that was fitted to the end.
+          effects: that may be in its place.
+          null: gains of the best signature of noise.
+        """
+        alike = families.look_alikes_of(best.effect, effects, of_any_family=True)
+        for effect in alike:
+            self._study.progress(f"trying {effect.name} in place of {best.effect.name}")
+        fits = refine_anyway(alike, self._study, best.fit, best.effect.name, _AS_GOOD)
+        return [self._judge_by_gain(fit, null) for fit in fits]
+
     def fit_anyway(self, scores: Sequence[Score], null: np.ndarray) -> list[Candidate]:
         """Rough fits with the effects of these signatures, whatever little they promise."""
         ordered = best_effects(scores, len(scores))
@@ -300,6 +319,7 @@ class _Start:
         every = [*refined, *(c for c in ordered if c.effect.name not in names)]
         names |= hopeless
         families_tried: set[str] = set()
+        doubted_of_set: set[str] = set()
         while True:
             redundant = add_nothing(every)
             every.sort(key=lambda c: (c.effect.name in redundant, *self.place(c)))
@@ -326,6 +346,12 @@ class _Start:
                 better = self._better_look_alikes(first, [e for e in effects if e not in fitted], null)
                 alike |= {c.effect.name: [] for c in better}
                 every += better
+            elif first.effect.of_set and not first.replaces and first.effect.name not in doubted_of_set:
+                doubted_of_set.add(first.effect.name)
+                fitted = {c.effect for c in every}
+                as_good = self._instead_of_set(first, [e for e in effects if e not in fitted], null)
+                alike |= {c.effect.name: [] for c in as_good}
+                every += as_good
             else:
                 return tuple(every), redundant
 
