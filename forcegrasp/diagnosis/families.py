@@ -143,6 +143,7 @@ def roughly_as(
     without: str | Collection[str],
     study: Study,
     at_the_end: bool = True,
+    begin: np.ndarray | None = None,
 ) -> Fit:
     """The same by the cheap model, from the best of several sizes.
 
@@ -150,8 +151,9 @@ def roughly_as(
       settings: the effect at these sizes.
       fit, without, study: as for :func:`refit_as`.
       at_the_end: whether slopes are measured where the fit ends, too: not needed if only what it leaves counts.
+      begin: coordinates of the fit to begin at, in place of where it stands, ``(p,)``.
     """
-    problem, start, slopes = _best_start(settings, fit, without, study)
+    problem, start, slopes = _best_start(settings, fit, without, study, begin)
     return fit_once(
         study.target, problem, study.simulators, start, fit.correction, rounds=0, slopes=slopes, at_the_end=at_the_end
     )
@@ -205,11 +207,14 @@ def _refit(settings: Sequence[EffectSetting], fit: Fit, without: str | Collectio
 
 
 def _best_start(
-    settings: Sequence[EffectSetting], fit: Fit, without: str | Collection[str], study: Study
-) -> tuple[Problem, np.ndarray, np.ndarray]:
+    settings: Sequence[EffectSetting], fit: Fit, without: str | Collection[str], study: Study,
+    begin: np.ndarray | None = None,
+) -> tuple[Problem, np.ndarray, np.ndarray | None]:  # fmt: skip
     """The problem with the best of some effects in place of others, where to start, and the slopes of what stays."""
     kept, places = _without(without, fit)
     base, slopes = fit.vector[places], fit.jacobian[..., places]
+    if begin is not None:
+        base, slopes = begin[places], None
 
     def start_of(setting: EffectSetting) -> tuple[Problem, np.ndarray]:
         problem = Problem(fit.problem.gripper, fit.problem.grasps, [*kept, setting])

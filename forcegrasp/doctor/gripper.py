@@ -82,7 +82,11 @@ def _sizes(gripper: Gripper) -> Iterator[Finding]:
         yield note("forces", "none are read: positions alone are compared, and no policy can be trained")
     else:
         told = f"up to {training.max_force_n:.3g} N from the largest command step; noise {training.force_std_n:.2g} N"
-        yield fine("forces", f"{told}, contact above {training.contact_threshold_n:.2g} N")
+        told += f", contact above {training.contact_threshold_n:.2g} N"
+        if gripper.force == "motor":
+            each = 1 / float(gripper.opening.travel.sum() / len(gripper.motors))
+            told += f"; {each:.4g} N for each {gripper.effort_unit} of the motor's effort, wherever it is"
+        yield fine("forces", told)
     soft = "" if training.softness else "; all as soft as the scene's, as training.softness is not there"
     yield fine("objects", f"radii of {1e3 * small:.3g} to {1e3 * large:.3g} mm are trained on{soft}")
 

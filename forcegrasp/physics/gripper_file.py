@@ -31,6 +31,9 @@ from forcegrasp.physics.gripper_schema import (
 )
 from forcegrasp.physics.mechanism_file import MECHANISMS, load_mechanism
 
+# What MuJoCo reads.
+_SCENES = (".xml", ".mjcf", ".urdf", ".mjb")
+
 
 def load_gripper(name: str | Path, folder: str | Path = "") -> Gripper:
     """Returns a gripper by name (see :func:`shipped_grippers`) or by the path of its description.
@@ -76,6 +79,8 @@ def shipped_mechanisms() -> list[str]:
 
 
 def _load(path: Path) -> Gripper:
+    if path.suffix.lower() in _SCENES:
+        raise refusal(path, "", f"a scene; give the description that names it (format: {FORMAT})")
     try:
         raw = plain_yaml.load(path)
     except (OSError, plain_yaml.PlainYamlError) as error:

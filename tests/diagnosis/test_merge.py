@@ -7,8 +7,9 @@ import dataclasses
 import numpy as np
 import pytest
 
+from forcegrasp.diagnosis.families import _best_start
 from forcegrasp.diagnosis.result import Candidate, Step
-from forcegrasp.diagnosis.search.merge import merge, promising
+from forcegrasp.diagnosis.search.merge import _roughly_as_good, merge, promising
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.effects import get_effect
 from forcegrasp.effects.for_gripper import effect_of, effects_of
@@ -23,6 +24,7 @@ from forcegrasp.identify.simulators import Simulators
 from tests.light_set import light_gripper, light_set
 
 LATE = ("readout_skew", "force_delay")
+MERGE = "forcegrasp.diagnosis.search.merge"
 CATALOGUE = list(effects_of(light_gripper()).values())
 
 
@@ -68,7 +70,7 @@ def test_what_promises_less_than_half_of_what_both_explain_is_not_fitted(late, m
     study, _, fit = late
     delay, *others = (effect_of(name, light_gripper()) for name in ("command_delay", "force_bias", "force_drift"))
     assert promising(study, fit, LATE, [delay, *others]) == [delay]
-    monkeypatch.setattr("forcegrasp.diagnosis.search.merge._PROMISE", -1.0)
+    monkeypatch.setattr(f"{MERGE}._PROMISE", -1.0)
     assert set(promising(study, fit, LATE, [delay, *others])) > {delay}
 
 
@@ -80,3 +82,32 @@ def test_what_was_given_stays(late):
 def test_two_that_are_there_stay():
     study, steps, fit = explained_by_late_readings("readout_skew delay_s=0.008", "force_delay delay_s=0.03")
     assert merge(study, steps, fit, CATALOGUE, 0) == (steps, fit)
+
+
+def test_of_few_pairs_none_is_asked_for_a_promise(late, monkeypatch):
+    study, steps, fit = late
+    monkeypatch.setattr(f"{MERGE}.promising", lambda *_: [])
+    assert len(merge(study, steps, fit, CATALOGUE, 0)[0]) == 1
+    monkeypatch.setattr(f"{MERGE}._FEW_PAIRS", 0)
+    assert merge(study, steps, fit, CATALOGUE, 0) == (steps, fit)
+
+
+@pytest.mark.parametrize(("left", "enough"), [("", True), ("in all", False)])
+def test_one_that_leaves_nothing_does_for_two_however_much_better_these_are(late, monkeypatch, left, enough):
+    """Two delays make up for a fraction of a physics step, too, by which one reading is older than another."""
+    study, _, fit = late
+    monkeypatch.setattr(f"{MERGE}.is_beyond_chance", lambda *_: True)
+    monkeypatch.setattr(f"{MERGE}.excess", lambda *_: left)
+    delay = effect_of("command_delay", light_gripper())
+    assert (_roughly_as_good(study, fit, LATE, delay) is not None) == enough
+
+
+def test_an_effect_in_the_place_of_others_begins_at_the_best_of_many_sizes(late):
+    """From one far off, what other parameters make up for leads elsewhere."""
+    study, _, fit = late
+    delay = effect_of("command_delay", light_gripper())
+    far = [EffectSetting(delay, "", np.array([seconds])) for seconds in (0.05, 0.12)]
+    problem, start, _ = _best_start(far, fit, LATE, study)
+    assert problem.case(start).effects[-1].values == pytest.approx([0.016], rel=0.15)
+    problem, start, _ = _best_start(far[:1], fit, LATE, study)
+    assert problem.case(start).effects[-1].values == pytest.approx([0.05])

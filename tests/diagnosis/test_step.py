@@ -264,7 +264,7 @@ def test_a_search_begins_anew_from_a_better_base(creeping, alike, monkeypatch):
     assert found.error_before == pytest.approx(study.error(study.heldout(base.fit)))
 
 
-@pytest.mark.parametrize("error", [2.0, 11.0])
+@pytest.mark.parametrize("error", [2.0, 29.0, 31.0])
 def test_a_search_fits_anyway_once_and_judges_odd_grasps_again(creeping, monkeypatch, error):
     """With a hundred times the noise left, a real drive got a force limit that no signature had promised."""
     study, base = creeping
@@ -288,10 +288,10 @@ def test_a_search_fits_anyway_once_and_judges_odd_grasps_again(creeping, monkeyp
     monkeypatch.setattr(conclusion, "may_be_forms", lambda *_: False)
     diagnosis = search.diagnose(study.target, base, study.simulators, [SMOOTH, DELAY], np.random.default_rng(0))
     # beside what was found, signatures are others
-    assert asked == ([False, True, False, False] if error < 10 else [False])
+    assert asked == ([False, True, False, False] if error < 30 else [False])
     assert [screen is screens[0] for screen in screens] == [True, True, True, False][: len(screens)]
-    assert diagnosis.preferred == (("smooth_friction",) if error < 10 else ())
-    assert len(diagnosis.odd) == (error > 10)
+    assert diagnosis.preferred == (("smooth_friction",) if error < 30 else ())
+    assert len(diagnosis.odd) == (error > 30)
 
 
 @pytest.mark.parametrize(("little", "tried"), [(0.1, []), (-1.0, [DELAY])])
@@ -412,3 +412,16 @@ def test_what_an_effect_contains_comes_first_where_the_set_may_be_wrong_instead(
     assert later == {"backlash_asymmetry"} - {first}
     start.least_gain = 0.1  # the simpler one explains too little
     assert start.simpler_first(ordered)[0].effect.name == "backlash_asymmetry"
+
+
+def test_a_mistake_of_the_set_is_held_against_effects_that_look_like_it(monkeypatch):
+    """Whatever their signatures promise: behind a motor that touches late, objects seem smaller."""
+    loaded = light_set("object_size error_m=-0.0006", grasps=9, samples=48)
+    target, simulators, base = fit_model(loaded, 0, silent)
+    numerical = beyond_fit(base.fit, numerical_error(base.fit, target))
+    study = with_few(Study(target, simulators, make_folds(target.grasps), numerical), base.fit)
+    effects = [effect_of(name, light_gripper()) for name in ("object_size", "backlash", "coulomb_friction")]
+    step = looked((study, base), effects, "object_size")
+    assert set(step.effects) == {one.effect.name for one in step.candidates} == {"object_size", "backlash"}
+    monkeypatch.setattr(step_module, "refine_anyway", lambda *_: [])
+    assert looked((study, base), effects, "object_size").effects == ("object_size",)

@@ -12,6 +12,7 @@ import pytest
 
 from forcegrasp.cli.main import main
 from forcegrasp.doctor.gripper import _creep, _heavier, check_gripper
+from forcegrasp.errors import ConfigError
 from forcegrasp.physics import load_gripper, shipped_grippers
 from forcegrasp.physics.plant import Plant, write_base
 
@@ -156,6 +157,21 @@ def test_what_follows_from_the_description_is_told_in_users_units():
     lines = " ".join(said("robotiq_2f85")["fine"])
     for told in ("85.0 mm between the pads when open", "0.8 rad", "q_rad, qdes_rad, f_l_n, f_r_n", "7.21 and 7.21 N"):
         assert told in lines
+
+
+def test_what_an_effort_counts_as_is_told_where_it_is_read():
+    gripper = load_gripper("so101_gripper")
+    (forces,) = (line for line in said("so101_gripper")["fine"] if "contact above" in line)
+    closed, opened = gripper.opening.opening_at(np.array([0.0, gripper.stroke]))
+    factor = float(forces.split("; ")[-1].split(" N for each N·m")[0])
+    assert factor == pytest.approx(gripper.stroke / (opened - closed), rel=0.03)
+    assert not any("effort" in line for line in said("tiago")["fine"])
+
+
+def test_a_scene_in_place_of_its_description_is_told(changed):
+    scene = str(Path(changed()).with_suffix(".xml"))
+    with pytest.raises(ConfigError, match=r"second\.xml: a scene; give the description that names it"):
+        load_gripper(scene)
 
 
 def test_a_description_that_is_refused_is_told_in_a_line(changed):

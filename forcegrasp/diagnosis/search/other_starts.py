@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from forcegrasp.diagnosis.search.refine import as_given
 from forcegrasp.diagnosis.signatures import Background
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.identify.fit import Fit
@@ -49,14 +50,12 @@ def other_starts(fit: Fit, study: Study) -> list[np.ndarray]:
     costs = costs_without(index, signals, fit, study.target)
     double = fit.vector.copy()
     double[index] = entry.coordinate(2 * size)
-    base = [e.effect is None and e.parameter not in ("radius_m", "offset_m") for e in problem.entries]
-    nominal = np.where(base, problem.start(), fit.vector)
     valleys = [
         i for i, cost in enumerate(costs)
         if cost <= min(costs[max(0, i - 1) : i + 2]) and cost < (1 + _PROMISING) * fit.cost
     ]  # fmt: skip
     ordered = sorted(valleys, key=lambda i: costs[i])[:_MOST]
-    return [*(starts[i] for i in ordered), double, *_other_shapes(fit, index), nominal]
+    return [*(starts[i] for i in ordered), double, *_other_shapes(fit, index), as_given(fit)]
 
 
 def costs_without(index: int, signals: np.ndarray, fit: Fit, target: Target) -> np.ndarray:

@@ -13,6 +13,7 @@ from forcegrasp.diagnosis.signatures import Background, Score, best_sizes, trial
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.effects import Effect
 from forcegrasp.effects.setting import EffectSetting
+from forcegrasp.identify.base_fit import rms_error
 from forcegrasp.identify.fit import Fit, fit_once
 from forcegrasp.identify.problem import Problem
 from forcegrasp.identify.side_by_side import side_by_side
@@ -24,6 +25,8 @@ _LOST = 0.4
 LOST_IF_FITTED = 0.7
 #: A rough fit whose cost is no smaller share of another's is no better; rough ones end within a tenth of that.
 NO_BETTER = 0.99
+# Beyond so many times the noise base parameters may be far from where they are with the effect that is missing.
+_MADE_UP = 3.0
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -84,15 +87,28 @@ def refine_anyway(
     some, part = study.on_few(fit)
     rough = partial(roughly_as, fit=part, without=without, study=some, at_the_end=some is study)
     few = side_by_side([partial(rough, trials([effect])) for effect in effects])
+    elsewhere: list[Fit] = []
+    if not without and rms_error(part, some.target) > _MADE_UP:
+        elsewhere = side_by_side([partial(rough, trials([e]), begin=as_given(part)) for e in effects])
+    if elsewhere:
+        few = [min(pair, key=lambda one: one.cost) for pair in zip(few, elsewhere, strict=True)]
     few = [one for one in few if one.cost < most * part.cost]
     if some is study:
         return few
     tasks = []
     for index in _in_the_race([part.cost - one.cost for one in few], LOST_IF_FITTED):
-        setting = few[index].effects[-1]
+        one, setting = few[index], few[index].effects[-1]
+        begin = fit.moved(part.problem, one.vector[: len(part.problem)]) if one in elsewhere else None
         study.progress(f"refitting with {setting.effect.name} {setting.variant} on all grasps")
-        tasks.append(partial(roughly_as, [setting], fit, without, study))
+        tasks.append(partial(roughly_as, [setting], fit, without, study, begin=begin))
     return side_by_side(tasks)
+
+
+def as_given(fit: Fit) -> np.ndarray:
+    """A fit's coordinates with base parameters as the description has them, ``(p,)``; objects stay where they are."""
+    problem = fit.problem
+    base = [e.effect is None and e.parameter not in ("radius_m", "offset_m") for e in problem.entries]
+    return np.where(base, problem.start(), fit.vector)
 
 
 def _in_the_race(gains: Sequence[float], least: float) -> list[int]:

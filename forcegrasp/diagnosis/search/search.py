@@ -50,6 +50,9 @@ from forcegrasp.identify.weights import reweigh
 # What is left within the forms of what was found may be another effect's if that explains so much of it, on few grasps
 # and then on held-out ones, unless it leaves nothing there.
 _OF_ANOTHER = 0.5
+# Beyond so many times the noise effects whose signatures promise little are not fitted; contacts, with which a base fit
+# makes up for them, bring it much further off than a servo is.
+_FAR_OF_CONTACTS = 3 * FAR
 #: Largest number of effects that are looked for one by one.
 MOST_EFFECTS = 8
 
@@ -156,7 +159,8 @@ def _add_effects(so_far: SoFar, begun: Begun, rng: np.random.Generator, stop_whe
             step = _of_another(step, study) if forms else step
         much = much and not leaves_forms(study, fit, begun.error, begun.floor)
         if much and not step.effects:
-            worth_it = untried and not tried_anyway and step.error_before < FAR
+            far = FAR if study.target.gripper.is_servo else _FAR_OF_CONTACTS
+            worth_it = untried and not tried_anyway and step.error_before < far
             found = _fitted_anyway(study, fit, screen, untried, rng) if worth_it else None
             found = found or exchange(study, fit, screen, others, steps, rng)
             two = None if found or forms else split(study, fit, screen, untried, steps, rng)

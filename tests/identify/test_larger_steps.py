@@ -1,0 +1,63 @@
+"""Fits are made with the scene's own steps where larger ones lead grasps astray."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from forcegrasp.identify import base_fit, fit_set
+from forcegrasp.identify.fit_set import apply_model, fit_model
+from forcegrasp.identify.fitted_model import model_of
+from forcegrasp.identify.larger_steps import lead_astray, with_own_steps
+from forcegrasp.identify.progress import silent
+from forcegrasp.identify.simulators import cheap_tier
+from forcegrasp.identify.target import make_target
+from forcegrasp.physics.gripper_file import load_gripper
+from tests.light_set import light_set
+
+
+@pytest.fixture(scope="module")
+def loaded():
+    return light_set(grasps=6, samples=40)
+
+
+@pytest.mark.parametrize(("times", "astray"), [(0.0, False), (8.0, False), (12.0, True)])
+def test_one_grasp_that_goes_another_way_tells(loaded, times, astray):
+    target = make_target(loaded.measured, loaded.gripper)
+    correction = np.zeros_like(target.signals)
+    correction[3] = times * np.broadcast_to(target.sigma, target.signals.shape)[3]
+    correction[1, ~target.mask[1]] = 1e9  # there are no such rows
+    assert lead_astray(SimpleNamespace(correction=correction), target) == astray
+
+
+def test_own_steps_have_no_cheaper_ones():
+    gripper = load_gripper("franka_hand")
+    own = with_own_steps(gripper)
+    assert (cheap_tier(gripper), cheap_tier(gripper, "screening")) == ("fitting", "screening")
+    assert (cheap_tier(own), cheap_tier(own, "screening")) == ("reference", "reference")
+    assert not gripper.own_steps
+
+
+def test_a_set_is_fitted_again_with_own_steps(loaded, monkeypatch):
+    asked, told = [], []
+
+    def astray(fit, target):
+        asked.append(target.gripper.own_steps)
+        return not target.gripper.own_steps
+
+    for module in (fit_set, base_fit):
+        monkeypatch.setattr(module, "lead_astray", astray)
+    target, simulators, base = fit_model(loaded, 0, told.append)
+    assert (target.gripper.own_steps, simulators.one_model) == (True, True)
+    assert base.fit.problem.gripper is target.gripper
+    assert asked[:2] == [False, False]  # before other starts, and of what came of it
+    assert sum("start 2" in line for line in told) == 1
+    assert any("with the scene's own" in line for line in told)
+    model = model_of(base.fit, target, loaded, ())
+    known, simulators, _ = apply_model(loaded, model, silent, refit=True)
+    assert (known.gripper.own_steps, simulators.one_model) == (True, True)
+    asked.clear()
+    apply_model(loaded, model, silent, refit=False)
+    assert not asked  # nothing is fitted
