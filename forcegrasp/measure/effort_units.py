@@ -34,7 +34,7 @@ def find_odd_effort(measured: MeasurementSet) -> tuple[float, tuple[int, ...]] |
     times = {index: ratio / usual for index, ratio in found.items()}
     if sum(1 / _USUAL < factor < _USUAL for factor in times.values()) <= len(times) / 2:
         return None  # the effort is not that of a servo without memory
-    odd = {index: factor for index, factor in times.items() if factor < 0 or not 1 / _OFF < factor < _OFF}
+    odd = {index: factor for index, factor in times.items() if not 1 / _OFF < factor < _OFF}
     groups = [tuple(i for i, other in odd.items() if 1 / _ALIKE < other / factor < _ALIKE) for factor in odd.values()]
     if not groups:
         return None

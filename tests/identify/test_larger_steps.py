@@ -28,8 +28,10 @@ def test_one_grasp_that_goes_another_way_tells(loaded, times, astray):
     target = make_target(loaded.measured, loaded.gripper)
     correction = np.zeros_like(target.signals)
     correction[3] = times * np.broadcast_to(target.sigma, target.signals.shape)[3]
-    correction[1, ~target.mask[1]] = 1e9  # there are no such rows
-    assert lead_astray(SimpleNamespace(correction=correction), target) == astray
+    mask = target.mask.copy()
+    mask[1, -1], correction[1, -1] = False, 1e9  # there is no such row
+    part = SimpleNamespace(mask=mask, sigma=target.sigma)
+    assert lead_astray(SimpleNamespace(correction=correction), part) == astray
 
 
 def test_own_steps_have_no_cheaper_ones():

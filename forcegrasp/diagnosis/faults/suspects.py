@@ -156,7 +156,7 @@ def suspects(loaded: Loaded[MeasurementSet], target: Target, fit: Fit) -> list[F
     if (unit := find_odd_unit(measured)) is not None:
         words = f"column {measured.columns.force[unit.channel]} {unit.words(measured.grasps)}"
         right = _changed(loaded, lambda index, g: unit.put_right(g) if index in unit.grasps else g)
-        found.append(Fault("force_unit", words, "the unit of that column in the logs of these grasps", right))
+        found.append(Fault("force_unit", words, "unit and sign of that column in the logs of these grasps", right))
     early = _early_readings(target, fit)
     if early:
         late = ", or commands stand one row late" if len(early) > 1 else ""
