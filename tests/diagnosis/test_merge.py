@@ -9,6 +9,7 @@ import pytest
 
 from forcegrasp.diagnosis.families import _best_start
 from forcegrasp.diagnosis.result import Candidate, Step
+from forcegrasp.diagnosis.search.exchange import are_alike
 from forcegrasp.diagnosis.search.merge import _roughly_as_good, merge, promising
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.effects import get_effect
@@ -84,11 +85,12 @@ def test_two_that_are_there_stay():
     assert merge(study, steps, fit, CATALOGUE, 0) == (steps, fit)
 
 
-def test_of_few_pairs_none_is_asked_for_a_promise(late, monkeypatch):
+def test_of_two_that_look_alike_no_promise_is_asked(late, monkeypatch):
     study, steps, fit = late
     monkeypatch.setattr(f"{MERGE}.promising", lambda *_: [])
     assert len(merge(study, steps, fit, CATALOGUE, 0)[0]) == 1
-    monkeypatch.setattr(f"{MERGE}._FEW_PAIRS", 0)
+    unlike = lambda one, other: are_alike(one, other) and {one.name, other.name} != set(LATE)  # noqa: E731
+    monkeypatch.setattr(f"{MERGE}.are_alike", unlike)
     assert merge(study, steps, fit, CATALOGUE, 0) == (steps, fit)
 
 

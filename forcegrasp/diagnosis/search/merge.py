@@ -31,8 +31,6 @@ from forcegrasp.identify.side_by_side import side_by_side
 
 # Signatures are straight: an effect that does for two promises at least this share of what they explain.
 _PROMISE = 0.5
-# Of so many pairs none is asked for a promise.
-_FEW_PAIRS = 3
 
 
 def merge(
@@ -65,10 +63,7 @@ def _one_for_two(
     searched = {one.effect.name for one in fit.problem.effects[given:]}
     found = [step.effects[0] for step in kept_steps(steps) if step.candidates and step.effects[0] in searched]
     pairs = [(pair, alike) for pair in combinations(found, 2) if (alike := list(_like_both(pair, fit, effects)))]
-    if len(pairs) > _FEW_PAIRS:
-        near = side_by_side([partial(promising, *few, pair, alike) for pair, alike in pairs])
-    else:  # signatures of what is large say little
-        near = [alike for _, alike in pairs]
+    near = side_by_side([partial(_near_enough, *few, pair, alike) for pair, alike in pairs])
     tried = [(pair, effect) for (pair, _), some in zip(pairs, near, strict=True) for effect in some]
     for pair, effect in tried:
         study.progress(f"fitting with {effect.name} in place of {pair[0]} and {pair[1]}")
@@ -95,6 +90,18 @@ def _like_both(pair: Collection[str], fit: Fit, effects: Sequence[type[Effect]])
             and all(are_alike(effect, one) for one in two)
         ):
             yield effect
+
+
+def _near_enough(
+    study: Study, fit: Fit, pair: Sequence[str], effects: Sequence[type[Effect]]
+) -> Sequence[type[Effect]]:
+    """Those of the effects that are worth a fit in the place of two.
+
+    All of them where these look like each other: then one may well do for both, however little its signature says,
+    which of what is large is not much.
+    """
+    one, other = (fit.effect(name).effect for name in pair)
+    return effects if are_alike(one, other) else promising(study, fit, pair, effects)
 
 
 def promising(
