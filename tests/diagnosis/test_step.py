@@ -8,11 +8,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from forcegrasp.diagnosis.families import look_alike
+from forcegrasp.diagnosis.families import look_alike, roughly_as
 from forcegrasp.diagnosis.faults.odd_grasps import OddGrasp
 from forcegrasp.diagnosis.few import with_few
 from forcegrasp.diagnosis.result import Step, kept_steps
 from forcegrasp.diagnosis.search import at_once, conclusion, search
+from forcegrasp.diagnosis.search import refine as refine_module
 from forcegrasp.diagnosis.search import step as step_module
 from forcegrasp.diagnosis.search.left_over import leaves_forms, leaves_little
 from forcegrasp.diagnosis.search.refine import fit_with, refine_anyway
@@ -425,3 +426,27 @@ def test_a_mistake_of_the_set_is_held_against_effects_that_look_like_it(monkeypa
     assert set(step.effects) == {one.effect.name for one in step.candidates} == {"object_size", "backlash"}
     monkeypatch.setattr(step_module, "refine_anyway", lambda *_: [])
     assert looked((study, base), effects, "object_size").effects == ("object_size",)
+
+
+@pytest.mark.parametrize(("much", "begun"), [(0.5, 2), (1e3, 0)])
+def test_where_much_is_left_effects_are_fitted_from_parameters_as_given_too(creeping, monkeypatch, much, begun):
+    study, base = creeping
+    begins = []
+
+    def recorded(settings, *arguments, begin=None, **more):
+        begins.append(begin)
+        return roughly_as(settings, *arguments, begin=begin, **more)
+
+    # a base fit that has gone elsewhere
+    name = "position_gain"
+    (index,) = [i for i, entry in enumerate(base.fit.problem.entries) if entry.name == name]
+    off = base.fit.vector.copy()
+    off[index] += 1.0
+    stuck = fit_once(study.target, base.fit.problem, study.simulators, off, free=np.zeros(len(off), bool))
+    monkeypatch.setattr(refine_module, "roughly_as", recorded)
+    monkeypatch.setattr(refine_module, "_MADE_UP", much)
+    (found,) = refine_anyway([SMOOTH], study, stuck)
+    assert sum(one is not None for one in begins) == begun  # on few grasps, and on all
+    if begun:
+        assert begins[1][index] == base.fit.problem.start()[index]
+        assert found.effect("smooth_friction").values[0] == pytest.approx(0.1, rel=0.15)

@@ -75,7 +75,8 @@ def refine_anyway(
 ) -> list[Fit]:
     """Rough fits with each effect that may be the best one, of those that leave less than a fit does on few grasps.
 
-    They start from the best of the sizes that are tried, and nothing is asked of signatures.
+    They start from the best of the sizes that are tried, and nothing is asked of signatures. Where much is left they
+    start from base parameters as given, too.
 
     Args:
       effects: that are added.
@@ -89,8 +90,7 @@ def refine_anyway(
     few = side_by_side([partial(rough, trials([effect])) for effect in effects])
     elsewhere: list[Fit] = []
     if not without and rms_error(part, some.target) > _MADE_UP:
-        elsewhere = side_by_side([partial(rough, trials([e]), begin=as_given(part)) for e in effects])
-    if elsewhere:
+        elsewhere = side_by_side([partial(rough, trials([effect]), begin=as_given(part)) for effect in effects])
         few = [min(pair, key=lambda one: one.cost) for pair in zip(few, elsewhere, strict=True)]
     few = [one for one in few if one.cost < most * part.cost]
     if some is study:

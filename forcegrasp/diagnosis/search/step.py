@@ -42,7 +42,7 @@ _REFITTED, _NEAR_THE_BEST = 5, 0.5
 _FITTED_ANYWAY = 12
 # Of these the best ones are fitted to the end.
 _REFINED = 3
-# A rough fit with an effect does as well as one of few grasps with a mistake of the set if it leaves no more than this.
+# On few grasps an effect does as well as a mistake of the set if it leaves no more than so many times its squares.
 _AS_GOOD = 1.02
 # Fitted to the end, the cost of a rough fit falls by this share of it at most, or of what the effect gained.
 _FALLS, _GAINS_MORE = 0.2, 0.1
