@@ -16,7 +16,7 @@ from forcegrasp.diagnosis.search import at_once, conclusion, search
 from forcegrasp.diagnosis.search import refine as refine_module
 from forcegrasp.diagnosis.search import step as step_module
 from forcegrasp.diagnosis.search.left_over import leaves_forms, leaves_little
-from forcegrasp.diagnosis.search.refine import fit_with, refine_anyway
+from forcegrasp.diagnosis.search.refine import best_as_given, fit_with, refine_anyway
 from forcegrasp.diagnosis.search.screen import Screen
 from forcegrasp.diagnosis.search.stalled_base import better_without
 from forcegrasp.diagnosis.search.step import _Start, look_further
@@ -348,6 +348,7 @@ def test_what_replaces_the_law_of_contacts_is_fitted_however_little_it_promises(
     study, base = creeping
     fitted: list[str] = []
     monkeypatch.setattr(step_module, "refine_anyway", lambda effects, *_: fitted.extend(e.name for e in effects) or [])
+    monkeypatch.setattr(step_module, "best_as_given", lambda *_: [])
     effects = sorted(catalogue().values(), key=lambda effect: bool(effect.instead_of))
     scores = [Score(EffectSetting.typical(effect), 0.0, np.zeros(1)) for effect in effects]
     _Start(study, base.fit).fit_anyway(scores, np.zeros(1))
@@ -450,3 +451,22 @@ def test_where_much_is_left_effects_are_fitted_from_parameters_as_given_too(cree
     if begun:
         assert begins[1][index] == base.fit.problem.start()[index]
         assert found.effect("smooth_friction").values[0] == pytest.approx(0.1, rel=0.15)
+
+
+@pytest.mark.parametrize(("much", "found"), [(0.5, [SMOOTH]), (1e3, [])])
+def test_which_effects_leave_least_beside_parameters_as_given(creeping, monkeypatch, much, found):
+    study, base = creeping
+    monkeypatch.setattr(refine_module, "_MADE_UP", much)
+    effects = [DELAY, SMOOTH, OFFSET]
+    assert best_as_given(effects, study, base.fit, 1) == found
+    ordered = best_as_given(effects, study, base.fit, 9)
+    assert len(ordered) == 3 * len(found)
+    asked = []
+    monkeypatch.setattr(step_module, "refine_anyway", lambda effects, *_: asked.extend(effects) or [])
+    monkeypatch.setattr(step_module, "_FITTED_ANYWAY", 1)
+    monkeypatch.setattr(step_module, "_AS_GIVEN", 1)
+    scores = Screen(effects, study).look(study, base.fit, _Start(study, base.fit).background, effects, None,
+                                         np.random.default_rng(0)).scores  # fmt: skip
+    monkeypatch.setattr(step_module, "best_effects", lambda *_: [OFFSET, DELAY, SMOOTH])
+    _Start(study, base.fit).fit_anyway(scores, np.zeros(1))
+    assert asked == [OFFSET, *found]

@@ -15,6 +15,7 @@ from forcegrasp.effects import Effect
 from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.identify.base_fit import rms_error
 from forcegrasp.identify.fit import Fit, fit_once
+from forcegrasp.identify.predict import Case, predict
 from forcegrasp.identify.problem import Problem
 from forcegrasp.identify.side_by_side import side_by_side
 from forcegrasp.short_repr import ShortRepr
@@ -102,6 +103,24 @@ def refine_anyway(
         study.progress(f"refitting with {setting.effect.name} {setting.variant} on all grasps")
         tasks.append(partial(roughly_as, [setting], fit, without, study, begin=begin))
     return side_by_side(tasks)
+
+
+def best_as_given(effects: Sequence[type[Effect]], study: Study, fit: Fit, most: int) -> list[type[Effect]]:
+    """So many of the effects at most, those that leave least of few grasps beside base parameters as given, unfitted.
+
+    Where the base fit has made up for one, signatures there say nothing of it. None where little is left.
+    """
+    some, part = study.on_few(fit)
+    if rms_error(part, some.target) <= _MADE_UP:
+        return []
+    tried, begun = trials(effects), part.problem.case(as_given(part))
+    cases = [Case(begun.base, (*begun.effects, one)) for one in tried]
+    left = map(some.target.residual, predict(some.rough or some.simulators.cheap, cases))
+    costs: dict[type[Effect], float] = {}
+    for one, residual in zip(tried, left, strict=True):
+        cost = float(np.sum((part.weight * residual) ** 2))
+        costs[one.effect] = min(cost, costs.get(one.effect, np.inf))
+    return sorted(costs, key=lambda effect: costs[effect])[:most]
 
 
 def as_given(fit: Fit) -> np.ndarray:

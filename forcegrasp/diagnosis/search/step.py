@@ -17,7 +17,7 @@ from forcegrasp.diagnosis.evidence import (
 from forcegrasp.diagnosis.noise.noise_check import unexpected_noise
 from forcegrasp.diagnosis.result import Candidate, Step
 from forcegrasp.diagnosis.search.judge import LEAST_GAIN, LEAST_GAIN_AT_FLOOR, judged
-from forcegrasp.diagnosis.search.refine import LOST_IF_FITTED, NO_BETTER, refine, refine_anyway
+from forcegrasp.diagnosis.search.refine import LOST_IF_FITTED, NO_BETTER, best_as_given, refine, refine_anyway
 from forcegrasp.diagnosis.search.screen import MAX_GAIN_FACTOR, Screen
 from forcegrasp.diagnosis.search.to_the_end import ALL_FITTED, to_the_end
 from forcegrasp.diagnosis.signatures import Background, Score, best_effects, direction, of_best_effects
@@ -40,6 +40,8 @@ _WORTH_A_TRIAL = 0.4
 _REFITTED, _NEAR_THE_BEST = 5, 0.5
 # So many are, where none promises enough.
 _FITTED_ANYWAY = 12
+# And of those that leave least beside base parameters as given, where much is left.
+_AS_GIVEN = 4
 # Of these the best ones are fitted to the end.
 _REFINED = 3
 # On few grasps an effect does as well as a mistake of the set if it leaves no more than so many times its squares.
@@ -280,6 +282,7 @@ class _Start:
         ordered = best_effects(scores, len(scores))
         # what takes the place of the scene's own law has no small size, and a signature that says little
         effects = [e for place, e in enumerate(ordered) if place < _FITTED_ANYWAY or e.instead_of]
+        effects += [e for e in best_as_given(ordered, self._study, self._fit, _AS_GIVEN) if e not in effects]
         for effect in effects:
             self._study.progress(f"fitting {effect.name} to few grasps, though it promises little")
         return [self._judge_by_gain(fit, null) for fit in refine_anyway(effects, self._study, self._fit)]
