@@ -181,7 +181,7 @@ class Plant(ContributedFields):
         if position is not None:
             self._place(ids, position)
             if self.gripper.command == "position":  # servos hold them there, with no effort
-                self._ctrl[ids[:, None], self.actuators] = position * self._command_scale + self._command_zero
+                self._ctrl[ids[:, None], self.actuators] = self._controls(position)
         if velocity is not None:
             self._qvel[ids[:, None], self.motor_dofs] = velocity * self._signs
         if not self.gripper.is_servo:
@@ -297,7 +297,7 @@ class Plant(ContributedFields):
             raise RuntimeError("effects act in every step: advance step by step")
         control = np.repeat(self._ctrl[:, None], commands.shape[1], axis=1)
         commands = self.effects.commands(commands, fresh)
-        control[..., self._drives] = commands * self._command_scale + self._command_zero
+        control[..., self._drives] = self._controls(commands)
         self._apply_actions()
         parts: list[dict[str, np.ndarray]] = []
         length = commands.shape[1] if stretch is None else at_once
@@ -321,7 +321,11 @@ class Plant(ContributedFields):
         return self.batch.warning[..., 1]
 
     def _send(self, command: np.ndarray) -> None:
-        self._ctrl[:, self._drives] = command * self._command_scale + self._command_zero
+        self._ctrl[:, self._drives] = self._controls(command)
+
+    def _controls(self, command: np.ndarray) -> np.ndarray:
+        """Control signals of the actuators for commands of the motors, ``(..., motors)``."""
+        return command * self._command_scale + self._command_zero
 
     def _write_force_range(self) -> None:
         """Limits the motors as effects say, and holds still those that are switched off."""

@@ -111,7 +111,7 @@ def test_what_was_found_at_once_is_asked_among_look_alikes_of_any_family(found, 
     alike = [effect_of(name, fit.problem.gripper) for name in (DEADBAND, "command_delay")]
     ask_again(study, at_once, fit, alike)
     assert (FRICTION, [DEADBAND]) not in asked
-    monkeypatch.setattr("forcegrasp.diagnosis.search.ask_again._AS_GOOD", np.inf)
+    monkeypatch.setattr("forcegrasp.diagnosis.search.ask_again.AS_GOOD", np.inf)
     ask_again(study, at_once, fit, alike)
     assert (FRICTION, [DEADBAND]) not in asked  # its signature promises too little
     monkeypatch.setattr("forcegrasp.diagnosis.search.ask_again.promising", lambda study, fit, name, effects: effects)

@@ -14,15 +14,12 @@ from forcegrasp.diagnosis.result import Candidate, Step
 from forcegrasp.diagnosis.search.exchange import against, steps_of
 from forcegrasp.diagnosis.search.merge import promising
 from forcegrasp.diagnosis.search.needless import chained
-from forcegrasp.diagnosis.search.refine import NO_BETTER, refine_anyway
+from forcegrasp.diagnosis.search.refine import AS_GOOD, NO_BETTER, refine_anyway
 from forcegrasp.diagnosis.signatures import direction, trials
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.effects import Effect
 from forcegrasp.identify.fit import Fit
 from forcegrasp.identify.side_by_side import side_by_side
-
-# On few grasps an effect may leave so many times as much as the one in whose place it is, and yet do as well on all.
-_AS_GOOD = 1.02
 
 
 def ask_again(
@@ -46,7 +43,7 @@ def ask_again(
         if step.candidates[0].without is not None:
             own = fit.effect(step.effects[0]).effect
             asked = [e for e in effects if not at_floor or e.of_set != own.of_set]
-            rivals = list(_in_its_place(study, step, fit, asked, of_any_family=True, most=_AS_GOOD))
+            rivals = list(_in_its_place(study, step, fit, asked, of_any_family=True, most=AS_GOOD))
         elif step is not found[-1]:
             rivals = [*rivals_in(step, fit), *_in_its_place(study, step, fit, () if at_floor else effects)]
         else:

@@ -26,6 +26,8 @@ _LOST = 0.4
 LOST_IF_FITTED = 0.7
 #: A rough fit whose cost is no smaller share of another's is no better; rough ones end within a tenth of that.
 NO_BETTER = 0.99
+#: On few grasps an effect may leave so many times as much as the one in whose place it is, and yet do as well on all.
+AS_GOOD = 1.02
 # Beyond so many times the noise base parameters may be far from where they are with the effect that is missing.
 _MADE_UP = 3.0
 

@@ -17,7 +17,7 @@ from forcegrasp.diagnosis.evidence import (
 from forcegrasp.diagnosis.noise.noise_check import unexpected_noise
 from forcegrasp.diagnosis.result import Candidate, Step
 from forcegrasp.diagnosis.search.judge import LEAST_GAIN, LEAST_GAIN_AT_FLOOR, judged
-from forcegrasp.diagnosis.search.refine import LOST_IF_FITTED, NO_BETTER, best_as_given, refine, refine_anyway
+from forcegrasp.diagnosis.search.refine import AS_GOOD, LOST_IF_FITTED, NO_BETTER, best_as_given, refine, refine_anyway
 from forcegrasp.diagnosis.search.screen import MAX_GAIN_FACTOR, Screen
 from forcegrasp.diagnosis.search.to_the_end import ALL_FITTED, to_the_end
 from forcegrasp.diagnosis.signatures import Background, Score, best_effects, direction, of_best_effects
@@ -44,8 +44,6 @@ _FITTED_ANYWAY = 12
 _AS_GIVEN = 4
 # Of these the best ones are fitted to the end.
 _REFINED = 3
-# On few grasps an effect does as well as a mistake of the set if it leaves no more than so many times its squares.
-_AS_GOOD = 1.02
 # Fitted to the end, the cost of a rough fit falls by this share of it at most, or of what the effect gained.
 _FALLS, _GAINS_MORE = 0.2, 0.1
 
@@ -252,13 +250,10 @@ class _Start:
           effects: that may be in its place.
           null: gains of the best signature of noise.
         """
-        name, own = best.effect.name, best.effect
+        own = best.effect
         alike = families.look_alikes_of(own, effects, of_any_family=best.share < EXPLAINED_FAR)
         alike = [effect for effect in alike if not families.is_richer(effect, own)]
-        for effect in alike:
-            self._study.progress(f"trying {effect.name} in place of {name}")
-        fits = refine_anyway(alike, self._study, best.fit, name)
-        return [self._judge_by_gain(fit, null) for fit in fits]
+        return self._in_its_place(best, alike, null)
 
     def _instead_of_set(self, best: Candidate, effects: Sequence[type[Effect]], null: np.ndarray) -> list[Candidate]:
         """Rough fits with look-alikes in the place of a mistake of the set, those that leave as little on few grasps.
@@ -272,10 +267,16 @@ class _Start:
           null: gains of the best signature of noise.
         """
         alike = families.look_alikes_of(best.effect, effects, of_any_family=True)
+        return self._in_its_place(best, alike, null, AS_GOOD)
+
+    def _in_its_place(
+        self, best: Candidate, alike: Sequence[type[Effect]], null: np.ndarray, most: float = NO_BETTER
+    ) -> list[Candidate]:
+        """Rough fits with these effects in one's place, those that leave at most so much of what it leaves."""
+        name = best.effect.name
         for effect in alike:
-            self._study.progress(f"trying {effect.name} in place of {best.effect.name}")
-        fits = refine_anyway(alike, self._study, best.fit, best.effect.name, _AS_GOOD)
-        return [self._judge_by_gain(fit, null) for fit in fits]
+            self._study.progress(f"trying {effect.name} in place of {name}")
+        return [self._judge_by_gain(fit, null) for fit in refine_anyway(alike, self._study, best.fit, name, most)]
 
     def fit_anyway(self, scores: Sequence[Score], null: np.ndarray) -> list[Candidate]:
         """Rough fits with the effects of these signatures, whatever little they promise."""
