@@ -37,7 +37,7 @@ PARTS = {
     step._Start.refit_richer.__code__: "fits with richer effects in place of known ones",
     needless.drop_needless.__code__: "fits without known effects",
     heldout_residual.__code__: "held-out grasps",
-    odd_grasps.odd_grasps.__code__: "odd grasps",
+    odd_grasps.odd_grasps.__wrapped__.__code__: "odd grasps",
     refine_anyway.__code__: "rough fits with effects that promise little",
     exchange.exchange.__code__: "effects in place of known ones",
     split.split.__code__: "two effects in place of one",

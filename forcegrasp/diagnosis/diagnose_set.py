@@ -105,7 +105,7 @@ class _Ways:
     def fitted(self, loaded: Loaded[MeasurementSet]) -> Fitted:
         """A set, fitted."""
         if self.model is None:
-            return fit_set.fit_model(loaded, self.seed, self.progress)
+            return fit_set.fit_model(loaded, self.seed, self.progress, hasty=True)
         return fit_set.apply_model(loaded, self.model, self.progress, refit=True)
 
     def search(
@@ -186,25 +186,31 @@ class _Ways:
 
         def put_right(fault: Fault, said: Fitted) -> tuple[Fault, Fitted] | None:
             model = fault.begun_from(model_of(found.fit, found.target, loaded, ()))
-            return dataclasses.replace(self, model=model).put_right(fault, said)
+            return dataclasses.replace(self, model=model).put_right(fault, said, widely=True)
 
         try:
             return with_givens_put_right(found, loaded, put_right, self._search_on, self.progress, least)
         except REASONS as reason:
             return dataclasses.replace(found, stopped=cut_short(reason, self.progress)), Simulators(found.fit.problem)
 
-    def put_right(self, fault: Fault, said: Fitted) -> tuple[Fault, Fitted] | None:
-        """The fault, or a wider one, and the set without it, fitted; None unless that leaves much less."""
+    def put_right(self, fault: Fault, said: Fitted, widely: bool = False) -> tuple[Fault, Fitted] | None:
+        """The fault, or a wider one, and the set without it, fitted; None unless that leaves much less.
+
+        Args:
+          fault: what may be wrong.
+          said: the set as it is, fitted.
+          widely: whether the wider one is tried though the fault itself leaves as much.
+        """
         self.progress(f"fitting the set with {fault.name} put right")
         right, wider = self.fitted(fault.put_right), fault.wider
-        if not leaves_less(fault, (right[0], right[2].fit), (said[0], said[2].fit)):
-            return None
-        if wider is not None and not leaves_nothing(right[2].fit, right[0]):
+        less = leaves_less(fault, (right[0], right[2].fit), (said[0], said[2].fit))
+        if wider is not None and (less or widely) and not leaves_nothing(right[2].fit, right[0]):
             self.progress("fitting it with the radii of more objects put right")
             more = self.fitted(wider.put_right)
-            if leaves_less(wider, (more[0], more[2].fit), (right[0], right[2].fit)):
+            before = right if less else said
+            if leaves_less(wider, (more[0], more[2].fit), (before[0], before[2].fit)):
                 return wider, more
-        return fault, right
+        return (fault, right) if less else None
 
 
 def _put_right_or_as_said(ways: _Ways, loaded: Loaded[MeasurementSet], said: Fitted) -> Found:

@@ -21,6 +21,8 @@ _NOISE = 0.5
 _MISSED = 0.1
 # Share by which one side's contacts may be stiffer than the other's; a set shows as much.
 _UNLIKE = 0.03
+# Share of the force that the largest command step is said to press with, which it must reach.
+_REACHED = 0.5
 # Share of their inertia that motors may get from the integrator.
 _HEAVIER = 0.1
 # Speed at which half of its dry friction may let an object creep, m/s: 0.1 mm in a second.
@@ -133,6 +135,11 @@ def _grasp(gripper: Gripper) -> Iterator[Finding]:
         return
     forces = " and ".join(f"{newtons:.3g}" for newtons in pressed)
     yield fine("grasp", f"an object of {radius:.3g} mm radius is pressed with {forces} N by full steps for 5 s")
+    said = gripper.training.max_force_n
+    if gripper.forces and pressed.mean() < _REACHED * said:
+        told = f"training.max_force_n is {said:.3g} N, and full steps of {gripper.max_step:g} {gripper.unit} press"
+        told += f" with {pressed.mean():.3g} N: goals beyond that are out of reach, and so are checks under such a load"
+        yield warning("forces", told, f"make control.max_step larger, or leave max_force_n out; {_PAGE}")
     yield from _stiffness(plant, pressed)
     if gripper.force == "sensors":
         yield from _sensors(gripper, pressed, force[-1])

@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 _PAGE = "see docs/compare-your-data.md"
 # Share of their distance by which rows scatter before that is told.
 _UNEVEN = 0.05
+# Times its clock's standard deviation by which a set's commands may be slower or faster than the gripper takes them.
+_CLOCK = 3.0
 
 
 def check_data(path: str) -> Iterator[Finding]:
@@ -53,6 +55,7 @@ def _readings(measured: MeasurementSet, gripper: Gripper) -> Iterator[Finding]:
         yield note("rows", f"{told}; uneven stamps", remedy)
     else:
         yield fine("rows", told)
+    yield from _clock(measured, gripper)
     if masses := [grasp.mass_kg for grasp in measured.grasps if grasp.mass_kg is not None]:
         yield fine("masses", f"of objects are given in {len(masses)} grasps: {min(masses):.3g} to {max(masses):.3g} kg")
     for name, value, channels in (
@@ -63,3 +66,16 @@ def _readings(measured: MeasurementSet, gripper: Gripper) -> Iterator[Finding]:
             yield fine("noise", f"of {name} is given: {value:.3g} {channels[0].unit}")
         elif channels:
             yield note("noise", f"of {name} is not given: it is estimated from the readings")
+
+
+def _clock(measured: MeasurementSet, gripper: Gripper) -> Iterator[Finding]:
+    """Whether commands come as often as the gripper takes them; where they are far from that, the set warns itself."""
+    from forcegrasp.measure.check_givens import clock_factor
+
+    share = measured.period_std_share
+    factor = clock_factor(measured, gripper.period_s, 1 + _CLOCK * share)
+    if factor is not None and clock_factor(measured, gripper.period_s) is None:
+        apart = f"commands are {1e3 * factor * gripper.period_s:.4g} ms apart, and the gripper takes one every"
+        beyond = f"beyond {_CLOCK:g} times the period_std_share of {share:g}"
+        told = f"{apart} {1e3 * gripper.period_s:g} ms: {factor - 1:+.1%}, {beyond}"
+        yield note("clock", told, "is it the clock of the rows that is off, or control.period_s of the description?")

@@ -21,7 +21,10 @@ class FingerCompliance(Effect):
     formula = "p = m + c F_pad"
     source = "series elasticity (Pratt and Williamson 1995), quasi-static"
     look_alikes = ("finger_creep", "stiffening_contact", "viscoelastic_contact", "encoder_bias")
-    separates = "objects of several softnesses: the finger's deflection is the same for all at one force"
+    separates = (
+        "objects whose stiffness is known, or far above the finger's: stiffnesses that are fitted object by object take"
+        " up a spring that is alike on both sides"
+    )
     parameters = (
         Parameter(
             "compliance_m_n",

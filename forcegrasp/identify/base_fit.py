@@ -30,6 +30,8 @@ _FINISHED = 3
 _SAME_SHARE, _SAME_COST = 0.01, 0.002
 # Up to so many times the noise, a fit is where it should be, wherever others ended.
 _NOISE_ALONE = 1.1
+# Beyond so many times the noise an effect is missing, or the set is wrong, wherever exactly a fit ends.
+_MUCH = 1.5
 # Where an effect is missing the cost has many minima: starts agree if their costs beyond the noise do to this share.
 _SAME_BEYOND = 0.2
 # A fit had stopped short if on few grasps it goes on by this share of what it leaves beyond the noise.
@@ -50,6 +52,7 @@ class BaseFit(ShortRepr):
     reason: str = ""  #: why it is not, in words
     starts_agree: bool = True  #: whether two starts at least ended in the best place
     settled: bool = False  #: whether no step lowers the error, however short, though slopes say so: contacts are rough
+    unfinished: bool = False  #: whether it was left before its end, as it leaves much: see :func:`finished`
 
 
 def fit_base(
@@ -58,8 +61,18 @@ def fit_base(
     simulators: Simulators,
     rng: np.random.Generator,
     progress: Progress = silent,
+    hasty: bool = False,
 ) -> BaseFit:
-    """Fits from the nominal parameters, and then looks from random places inside the bounds for a better optimum."""
+    """Fits from the nominal parameters, and then looks from random places inside the bounds for a better optimum.
+
+    Args:
+      target: the measurements.
+      problem: what may be changed.
+      simulators: of the problem's grasps.
+      rng: for the random places.
+      progress: told what is going on.
+      hasty: leaves a fit that is much more than noise before its end: that takes long, and an effect is missing anyway.
+    """
     first = fit_once(target, problem, simulators, guess(target, problem))
     progress(f"base model, start 1 of {STARTS}: {rms_error(first, target):.2f} × noise")
     if lead_astray(first, target):
@@ -97,6 +110,14 @@ def fit_base(
     checked = check_gradient(first, target, errors)
     if checked.converged:
         return checked
+    if hasty and rms_error(first, target) > _MUCH:
+        return dataclasses.replace(checked, unfinished=True)
+    return finished(checked, target, simulators)
+
+
+def finished(base: BaseFit, target: Target, simulators: Simulators) -> BaseFit:
+    """A fit whose slopes have not vanished yet, brought to its end."""
+    first, errors, problem = base.fit, base.errors, base.fit.problem
     # the cheap model's slopes may lead no further where the model itself still falls
     further = check_gradient(fit_exactly(target, problem, simulators, first.vector), target, errors)
     if not further.converged and not simulators.one_model:

@@ -28,6 +28,8 @@ _FAR, _COUNTS, _COUNTS_NEAR, _SHARES = 3.0, 0.02, 0.05, (1.0, 0.5, 0.25, 0.1)
 # So is one that leaves less than this share of a fold's squares: what was not fitted to is not fitted so much better.
 # And one that leaves so many times as much: where others hardly fix what a fold shows, a straight step goes anywhere.
 _TOO_GOOD, _TOO_BAD = 0.25, 10.0
+# A step by which a fold leaves so many times the squares of the fit is held against shorter ones.
+_FAR_WORSE = 4.0
 # What fits leave of held-out grasps, with target and folds: a search, its doubts and its report ask for the same.
 _KNOWN: WeakKeyDictionary[Fit, list[tuple[Target, Sequence[np.ndarray], np.ndarray]]] = WeakKeyDictionary()
 
@@ -131,26 +133,31 @@ def step_of(fit: Fit, inner: np.ndarray, slope: np.ndarray) -> np.ndarray:
 def _simulate(fit: Fit, target: Target, doubtful: list[tuple[np.ndarray, np.ndarray]], held: np.ndarray) -> None:
     """Replaces residuals of folds by simulated ones, of the longest step that lowers the error of the others.
 
-    The cheap model simulates them: by how much it is off is known where the fit ended, and steps are small.
+    Or of a shorter one that lowers it by more, where a fold's own error rises far: slopes that lead there do not hold
+    for so long. The cheap model simulates them: by how much it is off is known where the fit ended.
     """
     problem = fit.problem
     replay = Replay(problem.gripper, problem.grasps, cheap_tier(problem.gripper))
     squares = np.sum((fit.weight * fit.residual) ** 2, axis=(1, 2))
+    for fold, _ in doubtful:  # if no step lowers it, the others' own optimum is where the fit is
+        held[fold] = fit.residual[fold]
+    fell = dict.fromkeys((int(fold[0]) for fold, _ in doubtful), -1.0)
     for scale in _SHARES:
         vectors = [fit.vector + scale * step for _, step in doubtful]
         signals = predict(replay, [problem.case(vector) for vector in vectors]) + fit.correction
-        residuals = target.residual(signals)
-        left = []
-        for (fold, step), residual in zip(doubtful, residuals, strict=True):
-            others = np.delete(np.sum((fit.weight * residual) ** 2, axis=(1, 2)), fold)
-            if others.sum() <= np.delete(squares, fold).sum():
-                held[fold] = residual[fold]
-            else:
-                left.append((fold, step))
-        if not (doubtful := left):
+        shorter = []
+        for (fold, step), residual in zip(doubtful, target.residual(signals), strict=True):
+            after = np.sum((fit.weight * residual) ** 2, axis=(1, 2))
+            fall = np.delete(squares - after, fold).sum()
+            before = fell[int(fold[0])]
+            if lowers_more := fall >= max(before, 0.0):
+                fell[int(fold[0])], held[fold] = fall, residual[fold]
+            if (before < 0 and not lowers_more) or (
+                lowers_more and after[fold].sum() > _FAR_WORSE * squares[fold].sum()
+            ):
+                shorter.append((fold, step))
+        if not (doubtful := shorter):
             return
-    for fold, _ in doubtful:  # the others' own optimum is where the fit is
-        held[fold] = fit.residual[fold]
 
 
 def log_likelihood(residual: np.ndarray) -> np.ndarray:

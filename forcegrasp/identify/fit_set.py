@@ -22,8 +22,10 @@ from forcegrasp.physics.sensors import is_rounding
 from forcegrasp.replay.replay import NOWHERE
 
 
-def fit_model(loaded: Loaded[MeasurementSet], seed: int, progress: Progress) -> tuple[Target, Simulators, BaseFit]:
-    """Fits the base model to a set, from several starts.
+def fit_model(
+    loaded: Loaded[MeasurementSet], seed: int, progress: Progress, hasty: bool = False
+) -> tuple[Target, Simulators, BaseFit]:
+    """Fits the base model to a set, from several starts; for ``hasty`` see :func:`.fit_base`.
 
     Raises:
       PhysicsError: if it diverges wherever the fit went.
@@ -31,9 +33,9 @@ def fit_model(loaded: Loaded[MeasurementSet], seed: int, progress: Progress) -> 
     target = make_target(loaded.measured, loaded.gripper)
     problem = Problem(loaded.gripper, target.grasps)
     simulators = Simulators(problem)
-    base = fit_base(target, problem, simulators, np.random.default_rng(seed), progress)
+    base = fit_base(target, problem, simulators, np.random.default_rng(seed), progress, hasty)
     if lead_astray(base.fit, target):
-        return fit_model(_with_own_steps(loaded, progress), seed, progress)
+        return fit_model(_with_own_steps(loaded, progress), seed, progress, hasty)
     return _weighed(target, simulators, base)
 
 
@@ -79,8 +81,11 @@ def _weighed(target: Target, simulators: Simulators, base: BaseFit) -> tuple[Tar
     _refuse_diverged(base, simulators)
     weighed, fit = reweigh(target, base.fit, simulators)
     if fit is not base.fit and base.starts_agree:  # what one motion alone is missed by may not fall any further
+        unfinished = base.unfinished
         base = check_gradient(fit, weighed, base.errors)
-        if not base.converged:  # slopes of what sticks and slips never vanish: does the error still fall?
+        if unfinished and not base.converged:
+            base = dataclasses.replace(base, unfinished=True)
+        elif not base.converged:  # slopes of what sticks and slips never vanish: does the error still fall?
             further = fit_exactly(weighed, fit.problem, simulators, fit.vector)
             if fit.cost - further.cost <= cost_tolerance(further, weighed):
                 base = BaseFit(fit, base.errors, True)

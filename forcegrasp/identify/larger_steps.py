@@ -7,6 +7,9 @@ import dataclasses
 import numpy as np
 
 from forcegrasp.identify.fit import Fit
+from forcegrasp.identify.predict import predict
+from forcegrasp.identify.problem import Problem
+from forcegrasp.identify.simulators import Simulators
 from forcegrasp.identify.target import Target
 from forcegrasp.physics.gripper import Gripper
 
@@ -29,3 +32,18 @@ def lead_astray(fit: Fit, target: Target) -> bool:
 def with_own_steps(gripper: Gripper) -> Gripper:
     """The gripper, to be fitted with the steps of its scene alone."""
     return dataclasses.replace(gripper, own_steps=True)
+
+
+def with_larger_steps_again(fit: Fit, target: Target) -> tuple[Target, Simulators, Fit] | None:
+    """The same with larger physics steps, if grasps do not go another way with them where a fit with own steps ended.
+
+    Contacts that make up for an effect that the model lacks may ask for short steps; with the effect they do not.
+    """
+    gripper = dataclasses.replace(target.gripper, own_steps=False)
+    problem = Problem(gripper, fit.problem.grasps, fit.problem.effects)
+    simulators = Simulators(problem)
+    if simulators.one_model:
+        return None
+    correction = fit.predicted - predict(simulators.cheap, [problem.case(fit.vector)])[0]
+    fit = dataclasses.replace(fit, problem=problem, correction=correction)
+    return None if lead_astray(fit, target) else (dataclasses.replace(target, gripper=gripper), simulators, fit)

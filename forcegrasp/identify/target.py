@@ -25,7 +25,7 @@ _QUANTUM = 1.0
 _FINEST = 1e-4
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Target(ShortRepr):
     """Measured signals of all grasps, padded to the longest.
 

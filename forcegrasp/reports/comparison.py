@@ -11,7 +11,7 @@ from rich.table import Table as Printed
 from rich.text import Text as Plain
 
 from forcegrasp.identify.comparison import Cell, Comparison
-from forcegrasp.identify.cross_validation import rms
+from forcegrasp.identify.cross_validation import rms, rms_of_grasps
 from forcegrasp.identify.noise_floor import at_floor, most_at_floor
 from forcegrasp.identify.target import Target
 from forcegrasp.reports import between_sets, figures
@@ -38,6 +38,8 @@ PHASE_WORDS = {
 _WORTH_TELLING = 0.05
 # Errors by phase are of all that the model was fitted to: said where held-out ones differ from them by this share.
 _OTHERWISE = 0.1
+# So is a grasp that, held out, is missed by so many times as much as in the fit.
+_ALONE = 2.0
 _GOES_WITH = "what it goes with"
 #: What single readings are called that no motion explains.
 WRONG = "readings that went wrong"
@@ -215,8 +217,21 @@ def _rows(comparison: Comparison) -> list[tuple[str, str]]:
     fitted, held = rms(comparison.residual, target), comparison.floor_ratio()
     if abs(held - fitted) > _OTHERWISE * held:
         rows.append(("errors by phase", f"of the fit to all {target.part}s, {fitted:.2f} × noise in all"))
+        rows += _alone_rows(comparison)
     noise, _, sizes = noise_sentence(target).partition(": ")
     return [*rows, (noise, sizes)]
+
+
+def _alone_rows(comparison: Comparison) -> list[tuple[str, str]]:
+    """Which grasp, held out, is missed by far more than in the fit: it shows what no other does."""
+    target = comparison.target
+    held, fitted = rms_of_grasps(comparison.heldout, target), comparison.by_grasp()
+    times = held / np.maximum(fitted, 1.0)
+    if target.gripper.is_servo or not np.nanmax(times, initial=0.0) > _ALONE:
+        return []
+    worst = int(np.nanargmax(times))
+    told = f"{target.grasps[worst].label} is missed by {held[worst]:.1f} × noise, {fitted[worst]:.1f} × in the fit to"
+    return [("held out", f"{told} all: no other {target.part} shows what it does; record more like it")]
 
 
 def wrong_words(comparison: Comparison) -> str:

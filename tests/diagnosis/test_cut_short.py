@@ -72,7 +72,7 @@ def test_effects_on_trial_are_not_told_when_the_trial_is_cut_short():
 def test_a_set_is_not_searched_on_after_that(rubbing, monkeypatch, reason):
     """No moves within tolerance, no law, no second opinion: they would take minutes."""
     loaded, target, simulators, base = rubbing
-    monkeypatch.setattr(OF_SET.fit_set, "fit_model", lambda *_: (target, simulators, base))
+    monkeypatch.setattr(OF_SET.fit_set, "fit_model", lambda *_, **__: (target, simulators, base))
     monkeypatch.setattr(SEARCH, "look_further", raising(reason))
     for name in ("go_on_with_moved", "find_law", "more_likely"):
         monkeypatch.setattr(OF_SET, name, None)
@@ -85,7 +85,7 @@ def test_a_set_is_not_searched_on_after_that(rubbing, monkeypatch, reason):
 @pytest.mark.parametrize("reason", [reason for reason, _ in REASONS])
 def test_it_may_be_cut_short_anywhere_once_the_base_model_is_fitted(rubbing, monkeypatch, where, reason):
     loaded, target, simulators, base = rubbing
-    monkeypatch.setattr(OF_SET.fit_set, "fit_model", lambda *_: (target, simulators, base))
+    monkeypatch.setattr(OF_SET.fit_set, "fit_model", lambda *_, **__: (target, simulators, base))
     monkeypatch.setattr(OF_SET, where, raising(reason))
     found, _ = diagnose_set(loaded, None, ["coulomb_friction"], 0, silent, law=True)
     assert found.stopped

@@ -189,6 +189,17 @@ def test_a_sensor_that_does_not_feel_what_presses(changed):
     assert "the right one reads 0 N where 0.833 N press" in line
 
 
+@pytest.mark.parametrize(("said_n", "told"), [(1.6, False), (1.7, True)])
+def test_a_force_that_full_steps_do_not_reach(said_n, told, monkeypatch):
+    second = load_gripper(str(SECOND / "second.yaml"))
+    training = dataclasses.replace(second.training, max_force_n=said_n)
+    monkeypatch.setattr("forcegrasp.physics.load_gripper", lambda _: dataclasses.replace(second, training=training))
+    lines = said("second").get("warning", [])
+    assert (
+        any(f"max_force_n is {said_n} N, and full steps" in line and "with 0.833 N" in line for line in lines) == told
+    )
+
+
 def test_contacts_that_depend_on_the_collision_code(changed):
     round_object = {'type="box" size="0.02 0.03 0.03"': 'type="cylinder" size="0.02 0.03"'}
     (line,) = said(changed(xml=round_object))["warning"]

@@ -90,6 +90,39 @@ def test_a_straight_step_that_leaves_far_more_than_the_fit_is_simulated(monkeypa
     assert [fold.tolist() for fold, _ in asked] == [[0]]
 
 
+@pytest.mark.parametrize(
+    ("others", "own", "asked", "taken"),
+    [
+        ((90, 80, 0, 0), (3, 2, 0, 0), 1, 3),  # it holds
+        ((110, 95, 0, 0), (3, 2, 0, 0), 2, 2),  # the others leave more
+        ((90, 80, 85, 0), (9, 5, 3, 0), 3, 5),  # the fold leaves far more, and the others less by a shorter one
+        ((90, 92, 0, 0), (9, 5, 0, 0), 2, 9),
+        ((110, 110, 110, 110), (9, 5, 3, 2), 4, 1),
+    ],
+)
+def test_the_step_that_does_most_for_the_others_is_simulated(monkeypatch, others, own, asked, taken):
+    """Squares that the others and a fold leave by steps of four lengths, of 100 and 1 where the fit ended."""
+    seen = []
+
+    def predict(replay, cases):
+        seen.append(cases)
+        size = np.where(np.arange(G) == 2, np.sqrt(own[len(seen) - 1]), np.sqrt(others[len(seen) - 1] / (G - 1)))
+        return np.broadcast_to(size[:, None, None], (1, G, 1, 1))
+
+    monkeypatch.setattr(cross_validation, "predict", predict)
+    monkeypatch.setattr(cross_validation, "Replay", lambda *_: None)
+    monkeypatch.setattr(cross_validation, "cheap_tier", lambda *_: None)
+    problem = SimpleNamespace(gripper=None, grasps=None, case=float)
+    residual = np.where(np.arange(G) == 2, 1.0, np.sqrt(100 / (G - 1)))[:, None, None]
+    fit = SimpleNamespace(problem=problem, vector=0.0, correction=0.0, weight=np.ones((G, 1, 1)), residual=residual)
+    held = np.full((G, 1, 1), np.nan)
+    target = SimpleNamespace(residual=lambda signals: signals)
+    cross_validation._simulate(fit, target, [(np.array([2]), 8.0)], held)
+    assert [case for cases in seen for case in cases] == [8.0, 4.0, 2.0, 0.8][:asked]
+    assert held[2, 0, 0] ** 2 == pytest.approx(taken)
+    assert np.isnan(np.delete(held, 2)).all()
+
+
 def test_a_step_ends_at_the_bounds():
     rng, target = np.random.default_rng(0), make()
     jacobian = 100 * rng.standard_normal((G, S, 4, 2))

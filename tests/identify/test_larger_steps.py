@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import dataclasses
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from forcegrasp.identify import base_fit, fit_set
+from forcegrasp.identify import base_fit, fit_set, larger_steps
 from forcegrasp.identify.fit_set import apply_model, fit_model
 from forcegrasp.identify.fitted_model import model_of
-from forcegrasp.identify.larger_steps import lead_astray, with_own_steps
+from forcegrasp.identify.larger_steps import lead_astray, with_larger_steps_again, with_own_steps
+from forcegrasp.identify.predict import predict
+from forcegrasp.identify.problem import Problem
 from forcegrasp.identify.progress import silent
 from forcegrasp.identify.simulators import cheap_tier
 from forcegrasp.identify.target import make_target
@@ -63,3 +66,30 @@ def test_a_set_is_fitted_again_with_own_steps(loaded, monkeypatch):
     asked.clear()
     apply_model(loaded, model, silent, refit=False)
     assert not asked  # nothing is fitted
+
+
+def test_larger_steps_come_back_where_grasps_go_the_same_way(loaded, monkeypatch):
+    quick = dataclasses.replace(loaded.gripper, fast="sphere")
+    own = dataclasses.replace(loaded, gripper=with_own_steps(quick))
+    target, simulators, base = fit_model(own, 0, silent)
+    fit = base.fit
+    assert simulators.one_model
+    assert not fit.correction.any()
+    monkeypatch.setattr(larger_steps, "lead_astray", lambda fit, target: False)
+    again = with_larger_steps_again(fit, target)
+    assert again is not None
+    target_then, simulators_then, fit_then = again
+    assert target_then.gripper is fit_then.problem.gripper
+    assert (target_then.gripper.own_steps, simulators_then.one_model) == (False, False)
+    assert (fit_then.vector is fit.vector, fit_then.cost) == (True, fit.cost)
+    cheap = predict(simulators_then.cheap, [fit_then.problem.case(fit.vector)])[0]
+    assert np.allclose(fit_then.predicted, cheap + fit_then.correction)
+    assert fit_then.correction.any()
+    monkeypatch.setattr(larger_steps, "lead_astray", lambda fit, target: True)
+    assert with_larger_steps_again(fit, target) is None
+
+
+def test_there_are_none_to_come_back_to_without_a_cheaper_simulation(loaded):
+    own = with_own_steps(loaded.gripper)
+    target = make_target(loaded.measured, own)
+    assert with_larger_steps_again(SimpleNamespace(problem=Problem(own, target.grasps)), target) is None

@@ -75,3 +75,14 @@ def test_stamps_that_scatter(measured, tmp_path, capsys):
     (line,) = found["note"]
     assert "ms apart (from 3" in line
     assert "uneven stamps" in line
+
+
+@pytest.mark.parametrize(("factor", "told"), [(1.005, False), (1.06, True), (0.94, True), (1.5, False)])
+def test_a_clock_that_is_off_by_more_than_its_tolerance(measured, tmp_path, capsys, factor, told):
+    """Far off it is a warning of the set itself."""
+    grasps = [dataclasses.replace(grasp, time_s=factor * grasp.time_s) for grasp in measured.grasps]
+    write_set(dataclasses.replace(measured, grasps=tuple(grasps)), tmp_path / "set")
+    _, found = said(capsys, tmp_path / "set")
+    lines = [line for line in found.get("note", []) if "commands are" in line]
+    assert len(lines) == told
+    assert all(f"{factor - 1:+.1%}" in line and f"{40 * factor:.4g} ms apart" in line for line in lines)

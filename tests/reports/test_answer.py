@@ -342,6 +342,18 @@ def test_where_held_out_grasps_are_missed_by_more_it_is_said_what_errors_by_phas
     assert told == [f"errors by phase: of the fit to all grasps, {fitted:.2f} × noise in all"] * is_told
 
 
+@pytest.mark.parametrize(("times", "is_told"), [(1.8, False), (2.2, True)])
+def test_a_grasp_that_shows_what_no_other_does_is_told(made_up, times, is_told):
+    residual = np.where(made_up.target.mask[..., None], 2.0, 0.0) * np.ones(made_up.comparison.residual.shape)
+    heldout = 1.3 * residual
+    heldout[1] = times * residual[1]
+    comparison = dataclasses.replace(made_up.comparison, residual=residual, heldout=heldout)
+    told = [line for line in comparison_report.details(comparison) if line.startswith("held out: ")]
+    label = made_up.target.grasps[1].label
+    line = f"held out: {label} is missed by {2 * times:.1f} × noise, 2.0 × in the fit to all: no other grasp shows what"
+    assert told == [f"{line} it does; record more like it"] * is_told
+
+
 def with_residual(diagnosis: Diagnosis, residual: np.ndarray) -> Diagnosis:
     """The same with a final fit that leaves something else."""
     return dataclasses.replace(diagnosis, fit=dataclasses.replace(diagnosis.fit, residual=residual))

@@ -6,6 +6,7 @@ import dataclasses
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -43,6 +44,7 @@ class OddGrasp:
         return f"{text}; {self.error_like:.1f} as one of {self.like})" if self.like else f"{text})"
 
 
+@lru_cache(maxsize=1)  # asked where a set is doubted, and again where its search begins
 def odd_grasps(target: Target, fit: Fit) -> tuple[OddGrasp, ...]:
     """The few grasps that a fit of all others misses by far; none if there are none, or many.
 

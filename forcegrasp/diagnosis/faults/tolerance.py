@@ -98,10 +98,14 @@ class Moved:
         return bool((np.abs(self.deviations) < _limits(self.numbers)).all())
 
     def radii_apart(self) -> list[str]:
-        """Objects whose radius is beyond the tolerance, if that is not so of all alike, as an effect would have it."""
+        """Objects whose radius is beyond the tolerance, if that is not so of all alike, as an effect would have it.
+
+        Where there are any, those that are moved at all stand with them: each explains little without the others.
+        """
         sizes = {n.owner: move for n, move in zip(self.numbers, self.deviations, strict=True) if n.kind == "radius_m"}
         alike = not sizes or max(sizes.values()) - min(sizes.values()) < MOST
-        return [] if alike else [name for name, move in sizes.items() if abs(move) >= MOST]
+        beyond = not alike and max(map(abs, sizes.values())) >= MOST
+        return [name for name, move in sizes.items() if abs(move) >= _TOLD] if beyond else []
 
     @property
     def radii_differ_by_m(self) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -16,7 +17,7 @@ from forcegrasp.diagnosis.search.left_over import AS_GOOD_AS_NOTHING, left_by_ma
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.diagnosis.verdict import EXPLAINED_FAR, MUCH, conclude, explained_share
 from forcegrasp.effects import Effect
-from forcegrasp.identify.base_fit import BaseFit, check_gradient
+from forcegrasp.identify.base_fit import BaseFit, check_gradient, cost_tolerance, finished
 from forcegrasp.identify.fit import Fit
 from forcegrasp.identify.noise_floor import numerical_error
 from forcegrasp.identify.verdict import Verdict
@@ -72,9 +73,12 @@ def concluded(begun: Begun, study: Study, steps: Sequence[Step], fit: Fit, in_a_
     beyond_floor = explained_share(error_before, error_after, noise=floor)
     leaves_more = error_after > AS_GOOD_AS_NOTHING * floor and beyond_floor < EXPLAINED_FAR
     led_on = bool(found) and check_gradient(fit, target).converged
+    told = not found or leaves_more
+    if left and base.unfinished and not (led_on or in_a_hurry) and told:
+        base = _finished(base, study)
     # nor is it the fit that is to blame for what no effect explains where no step leads further
-    came_to_an_end = base.converged or led_on or (base.settled and not found)
-    if left and not came_to_an_end and (not found or leaves_more):
+    came_to_an_end = base.converged or led_on or ((base.settled or base.unfinished) and not found)
+    if left and not came_to_an_end and told:
         return Diagnosis(
             Verdict.NOT_FITTED, (), (), base, base.fit, target, begun.folds, error_before, error_before,
             begun.numerical, odd=begun.odd,
@@ -99,3 +103,11 @@ def concluded(begun: Begun, study: Study, steps: Sequence[Step], fit: Fit, in_a_
         verdict, tuple(dict.fromkeys(names)), tuple(steps), base, fit, target, begun.folds, error_before, error_after,
         numerical, floor, left, odd, noise, alone=alone, may_be_forms=forms,
     )  # fmt: skip
+
+
+def _finished(base: BaseFit, study: Study) -> BaseFit:
+    """The base model's fit, brought to its end; the very same fit if that leads to no other place."""
+    study.progress("bringing the fit of the base model to its end")
+    end = finished(base, study.target, study.simulators)
+    same = base.fit.cost - end.fit.cost <= cost_tolerance(end.fit, study.target)
+    return dataclasses.replace(end, fit=base.fit) if same else end

@@ -40,6 +40,7 @@ from forcegrasp.effects import Effect
 from forcegrasp.identify.base_fit import BaseFit, rms_error
 from forcegrasp.identify.cross_validation import evidence_folds, make_folds
 from forcegrasp.identify.fit import Fit
+from forcegrasp.identify.larger_steps import with_larger_steps_again
 from forcegrasp.identify.noise_floor import beyond_fit, numerical_error, numerical_floor
 from forcegrasp.identify.progress import Progress, silent
 from forcegrasp.identify.simulators import Simulators
@@ -112,7 +113,11 @@ def diagnose(
         if so_far.given_first:
             return concluded(begun, *so_far.all, in_a_hurry=True)
         _tidy_up(so_far, begun)
-        return _believed(so_far, begun)
+        found = _believed(so_far, begun)
+        if start is None and found.base.fit is not base.fit:
+            progress(f"further on the base model leaves less: {rms_error(found.base.fit, target):.2f} × noise")
+            return diagnose(target, found.base, simulators, effects, rng, progress, start, stop_when)
+        return found
     except REASONS as reason:
         stopped = cut_short(reason, progress)
         return dataclasses.replace(concluded(begun, *so_far.sure, in_a_hurry=True), stopped=stopped)
@@ -187,11 +192,21 @@ def _add_effects(so_far: SoFar, begun: Begun, rng: np.random.Generator, stop_whe
             study = dataclasses.replace(study, target=target)
         step, fit = drop_needless(study, step, fit, begun.given)
         steps = [*steps, step]
+        study, fit = _with_larger_steps(study, fit)
         so_far.all = study, steps, fit
         little = study.target.gripper.is_servo and leaves_little(study, fit, begun.error, begun.floor)
         if little or not is_worth_looking(study, fit):
             break
     return None
+
+
+def _with_larger_steps(study: Study, fit: Fit) -> tuple[Study, Fit]:
+    """Both with larger physics steps, if the base fit bore none and what was found since does; else as they are."""
+    if not study.target.gripper.own_steps or (again := with_larger_steps_again(fit, study.target)) is None:
+        return study, fit
+    study.progress("from here on grasps go the same way with larger physics steps")
+    target, simulators, fit = again
+    return dataclasses.replace(study, target=target, simulators=simulators, few=None, rough=None), fit
 
 
 def _may_be_another(study: Study, fit: Fit, screen: Screen, effects: Sequence[type[Effect]]) -> bool:
