@@ -16,6 +16,7 @@ from forcegrasp.effects import get_effect
 from forcegrasp.identify.cross_validation import evidence_folds
 from forcegrasp.identify.fit_set import fit_model
 from forcegrasp.identify.simulators import Simulators
+from forcegrasp.identify.target import make_target
 from tests.light_set import light_set
 
 GAP_M, OFF_M = 0.0015, {"thing_0": 3e-4, "thing_1": -3e-4, "thing_2": 3e-4}
@@ -43,7 +44,7 @@ def loose():
     loaded = light_set(f"backlash loose gap_m={GAP_M}", seed=4, grasps=12)
     loaded = with_grasps(loaded, lambda g: dataclasses.replace(g, radius_m=g.radius_m + OFF_M.get(g.object, 0.0)))
     loaded = dataclasses.replace(loaded, measured=dataclasses.replace(loaded.measured, radius_std_m=3e-4))
-    numbers = tuple(number for number in _numbers(loaded.measured, fit_model(loaded, 0, silent)[0]))
+    numbers = _numbers(loaded.measured, make_target(loaded.measured, loaded.gripper))
     radii = tuple(number for number in numbers if number.kind == "radius_m")
     down = Moved(radii, np.array([(-GAP_M / 2 - OFF_M.get(number.owner, 0.0)) / 3e-4 for number in radii]))
     fitted = with_grasps(loaded, down.put)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import itertools
 from types import SimpleNamespace
 
@@ -57,6 +58,7 @@ CATALOGUE = [
 ]
 
 
+@functools.cache
 def study_of(*hidden: str):
     """A set with these effects hidden, and its base model."""
     target, simulators, base = fit_model(light_set(*hidden, grasps=9), 0, silent)

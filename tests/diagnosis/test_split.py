@@ -30,7 +30,7 @@ DELAY = CATALOGUE[0]
 
 def split_delay(*hidden: str):
     """What takes the place of a late command in a set with these effects hidden; and the step that had found it."""
-    loaded = light_set(*hidden, grasps=9)
+    loaded = light_set(*hidden, grasps=9, samples=54)
     target, simulators, base = fit_model(loaded, 0, silent)
     numerical = beyond_fit(base.fit, numerical_error(base.fit, target))
     study = with_few(Study(target, simulators, make_folds(target.grasps), numerical), base.fit)

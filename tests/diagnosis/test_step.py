@@ -70,6 +70,12 @@ def alike(creeping) -> Step:
     return looked(creeping, [PRESLIDING, SMOOTH], "presliding")
 
 
+@pytest.fixture(scope="module")
+def fitted_anyway(creeping) -> Step:
+    """A step that fitted what promised too little."""
+    return looked(creeping, [SMOOTH, DELAY], anyway=True)
+
+
 def test_a_look_alike_of_its_family_is_fitted_in_the_place_of_what_leaves_more_than_noise(alike):
     assert alike.effects[0] == "smooth_friction"
     assert alike.error_after < 1.05 < next(c for c in alike.candidates if c.effect is PRESLIDING).error_after
@@ -200,10 +206,10 @@ def test_where_noise_alone_is_left_no_look_alike_is_fitted(creeping, monkeypatch
 
 
 @pytest.mark.parametrize(("share", "of_any_family"), [(0.95, False), (0.8, True)])
-def test_what_explains_little_may_be_of_the_wrong_family(creeping, monkeypatch, share, of_any_family):
+def test_what_explains_little_may_be_of_the_wrong_family(creeping, fitted_anyway, monkeypatch, share, of_any_family):
     """Objects of 150 g in place of 400 g were a lag of the motors."""
     study, base = creeping
-    best = dataclasses.replace(looked(creeping, [SMOOTH], anyway=True).candidates[0], share=share)
+    best = dataclasses.replace(fitted_anyway.candidates[0], share=share)
     tried = []
     monkeypatch.setattr(
         "forcegrasp.diagnosis.search.step.refine_anyway", lambda effects, *_: tried.extend(effects) or []
@@ -217,11 +223,10 @@ def test_what_explains_little_may_be_of_the_wrong_family(creeping, monkeypatch, 
     assert any(e.family != SMOOTH.family for e in tried) == of_any_family
 
 
-def test_what_promises_too_little_is_fitted_where_it_is_asked_for(creeping):
+def test_what_promises_too_little_is_fitted_where_it_is_asked_for(creeping, fitted_anyway):
     assert looked(creeping, [SMOOTH, DELAY]).effects == ()
-    step = looked(creeping, [SMOOTH, DELAY], anyway=True)
-    assert step.effects == ("smooth_friction",)
-    assert step.candidates[0].parameters()["force_n"] == pytest.approx(0.1, rel=0.1)
+    assert fitted_anyway.effects == ("smooth_friction",)
+    assert fitted_anyway.candidates[0].parameters()["force_n"] == pytest.approx(0.1, rel=0.1)
 
 
 def test_of_rough_fits_those_that_gain_much_less_than_the_best_one_are_left_out(creeping):
@@ -266,7 +271,7 @@ def test_a_search_begins_anew_from_a_better_base(creeping, alike, monkeypatch):
 
 
 @pytest.mark.parametrize("error", [2.0, 29.0, 31.0])
-def test_a_search_fits_anyway_once_and_judges_odd_grasps_again(creeping, monkeypatch, error):
+def test_a_search_fits_anyway_once_and_judges_odd_grasps_again(creeping, fitted_anyway, monkeypatch, error):
     """With a hundred times the noise left, a real drive got a force limit that no signature had promised."""
     study, base = creeping
     nothing, asked, screens = Step((), (), (), error, error), [], []
@@ -274,7 +279,7 @@ def test_a_search_fits_anyway_once_and_judges_odd_grasps_again(creeping, monkeyp
     def step(study, fit, screen, *_, anyway=False, **__):
         asked.append(anyway)
         screens.append(screen)
-        return looked(creeping, [SMOOTH, DELAY], anyway=True) if anyway and asked.count(True) == 1 else nothing
+        return fitted_anyway if anyway and asked.count(True) == 1 else nothing
 
     def odd(target, fit):
         return () if fit.problem.effects else (OddGrasp("3", "thing_0", 9.0),)
@@ -297,16 +302,15 @@ def test_a_search_fits_anyway_once_and_judges_odd_grasps_again(creeping, monkeyp
 
 @pytest.mark.parametrize(("little", "tried"), [(0.1, []), (-1.0, [DELAY])])
 def test_no_effect_is_tried_beside_what_leaves_little_unless_it_explains_half_of_that(
-    creeping, monkeypatch, little, tried
+    creeping, fitted_anyway, monkeypatch, little, tried
 ):
     """What takes the rest makes up for the form of what was found: an object ten times too light, behind a lag."""
     study, base = creeping
-    found, asked = looked(creeping, [SMOOTH, DELAY], anyway=True), []
-    nothing = Step((), (), (), 1.05, 1.05)
+    nothing, asked = Step((), (), (), 1.05, 1.05), []
 
     def look_further(study, fit, screen, effects, *_, **__):
         asked.append(effects)
-        return nothing if asked[1:] else found
+        return nothing if asked[1:] else fitted_anyway
 
     monkeypatch.setattr(search, "look_further", look_further)
     monkeypatch.setattr(search, "most_gained_by_one", lambda *_: 0.0)
@@ -356,13 +360,15 @@ def test_what_replaces_the_law_of_contacts_is_fitted_however_little_it_promises(
 
 
 @pytest.mark.parametrize("of_forms", [True, False])
-def test_effects_that_promise_little_are_not_fitted_for_what_forms_leave(creeping, monkeypatch, of_forms):
+def test_effects_that_promise_little_are_not_fitted_for_what_forms_leave(
+    creeping, fitted_anyway, monkeypatch, of_forms
+):
     study, base = creeping
-    found, asked = looked(creeping, [SMOOTH, DELAY], anyway=True), []
+    asked = []
 
     def step(study, fit, *_, anyway=False, **__):
         asked.append(anyway)
-        return Step((), (), (), 2.0, 2.0) if fit.problem.effects else found
+        return Step((), (), (), 2.0, 2.0) if fit.problem.effects else fitted_anyway
 
     monkeypatch.setattr(search, "look_further", step)
     for module in (search, conclusion):

@@ -53,6 +53,12 @@ def null_among_others() -> Trace:
     return rollout(n, [*everything(range(n)), *nulls], offset_m=np.tile(OFFSETS_M[:2], len(KINDS)))
 
 
+@functools.cache
+def typical(effect: type[Effect], variant: str) -> Trace:
+    """One effect at its typical size, on three rows."""
+    return rollout(3, [(effect, effect.typical_values(), variant, range(3))])
+
+
 def grown(effect: type[Effect], name: str, factor: float) -> np.ndarray:
     """Typical values, one so many times as far from its null value, within bounds; an infinite one is divided."""
     values = effect.typical_values()
@@ -154,10 +160,11 @@ def test_an_effect_is_the_simpler_one_that_it_contains(effect, nested):
     richer = {p.name: p.typical for p in effect.parameters}
     values = np.array([richer[next(r for r, s in nested.same.items() if s == p.name)] for p in simpler.parameters])
     inside = np.array([(richer | dict(nested.at))[p.name] for p in effect.parameters])
+    uses = [(simpler, values, "", [0]), (effect, [inside, effect.typical_values()], "", [1, 2])]
     for tier in TIERS:
-        theirs = rollout(1, [(simpler, values, "", [0])], tier)
-        assert rollout(1, [(effect, inside, "", [0])], tier).row(0) == theirs.row(0)
-        assert rollout(1, [(effect, effect.typical_values(), "", [0])], tier).row(0) != theirs.row(0)
+        trace = rollout(3, uses, tier, offset_m=np.full(3, OFFSETS_M[0]))
+        assert trace.row(1) == trace.row(0)
+        assert trace.row(2) != trace.row(0)
 
 
 @pytest.mark.parametrize(("effect", "nested"), [pytest.param(e, n, id=f"{e.name}-{n.effect}") for e, n in NESTED])
@@ -185,7 +192,7 @@ def test_rows_of_a_batch_are_as_if_alone(effect, variant):
 def test_a_reset_forgets_its_rows_and_no_others(effect, variant):
     """Rows that are reset in the middle of a grasp start as on a fresh plant; the others go on as if nothing were."""
     uses = [(effect, effect.typical_values(), variant, [0, 1, 2])]
-    fresh, when = rollout(3, uses), 18  # in the partial release
+    fresh, when = typical(effect, variant), 18  # in the partial release
     plant = make_plant(3, uses)
     start(plant, range(3))
     play(plant, RICH[:when])
@@ -275,7 +282,7 @@ def test_wrong_use_is_refused(effect):
 @pytest.mark.parametrize(("effect", "variant"), CASES)
 def test_what_a_class_says_of_its_variants_is_true(effect, variant):
     """`reads_only`: nothing that happens changes. `reads`: what is read differs from what happens."""
-    trace = rollout(3, [(effect, effect.typical_values(), variant, range(3))])
+    trace = typical(effect, variant)
     moved = trace.true_position.tobytes() != bare("fast").true_position.tobytes()
     assert moved != effect.reads_only(variant)
     read = not all(map(np.array_equal, (trace.position, trace.force), (trace.true_position, trace.true_force)))

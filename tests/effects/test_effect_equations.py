@@ -132,7 +132,7 @@ def test_finger_creep_deflects_with_time_and_comes_to_what_a_spring_does(share, 
     assert np.array(shift)[1000:][settled] == pytest.approx(after[settled], abs=1e-8)
     # in the plant, held for long enough, it is the spring to the last digits that matter
     plant, spring = (
-        settle(name, values, *[0.0215] * round(10 * time_constant))
+        settle(name, values, 0.0215, seconds=8 * time_constant)
         for name, values in (("finger_creep", creeps.values[0]), ("finger_compliance", (compliance,)))
     )
     assert plant.pad_force[0] == pytest.approx(spring.pad_force[0], rel=3e-3)

@@ -33,7 +33,7 @@ def simulate(*uses: tuple[type[Effect], np.ndarray, str], moves: np.ndarray) -> 
     plant.reset(row, np.array([0.0008]), np.full((1, 2), moves[0]))
     seen = []
     for command in moves:
-        for _ in range(4):
+        for _ in range(3):
             plant.advance(np.full((1, 2), command), 40)
             position, force = read(plant)
             seen.append([position[0], force[0], [plant.object_position[0], 0]])

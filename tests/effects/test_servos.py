@@ -15,9 +15,9 @@ from forcegrasp.physics.plant import Plant
 
 MECHANISMS = ("so101_jaw", "emps", "xl330_pendulum", "bam_pendulum", "dfki_pendulum")
 #: Waves and steps, and a rest: shares of the span, or of an effort that moves it so far.
-TIME_S = np.arange(0, 2.4, 0.02)
+TIME_S = np.arange(0, 1.9, 0.02)
 WAVES = 0.6 * np.sin(2.1 * TIME_S) + 0.1 * np.sin(7 * TIME_S) + 0.08 * ((TIME_S // 0.9) % 2)
-PATH = np.concatenate([WAVES, np.full(20, WAVES[-1])])
+PATH = np.concatenate([WAVES, np.full(16, WAVES[-1])])
 
 
 def play(plant: Plant) -> np.ndarray:

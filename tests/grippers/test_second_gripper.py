@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -22,13 +22,13 @@ FORCES_ARE = 5
 #: 25 Hz commands that close off-centre, press harder, pause, reverse, release, creep in free air and close again.
 COMMAND = np.concatenate(
     [
-        np.repeat([(0.03, 0.03), (0.012, 0.012), (0.006, 0.004), (0.0052, 0.0042)], [8, 16, 10, 4], axis=0),
-        np.repeat([(0.013, 0.012), (0.03, 0.03)], [5, 16], axis=0),
-        np.linspace(0.03, 0.029, 12)[:, None].repeat(2, axis=1),
-        np.repeat([(0.012, 0.014)], 8, axis=0),
+        np.repeat([(0.03, 0.03), (0.012, 0.012), (0.006, 0.004), (0.0052, 0.0042)], [5, 12, 8, 4], axis=0),
+        np.repeat([(0.013, 0.012), (0.03, 0.03)], [5, 12], axis=0),
+        np.linspace(0.03, 0.029, 8)[:, None].repeat(2, axis=1),
+        np.repeat([(0.012, 0.014)], 6, axis=0),
     ]
 )
-PRESSED, RELEASED = slice(26, 34), slice(50, 60)
+PRESSED, RELEASED = slice(19, 25), slice(40, 46)
 #: What base parameters of a row may be; friction and stiffness not the scene's own, lest an effect falls back on those.
 BASE = {"joint_friction": 0.02, "contact_stiffness": 1200.0, "radius_m": 0.022, "offset_m": 0.004}
 
@@ -36,25 +36,27 @@ BASE = {"joint_friction": 0.02, "contact_stiffness": 1200.0, "radius_m": 0.022, 
 Row = tuple[type[Effect], str, np.ndarray, np.ndarray]  #: class, variant, rows, values
 
 
-def _roll(n: int, effects: Sequence[Row] = (), times: int = 1) -> np.ndarray:
-    """Replays the command on one plant so many times; returns readings and truth, ``(times, samples, n, 7)``."""
+def _roll(n: int, effects: Sequence[Row] = (), again: int = 0) -> np.ndarray:
+    """Replays the command, then so many samples of it again on the same plant; readings and truth, ``(…, n, 7)``."""
     plant, ids = Plant(load_gripper(str(SECOND)), n, threads=1), np.arange(n)
     plant.attach([(effect(values, plant.dt, variant), rows) for effect, variant, rows, values in effects])
     seen = []
-    for _ in range(times):
+    for commands in (COMMAND, COMMAND[:again]):
         offset = write_base(plant, ids, {name: np.full(n, value) for name, value in BASE.items()})
         plant.reset(ids, offset, np.full((n, 2), 0.05))
-        for command in COMMAND:
+        for command in commands:
             plant.advance(np.tile(command, (n, 1)), 40)
             truth = (plant.position, plant.object_position[:, None])
             force, position = plant.measured_force.copy(), plant.measured_position.copy()
             for effect, _, rows, values in effects:
                 if is_rounding(effect):  # of readings, after a noise of 0
-                    position[rows] = with_noise(position[rows], 0.0, 0.0, values[0, 0])
-                    force[rows] = with_noise(force[rows], 0.0, 0.0, values[0, 1])
+                    for row, steps in zip(rows, values, strict=True):
+                        position[row], force[row] = (
+                            with_noise(v[row], 0.0, 0.0, s) for v, s in zip((position, force), steps, strict=True)
+                        )
             seen.append(np.concatenate([force, position, *truth], axis=1))
     assert not plant.warnings().any()
-    return np.reshape(seen, (times, len(COMMAND), n, 7))
+    return np.array(seen)
 
 
 def _typical(effect: type[Effect]) -> np.ndarray:
@@ -63,21 +65,28 @@ def _typical(effect: type[Effect]) -> np.ndarray:
     return np.clip(values, [p.low for p in effect.parameters], [p.high for p in effect.parameters])
 
 
-def _rows(size: Callable[[type[Effect]], np.ndarray]) -> list[Row]:
-    """Each effect and variant on a row of its own, after row 0, which has none."""
-    found = [(catalogue()[name], variant) for name, variant in VARIANTS]
-    return [(effect, variant, np.array([row]), size(effect)[None]) for row, (effect, variant) in enumerate(found, 1)]
-
-
 @pytest.fixture(scope="module")
 def plain() -> np.ndarray:
-    return _roll(1)[0, :, 0]
+    return _roll(1)[:, 0]
 
 
 @pytest.fixture(scope="module")
-def typical() -> np.ndarray:
-    """All effects side by side, twice."""
-    return _roll(1 + len(VARIANTS), _rows(_typical), times=2)
+def side_by_side() -> np.ndarray:
+    """Row 0 has no effect; then each variant in its typical size; then each at its null values, in the same order.
+
+    And what follows the whole command is the start of it again, until it presses.
+    """
+    effects, n = [(catalogue()[name], variant) for name, variant in VARIANTS], len(VARIANTS)
+    sizes = [np.stack([_typical(effect), effect.null_values()]) for effect, _ in effects]
+    rows = [np.array([row, row + n]) for row in range(1, n + 1)]
+    return _roll(
+        1 + 2 * n, [(*one, at, values) for one, at, values in zip(effects, rows, sizes, strict=True)], again=24
+    )
+
+
+@pytest.fixture(scope="module")
+def typical(side_by_side) -> np.ndarray:
+    return side_by_side[: len(COMMAND), 1 : 1 + len(VARIANTS)]
 
 
 def test_the_grasp_is_worth_looking_at(plain):
@@ -88,11 +97,10 @@ def test_the_grasp_is_worth_looking_at(plain):
     assert abs(plain[-1, 6]) < 0.004  # the object was pushed towards the middle
 
 
-def test_null_values_leave_every_bit(plain):
-    seen = _roll(1 + len(VARIANTS), _rows(lambda effect: effect.null_values()))[0]
-    different = [VARIANTS[row - 1] for row in range(1, seen.shape[1]) if not np.array_equal(seen[:, row], plain)]
+def test_null_values_leave_every_bit(plain, side_by_side):
+    null = side_by_side[: len(COMMAND), 1 + len(VARIANTS) :]
+    different = [VARIANTS[i] for i in range(len(VARIANTS)) if not np.array_equal(null[:, i], plain)]
     assert different == []
-    np.testing.assert_array_equal(seen[:, 0], plain)
 
 
 @pytest.mark.parametrize("name", ["coulomb_friction", "finger_compliance", "object_friction", "stiffening_contact"])
@@ -100,16 +108,16 @@ def test_null_values_leave_every_bit_alone(plain, name):
     """Without neighbours, whose fields it might have borrowed."""
     effect = catalogue()[name]
     seen = _roll(1, [(effect, "", np.arange(1), effect.null_values()[None])])
-    np.testing.assert_array_equal(seen[0, :, 0], plain)
+    np.testing.assert_array_equal(seen[:, 0], plain)
 
 
-def test_neighbours_with_effects_leave_every_bit(plain, typical):
-    np.testing.assert_array_equal(typical[0, :, 0], plain)
+def test_neighbours_with_effects_leave_every_bit(plain, side_by_side):
+    np.testing.assert_array_equal(side_by_side[: len(COMMAND), 0], plain)
 
 
 @pytest.mark.parametrize(("name", "variant"), VARIANTS)
 def test_typical_size_changes_what_it_should(plain, typical, name, variant):
-    seen = typical[0, :, 1 + VARIANTS.index((name, variant))]
+    seen = typical[:, VARIANTS.index((name, variant))]
     assert np.isfinite(seen).all()
     change = np.abs(seen - plain).max(axis=0)
     slides_on_a_rail = name in ("contact_friction", "table_friction")  # pads press it, and nothing rubs along it
@@ -122,8 +130,9 @@ def test_friction_of_a_table_is_left_out_where_there_is_none():
     assert why_left_out(catalogue()["table_friction"], load_gripper(str(SECOND))).startswith("needs ground")
 
 
-def test_what_ran_before_leaves_no_trace(typical):
-    np.testing.assert_array_equal(typical[1], typical[0])
+def test_what_ran_before_leaves_no_trace(side_by_side):
+    again = side_by_side[len(COMMAND) :]
+    np.testing.assert_array_equal(again, side_by_side[: len(again)])
 
 
 class Shift(Effect):
@@ -177,7 +186,7 @@ def test_pads_on_bodies_of_their_own_shift_too(tmp_path):
 def test_compliance_lets_force_fall_and_fingers_close_further(plain):
     """Were the pads to move inward, as a wrong sign would have them, the force would grow."""
     compliance = catalogue()["finger_compliance"]
-    seen = _roll(2, [(compliance, "", np.arange(2), np.array([[0.0], [5e-4]]))])[0]
+    seen = _roll(2, [(compliance, "", np.arange(2), np.array([[0.0], [5e-4]]))])
     np.testing.assert_array_equal(seen[:, 0], plain)
     stiff, soft = seen[PRESSED, 0], seen[PRESSED, 1]
     assert (soft[:, :2] < stiff[:, :2] - 0.1).all()

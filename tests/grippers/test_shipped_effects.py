@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 import pytest
 
@@ -27,27 +25,32 @@ def cases(gripper: Gripper) -> list[tuple[type[Effect], str]]:
     return [(effect, variant) for effect in effects_of(gripper).values() for variant in effect.variants]
 
 
-def roll(gripper: Gripper, size: Callable[[type[Effect]], np.ndarray] | None) -> np.ndarray:
-    """Row 0 without effects, and a row for each effect and variant; ``(samples, rows, readings)``."""
-    effects = cases(gripper) if size else []
-    plant, ids = Plant(gripper, 1 + len(effects), "fast", threads=1), np.arange(1 + len(effects))
+def roll(gripper: Gripper, with_effects: bool) -> np.ndarray:
+    """``(samples, rows, readings)``: row 0 has no effect, then each variant its null values and its typical size."""
+    effects = cases(gripper) if with_effects else []
+    n = 1 + 2 * len(effects)
+    plant, ids = Plant(gripper, n, "fast", threads=1), np.arange(n)
+    sizes = [np.array([effect.null_values(), effect.typical_values()]) for effect, _ in effects]
     plant.attach(
-        [(e(size(e)[None], plant.dt, variant), np.array([row])) for row, (e, variant) in enumerate(effects, 1)]
+        [
+            (effect(size, plant.dt, variant), np.array([1, 2]) + 2 * i)
+            for i, ((effect, variant), size) in enumerate(zip(effects, sizes, strict=True))
+        ]
     )
     grasp = GraspSampler(GraspConfig(), gripper)(np.random.default_rng(3), np.arange(1))
-    base = {name: np.repeat(value, len(ids)) for name, value in base_parameters(gripper, grasp).items()}
+    base = {name: np.repeat(value, n) for name, value in base_parameters(gripper, grasp).items()}
     plant.reset(ids, write_base(plant, ids, base))
     touch, seen = gripper.contact_position(grasp.radius_m[0]), []
     for share in COMMAND:
         command = np.clip(touch + share * gripper.stroke, 0, gripper.stroke)
-        plant.advance(np.full((len(ids), plant.motors), command), round(gripper.period_s / plant.dt))
+        plant.advance(np.full((n, plant.motors), command), round(gripper.period_s / plant.dt))
         position, force = plant.measured_position.copy(), plant.measured_force.copy()
-        for row, (effect, _) in enumerate(effects, 1):
+        for i, (effect, _) in enumerate(effects):
             if is_rounding(effect):  # of readings, after a noise of 0
-                steps = size(effect)
-                position[row], force[row] = (
-                    with_noise(v[row], 0.0, 0.0, s) for v, s in zip((position, force), steps, strict=True)
-                )
+                for row, steps in enumerate(sizes[i], 1 + 2 * i):
+                    position[row], force[row] = (
+                        with_noise(v[row], 0.0, 0.0, s) for v, s in zip((position, force), steps, strict=True)
+                    )
         seen.append(np.concatenate([position, force], axis=1))
     assert not plant.warnings().any()
     return np.array(seen)
@@ -55,7 +58,12 @@ def roll(gripper: Gripper, size: Callable[[type[Effect]], np.ndarray] | None) ->
 
 @pytest.fixture(scope="module")
 def plain(gripper) -> np.ndarray:
-    return roll(gripper, None)[:, 0]
+    return roll(gripper, with_effects=False)[:, 0]
+
+
+@pytest.fixture(scope="module")
+def side_by_side(gripper) -> np.ndarray:
+    return roll(gripper, with_effects=True)
 
 
 def test_the_grasp_is_worth_looking_at(gripper, plain):
@@ -65,20 +73,21 @@ def test_the_grasp_is_worth_looking_at(gripper, plain):
         assert (force[RELEASED] < gripper.training.contact_threshold_n).all(), "not released"
 
 
-def test_null_values_leave_every_bit(gripper, plain):
-    seen = roll(gripper, lambda effect: effect.null_values())
-    changed = [case for row, case in enumerate(cases(gripper), 1) if not np.array_equal(seen[:, row], plain)]
+def test_null_values_leave_every_bit(gripper, plain, side_by_side):
+    null = side_by_side[:, 1::2]
+    changed = [case for i, case in enumerate(cases(gripper)) if not np.array_equal(null[:, i], plain)]
     assert changed == []
-    np.testing.assert_array_equal(seen[:, 0], plain)
 
 
-def test_typical_sizes_change_what_is_read(gripper, plain):
-    seen = roll(gripper, lambda effect: effect.typical_values())
-    assert np.isfinite(seen).all()
-    np.testing.assert_array_equal(seen[:, 0], plain)
+def test_neighbours_with_effects_leave_every_bit(plain, side_by_side):
+    np.testing.assert_array_equal(side_by_side[:, 0], plain)
+
+
+def test_typical_sizes_change_what_is_read(gripper, plain, side_by_side):
+    assert np.isfinite(side_by_side).all()
     widths = np.ptp(plain, axis=0)
-    change = (np.abs(seen - plain[:, None]) / widths).max(axis=(0, 2))
-    same = [(effect.name, variant) for row, (effect, variant) in enumerate(cases(gripper), 1) if change[row] < 1e-4]
+    change = (np.abs(side_by_side[:, 2::2] - plain[:, None]) / widths).max(axis=(0, 2))
+    same = [(effect.name, variant) for i, (effect, variant) in enumerate(cases(gripper)) if change[i] < 1e-4]
     assert same == []
 
 

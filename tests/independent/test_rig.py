@@ -275,7 +275,9 @@ def test_record(tmp_path: Path) -> None:
 
 
 def test_one_more_grasp_is_of_the_same_hand_and_object(tmp_path: Path) -> None:
-    truth, setup = record(tmp_path / "set", {"force_lag": "large"}, 3, grasps=4), draw_setup(3, 4, "rich", 150)
+    samples = 60
+    truth = record(tmp_path / "set", {"force_lag": "large"}, 3, grasps=4, samples=samples)
+    setup = draw_setup(3, 4, "rich", samples)
     thing = setup.things[setup.thing[2]].name
     record_one_more(tmp_path / "more", truth, thing, float(setup.offset[2]), setup.commands[2], noise_seed=4)
     (row,) = csv.DictReader((tmp_path / "more" / "grasps.csv").read_text().splitlines())

@@ -107,7 +107,7 @@ def test_a_drivers_dead_band_goes_by_the_logged_positions():
 def test_null_values_change_no_bit():
     """Of all effects at once; tests/effects/test_effect_contract.py has them one by one."""
     nothing = tuple(EffectSetting(effect, "", effect.null_values()) for effect in catalogue().values())
-    assert signals(make(effects=nothing)).tobytes() == signals(plain()).tobytes()
+    assert signals(make(light_gripper(), effects=nothing)).tobytes() == signals(plain_and_light()).tobytes()
 
 
 def test_seed_decides_everything():
