@@ -9,10 +9,10 @@ from forcegrasp.identify.loading import Loaded
 
 
 def fit_each_set_once(patch: pytest.MonkeyPatch) -> None:
-    """Keeps base fits by all that they depend on: what was measured, and the seed."""
+    """Keeps base fits by all that they depend on, what was measured and the seed, each brought to its end."""
     fit_model, known = fit_set.fit_model, {}
 
-    def fit_once(loaded: Loaded, seed: int, progress):
+    def fit_once(loaded: Loaded, seed: int, progress, hasty: bool = False):
         key = (loaded.measured.fingerprint, loaded.gripper.name, seed)
         if key not in known:
             known[key] = fit_model(loaded, seed, progress)

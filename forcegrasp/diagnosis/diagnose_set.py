@@ -10,6 +10,7 @@ from functools import partial
 import numpy as np
 
 from forcegrasp.diagnosis.cut_short import REASONS, cut_short
+from forcegrasp.diagnosis.evidence import LEAST_SHARE_TOGETHER
 from forcegrasp.diagnosis.faults.suspects import Fault, besides, leaves_nothing, suspects
 from forcegrasp.diagnosis.givens.doubt import leaves_less, more_likely, with_fault
 from forcegrasp.diagnosis.givens.givens_besides import Fitted, with_givens_put_right
@@ -132,7 +133,7 @@ class _Ways:
         further = go_on_with_moved(found, loaded, search_on, self.progress, self.effects)
         if further is None and found.bolder is not None:
             further = go_on_with_moved(found.bolder, loaded, search_on, self.progress, self.effects)
-            return further if further is not None and not further[0].left else None
+            return further if further is not None and _is_convincing(further[0]) else None
         return further
 
     def _search_on(
@@ -211,6 +212,12 @@ class _Ways:
             if leaves_less(wider, (more[0], more[2].fit), (before[0], before[2].fit)):
                 return wider, more
         return (fault, right) if less else None
+
+
+def _is_convincing(moved: Diagnosis) -> bool:
+    """Whether effects that were too little before the set was moved leave nothing with it, or explain most."""
+    explained = explained_share(moved.error_before, moved.error_after, noise=moved.floor)
+    return not moved.left or explained >= LEAST_SHARE_TOGETHER
 
 
 def _put_right_or_as_said(ways: _Ways, loaded: Loaded[MeasurementSet], said: Fitted) -> Found:

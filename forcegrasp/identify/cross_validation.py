@@ -152,9 +152,8 @@ def _simulate(fit: Fit, target: Target, doubtful: list[tuple[np.ndarray, np.ndar
             before = fell[int(fold[0])]
             if lowers_more := fall >= max(before, 0.0):
                 fell[int(fold[0])], held[fold] = fall, residual[fold]
-            if (before < 0 and not lowers_more) or (
-                lowers_more and after[fold].sum() > _FAR_WORSE * squares[fold].sum()
-            ):
+            far_worse = after[fold].sum() > _FAR_WORSE * squares[fold].sum()
+            if (lowers_more and far_worse) or not (lowers_more or before >= 0):
                 shorter.append((fold, step))
         if not (doubtful := shorter):
             return

@@ -474,14 +474,16 @@ def test_a_sound_set_has_neither_suspects_nor_odd_grasps(sound, refitted):
     assert odd_grasps(target, everywhere) == ()
 
 
-@pytest.mark.parametrize(("left", "believed"), [("", True), ("in all", False)])
-def test_effects_on_trial_are_believed_where_a_move_beside_them_leaves_nothing(
-    sound, made_up, monkeypatch, left, believed
+@pytest.mark.parametrize(
+    ("left", "after", "believed"), [("", 3.0, True), ("in all", 3.0, False), ("in all", 2.0, True)]
+)
+def test_effects_on_trial_are_believed_where_a_move_beside_them_leaves_nothing_or_little(
+    sound, made_up, monkeypatch, left, after, believed
 ):
     loaded, model = sound
     bolder = dataclasses.replace(made_up.diagnosis("effect"), left="in all")
     found = dataclasses.replace(made_up.diagnosis("unknown"), bolder=bolder)
-    moved = dataclasses.replace(bolder, left=left)
+    moved = dataclasses.replace(bolder, left=left, error_before=4.0, error_after=after, floor=1.2)
     module = importlib.import_module("forcegrasp.diagnosis.diagnose_set")
     monkeypatch.setattr(module, "diagnose", lambda *_: found)
     monkeypatch.setattr(module, "suspects", lambda *_: [])
