@@ -13,6 +13,7 @@ from forcegrasp.diagnosis.cut_short import REASONS, cut_short
 from forcegrasp.diagnosis.evidence import LEAST_SHARE_TOGETHER
 from forcegrasp.diagnosis.faults.suspects import Fault, besides, leaves_nothing, suspects
 from forcegrasp.diagnosis.givens.doubt import leaves_less, more_likely, with_fault
+from forcegrasp.diagnosis.givens.give_back import without_move
 from forcegrasp.diagnosis.givens.givens_besides import Fitted, with_givens_put_right
 from forcegrasp.diagnosis.givens.late_rows import may_be_late_rows
 from forcegrasp.diagnosis.givens.left_out import LeaveOutFirst, is_answer, told_of, without
@@ -132,9 +133,12 @@ class _Ways:
         search_on = partial(self._search_on, stop_when=_BRIEFLY if briefly else AT_ITS_END)
         further = go_on_with_moved(found, loaded, search_on, self.progress, self.effects)
         if further is None and found.bolder is not None:
-            further = go_on_with_moved(found.bolder, loaded, search_on, self.progress, self.effects)
-            return further if further is not None and _is_convincing(further[0]) else None
-        return further
+            found = found.bolder
+            further = go_on_with_moved(found, loaded, search_on, self.progress, self.effects)
+            further = further if further is not None and _is_convincing(further[0]) else None
+        if further is None or (back := without_move(further[0], found, search_on, self.progress)) is None:
+            return further
+        return go_on_with_moved(back[0], loaded, search_on, self.progress, self.effects) or back
 
     def _search_on(
         self, target: Target, simulators: Simulators, base: BaseFit, fit: Fit, steps: Sequence[Step],
