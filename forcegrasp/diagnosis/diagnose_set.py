@@ -190,7 +190,7 @@ class _Ways:
         """See :func:`.with_givens_put_right`."""
 
         def put_right(fault: Fault, said: Fitted) -> tuple[Fault, Fitted] | None:
-            model = fault.begun_from(model_of(found.fit, found.target, loaded, ()))
+            model = fault.begun_from(model_of(said[2].fit, said[0], loaded, ()))
             return dataclasses.replace(self, model=model).put_right(fault, said, widely=True)
 
         try:

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import dataclasses
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from forcegrasp.diagnosis.diagnose_set import diagnose_set
 from forcegrasp.diagnosis.givens import givens_besides
 from forcegrasp.diagnosis.result import Diagnosis
+from forcegrasp.effects import get_effect
+from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.identify.fitted_model import model_of
 from forcegrasp.identify.loading import Loaded
 from forcegrasp.reports.diagnosis import answer
@@ -75,3 +79,62 @@ def test_radii_that_are_fitted_begin_where_a_linear_step_leads(diagnosis):
     assert set(begun.objects["thing_0"]) == {*known.objects["thing_0"], "radius_m"}
     assert begun.objects["thing_1"].keys() == known.objects["thing_1"].keys()  # no step says where
     assert set(begun.objects) == set(known.objects)
+
+
+@pytest.fixture
+def with_rivals(made_up):
+    """A diagnosis of one step whose effect has rivals: of as much, of less, a mistake of the set, and a second one."""
+    found = made_up.diagnosis("one_of")
+    (step, *_) = found.steps
+    bias, drift = step.candidates
+
+    def rival(share: float, **changed):
+        gains = np.full_like(bias.gains, share * bias.heldout_gain / len(bias.gains))
+        return dataclasses.replace(drift, gains=gains, **changed)
+
+    of_set = rival(0.95, setting=EffectSetting.typical(get_effect("object_size"), ""))
+    step = dataclasses.replace(
+        step, effects=step.effects[:1], candidates=(bias, rival(0.9), of_set, rival(0.7), rival(0.85), rival(0.99))
+    )
+    return dataclasses.replace(found, fault=None, left="much", error_after=3.0, steps=(step,), fit=bias.fit)
+
+
+def test_rivals_that_explained_nearly_as_much_are_tried_with_the_set_put_right(with_rivals, monkeypatch):
+    asked, fits = [], []
+
+    def refit_as(setting, fit, name, study):
+        asked.append((setting.effect.name, name))
+        fits.append(dataclasses.replace(with_rivals.steps[0].candidates[1].fit))
+        return fits[-1]
+
+    monkeypatch.setattr(givens_besides, "refit_as", refit_as)
+    models = list(givens_besides._near_models(with_rivals, with_rivals.steps, silent))
+    assert asked == 2 * [("force_drift", "force_bias")]  # of three that are near enough
+    assert [fit for fit, _ in models] == [with_rivals.fit, *fits]
+    assert [steps[0].effects for _, steps in models] == [("force_bias",), ("force_drift",), ("force_drift",)]
+    for fit, (step,) in models[1:]:
+        assert step.candidates[0].fit is fit
+
+
+@pytest.mark.parametrize("rival_is_better", [False, True])
+def test_what_leaves_less_once_the_set_is_put_right_is_gone_on_with(with_rivals, monkeypatch, rival_is_better):
+    first, other = with_rivals.fit, with_rivals.steps[0].candidates[1].fit
+    models = [(first, [with_rivals.steps[0]]), (other, [with_rivals.steps[0]])]
+    monkeypatch.setattr(givens_besides, "_near_models", lambda *_: iter(models))
+    fault = SimpleNamespace(fitted={"radius_m of a": 0.01}, is_borne_out=lambda fit: True, told_by=lambda fit: None)
+    monkeypatch.setattr(givens_besides, "suspects", lambda *_: [fault])
+    for name in ("beyond_fit", "Study", "with_few", "evidence_folds"):
+        monkeypatch.setattr(givens_besides, name, lambda *_: None)
+    monkeypatch.setattr(givens_besides, "one_after_the_other", lambda study, steps, fit: (steps, fit))
+    monkeypatch.setattr(givens_besides, "with_fault", lambda again, *_: again)
+
+    def put_right(fault, said):
+        size = 0.5 if (said[2].fit is other) == rival_is_better else 1.0
+        fit = dataclasses.replace(said[2].fit, residual=size * first.residual)
+        return fault, (said[0], said[1], dataclasses.replace(said[2], fit=fit))
+
+    def search_on(target, simulators, base, fit, steps):
+        return SimpleNamespace(fit=fit)
+
+    again, _ = givens_besides.with_givens_put_right(with_rivals, limited(), put_right, search_on, silent)
+    assert again.fit.problem is (other if rival_is_better else first).problem
