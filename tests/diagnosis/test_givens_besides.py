@@ -90,11 +90,12 @@ def with_rivals(made_up):
 
     def rival(share: float, **changed):
         gains = np.full_like(bias.gains, share * bias.heldout_gain / len(bias.gains))
-        return dataclasses.replace(drift, gains=gains, **changed)
+        setting = dataclasses.replace(drift.setting, values=np.full(len(drift.setting.values), share))
+        return dataclasses.replace(drift, gains=gains, **({"setting": setting} | changed))
 
     of_set = rival(0.95, setting=EffectSetting.typical(get_effect("object_size"), ""))
     step = dataclasses.replace(
-        step, effects=step.effects[:1], candidates=(bias, rival(0.9), of_set, rival(0.7), rival(0.85), rival(0.99))
+        step, effects=step.effects[:1], candidates=(bias, rival(0.7), of_set, rival(0.9), rival(0.85), rival(0.99))
     )
     return dataclasses.replace(found, fault=None, left="much", error_after=3.0, steps=(step,), fit=bias.fit)
 
@@ -103,13 +104,13 @@ def test_rivals_that_explained_nearly_as_much_are_tried_with_the_set_put_right(w
     asked, fits = [], []
 
     def refit_as(setting, fit, name, study):
-        asked.append((setting.effect.name, name))
+        asked.append((setting.values[0], name))
         fits.append(dataclasses.replace(with_rivals.steps[0].candidates[1].fit))
         return fits[-1]
 
     monkeypatch.setattr(givens_besides, "refit_as", refit_as)
     models = list(givens_besides._near_models(with_rivals, with_rivals.steps, silent))
-    assert asked == 2 * [("force_drift", "force_bias")]  # of three that are near enough
+    assert asked == [(0.9, "force_bias"), (0.85, "force_bias")]  # of three that are near enough
     assert [fit for fit, _ in models] == [with_rivals.fit, *fits]
     assert [steps[0].effects for _, steps in models] == [("force_bias",), ("force_drift",), ("force_drift",)]
     for fit, (step,) in models[1:]:
