@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -51,6 +51,16 @@ class Study:
     def heldout(self, fit: Fit) -> np.ndarray:
         """Residuals of held-out grasps, ``(G, S, C)``."""
         return heldout_residual(fit, self.target, self.folds)
+
+    def telling(self, words: str, task: Callable[[], Fit]) -> Callable[[], Fit]:
+        """A task that ends by telling how much error its fit leaves."""
+
+        def told() -> Fit:
+            fit = task()
+            self.progress(f"{words}: {rms(fit.residual, self.target):.2f} × noise")
+            return fit
+
+        return told
 
     def on_few(self, fit: Fit) -> tuple[Study, Fit]:
         """The few grasps alone, none of them held out, and what a fit says of them; all where none are chosen."""

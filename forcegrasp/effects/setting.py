@@ -31,7 +31,7 @@ class EffectSetting(ShortRepr):
     @property
     def title(self) -> str:
         """Name and variant, for people."""
-        return f"{self.effect.name} {self.variant}".strip()
+        return f"{self.effect.name} ({self.variant})" if self.variant else self.effect.name
 
     @property
     def parameters(self) -> dict[str, float]:

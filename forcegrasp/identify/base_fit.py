@@ -84,6 +84,8 @@ def fit_base(
     ends = side_by_side([partial(small.fit, start) for start in starts])
     for number, end in enumerate(ends[1:], 2):
         progress(f"base model, start {number} of {STARTS}, on a few grasps: {end.error:.2f} × noise")
+    if not _agree(ends, small.target):
+        progress(f"base model: the starts end in different places; up to {MOST_STARTS} are tried")
     while len(ends) < MOST_STARTS and not _agree(ends, small.target):
         ends.append(small.fit(_random_start(small.problem, contact_estimate, rng)))
         progress(f"base model, start {len(ends)} of {MOST_STARTS}, on a few grasps: {ends[-1].error:.2f} × noise")

@@ -73,7 +73,7 @@ EFFECTS = {
     ),
     "adhesion": Prior(0.1, 0.2, 1, "assumed: soft pads stick a little, rarely"),
     "object_friction": Prior(0.7, 0.3, 5, "μ m g of 10 to 170 g at μ 0.3, on what the object stands on"),
-    "force_crosstalk": Prior(0.3, 0.2, 2, "assumed: 2 to 16 %"),
+    "force_crosstalk": Prior(0.3, 0.2, 2, "assumed: 2 to 16 %, of both alike", fixed={"difference": 0.0}),
     "force_hysteresis": Prior(
         0.3, 0.3, 2, "assumed: 5 to 30 %; data sheets of force-sensing resistors say 10 %", variants=("lasting",)
     ),

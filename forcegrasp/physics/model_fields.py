@@ -18,9 +18,10 @@ from forcegrasp.physics.gripper_parts import FieldWrite
 from forcegrasp.physics.inertia import inertia_of_radius
 from forcegrasp.physics.scene_layout import SceneLayout
 
-# Constraint that holds a finger against dry friction: as stiff as the step allows, lest it creeps under load.
-_STIFF_SOLREF = (0.004, 1.0)
-_STIFF_SOLIMP = (0.999, 0.9999, 0.001, 0.5, 2.0)
+# Constraint that holds a finger against dry friction: as stiff as the engine and the step allow, lest it creeps under
+# load. In place of a time constant below two steps MuJoCo takes two steps, and no impedance is larger.
+_STIFF_SOLREF = (1e-4, 1.0)
+_STIFF_SOLIMP = (0.9999, 0.9999, 0.001, 0.5, 2.0)
 
 
 class ModelFields(SceneLayout):

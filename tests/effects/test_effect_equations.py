@@ -585,10 +585,16 @@ def test_smooth_object_friction_creeps_in_proportion_to_the_push_and_then_slides
 
 
 def test_force_crosstalk():
-    out = read(make("force_crosstalk", 0.1), wave(), 0 * T)
+    out = read(make("force_crosstalk", 0.1, 0.0), wave(), 0 * T)
     assert out == pytest.approx(np.stack([wave(), 0.1 * wave()], axis=1))
-    out = read(make("force_crosstalk", -0.2), wave(), wave(2.0))
+    out = read(make("force_crosstalk", -0.2, 0.0), wave(), wave(2.0))
     assert out == pytest.approx(np.stack([wave() - 0.2 * wave(2.0), wave(2.0) - 0.2 * wave()], axis=1))
+
+
+def test_force_crosstalk_may_be_uneven():
+    """The left reading has 6 % of the right force, the right one 2 % of the left force."""
+    out = read(make("force_crosstalk", 0.04, 0.02), wave(), wave(2.0))
+    assert out == pytest.approx(np.stack([wave() + 0.06 * wave(2.0), wave(2.0) + 0.02 * wave()], axis=1))
 
 
 def test_force_hysteresis_width():

@@ -13,7 +13,7 @@ from forcegrasp.effects import get_effect
 from forcegrasp.physics.gripper_file import load_gripper
 from forcegrasp.physics.plant import Plant
 
-from .rollouts import START_M, path, rollout
+from .rollouts import START_M, path, rollout, start
 from .signals import DT, GAIN, make, settle
 
 
@@ -29,9 +29,23 @@ def test_coulomb_friction_stops_short_by_an_offset_that_flips(friction):
 def test_coulomb_friction_holds_up_to_its_size():
     plant = settle("coulomb_friction", (0.05,), START_M)
     plant.advance(np.full((1, 2), START_M + 0.95 * 0.05 / GAIN), 2000)
-    assert plant.position[0] == pytest.approx([START_M] * 2, abs=3e-6)  # in 4 s
+    assert plant.position[0] == pytest.approx([START_M] * 2, abs=4e-7)  # in 4 s
     plant.advance(np.full((1, 2), START_M + 1.5 * 0.05 / GAIN), 2000)
     assert plant.position[0] == pytest.approx([START_M + 0.5 * 0.05 / GAIN] * 2, abs=2e-5)
+
+
+def test_coulomb_friction_holds_harder_in_finer_steps():
+    """Where motors are stiff, what creeps counts: 10 µm are 0.2 N of one of 20 kN/m."""
+    crept = []
+    for factor in (1.0, 0.25):
+        plant = Plant(load_gripper("tiago"), 1, "reference", threads=1, step_factor=factor)
+        plant.attach([(get_effect("coulomb_friction")(np.array([[0.05]]), plant.dt), np.array([0]))])
+        start(plant, [0], np.zeros(1))
+        plant.advance(np.full((1, 2), START_M), round(1.0 / plant.dt))
+        before = plant.position[0, 0]
+        plant.advance(np.full((1, 2), START_M + 0.95 * 0.05 / GAIN), round(4.0 / plant.dt))
+        crept.append(plant.position[0, 0] - before)
+    assert crept[1] == pytest.approx(crept[0] / 4, rel=0.05)
 
 
 def test_stiction_follows_the_stribeck_curve():

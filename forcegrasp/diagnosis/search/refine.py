@@ -57,9 +57,12 @@ def refine(scores: Sequence[Score], study: Study, fit: Fit, background: Backgrou
     pairs = sorted(((sized[i][0], scores[i]) for i in racing), key=lambda pair: -pair[0].gain)
     some, part = study.on_few(fit)
     settings = [sized.setting for sized, _ in pairs]
-    for setting in settings:
-        study.progress(f"refitting with {setting.effect.name} {setting.variant}")
-    fits = side_by_side([partial(fit_with, [setting], part.vector, some, part) for setting in settings])
+    study.progress(f"fitting each of {len(settings)} effects and variants, on {len(some.target.grasps)} grasps")
+    where = f"on {len(some.target.grasps)} grasps"
+    tasks = [partial(fit_with, [setting], part.vector, some, part) for setting in settings]
+    fits = side_by_side(
+        [some.telling(f"{one.title}, {where}", task) for one, task in zip(settings, tasks, strict=True)]
+    )
     if some is study:
         return [Refined(score, one) for (_, score), one in zip(pairs, fits, strict=True)]
     racing = _in_the_race([part.cost - one.cost for one in fits], LOST_IF_FITTED)
@@ -67,9 +70,9 @@ def refine(scores: Sequence[Score], study: Study, fit: Fit, background: Backgrou
     tasks = []
     for few in (fits[i] for i in left):
         setting = few.effects[-1]
-        study.progress(f"refitting with {setting.effect.name} {setting.variant} on all grasps")
         start = fit.moved(part.problem, few.vector[: len(part.problem)])
-        tasks.append(partial(fit_with, [setting], start, study, fit))
+        task = partial(fit_with, [setting], start, study, fit)
+        tasks.append(study.telling(f"{setting.title}, on all grasps", task))
     return [Refined(pairs[i][1], refitted) for i, refitted in zip(left, side_by_side(tasks), strict=True)]
 
 
@@ -102,8 +105,8 @@ def refine_anyway(
     for index in _in_the_race([part.cost - one.cost for one in few], LOST_IF_FITTED):
         one, setting = few[index], few[index].effects[-1]
         begin = fit.moved(part.problem, one.vector[: len(part.problem)]) if one in elsewhere else None
-        study.progress(f"refitting with {setting.effect.name} {setting.variant} on all grasps")
-        tasks.append(partial(roughly_as, [setting], fit, without, study, begin=begin))
+        task = partial(roughly_as, [setting], fit, without, study, begin=begin)
+        tasks.append(study.telling(f"{setting.title}, on all grasps", task))
     return side_by_side(tasks)
 
 

@@ -166,9 +166,13 @@ class _Start:
         pairs = richer if excess(self.held, self._study.numerical, self._study.target) else ()
         enough = side_by_side([partial(self._may_explain_enough, effect, name) for name, effect in pairs])
         pairs = [pair for pair, may in zip(pairs, enough, strict=True) if may]
-        for name, effect in pairs:
-            self._study.progress(f"refitting with {effect.name} in place of {name}")
-        tasks = [partial(families.refit_as_richer, effect, self._fit, name, self._study) for name, effect in pairs]
+        tasks = [
+            self._study.telling(
+                f"{effect.name} in place of {name}",
+                partial(families.refit_as_richer, effect, self._fit, name, self._study),
+            )
+            for name, effect in pairs
+        ]
         candidates = []
         for (name, effect), refit in zip(pairs, side_by_side(tasks), strict=True):
             if not any(families.falls_back(refit, nested) for nested in effect.contains):
@@ -394,9 +398,11 @@ class _Start:
         """
         fitted = [c for c in candidates if not c.replaces]  # the others were fitted to the end already
         every = [one for c in fitted for one in (c, *alike[c.effect.name])]
-        for one in every:
-            self._study.progress(f"fitting {one.effect.name} {one.setting.variant} to the end")
-        ends = list(zip(side_by_side([partial(to_the_end, one.fit, self._study) for one in every]), every, strict=True))
+        tasks = [
+            self._study.telling(f"{one.setting.title}, to the end", partial(to_the_end, one.fit, self._study))
+            for one in every
+        ]
+        ends = list(zip(side_by_side(tasks), every, strict=True))
         judged = {}
         for c in fitted:
             fit, best = min((end for end in ends if end[1].effect is c.effect), key=lambda end: end[0].cost)
