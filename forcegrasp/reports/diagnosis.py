@@ -35,6 +35,7 @@ from forcegrasp.reports.diagnosis_words import (
     besides_sentence,
     fault_words,
     is_of_labels,
+    is_only_moved,
     lacks,
     left_out_words,
     left_sentence,
@@ -133,7 +134,9 @@ def answer(diagnosis: Diagnosis) -> str:
     """The verdict in words."""
     of_model, of_set = _of_model(diagnosis), fault_words(diagnosis)
     alone = f"Only {diagnosis.alone} shows more: look at it." if diagnosis.alone else ""
-    parts = (of_model, of_set) if diagnosis.fault_is_rival else (of_set, of_model)
+    # what was moved within its tolerance is no fault, and comes after the verdict
+    model_first = diagnosis.fault_is_rival or is_only_moved(diagnosis)
+    parts = (of_model, of_set) if model_first else (of_set, of_model)
     return " ".join(filter(None, (stopped_words(diagnosis), *parts, alone, left_out_words(diagnosis))))
 
 

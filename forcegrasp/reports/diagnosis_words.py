@@ -92,19 +92,25 @@ def odd_words(diagnosis: Diagnosis) -> str:
     return f"{named}{as_other}, judged by a fit of all others"
 
 
+def is_only_moved(diagnosis: Diagnosis) -> bool:
+    """Whether nothing is wrong with the set: what it gives was moved within its tolerance."""
+    fault = diagnosis.fault
+    return fault is not None and fault.moved is not None and fault.name not in diagnosis.effects
+
+
 def fault_words(diagnosis: Diagnosis) -> str:
     """What seems to be wrong with the set besides what the model lacks, or in place of it; empty if nothing."""
     if diagnosis.fault is None or diagnosis.verdict is Verdict.DATA:
         return ""
     named = _named(diagnosis.fault)
-    if diagnosis.fault.moved is not None and diagnosis.fault.name not in diagnosis.effects:
+    if is_only_moved(diagnosis) and diagnosis.fault.moved is not None:
         moved = f"What the set gives was moved within its tolerance: {diagnosis.fault.words}"
         if smaller := diagnosis.fault.moved.smaller_m:
             moved += f" (objects are {1e3 * smaller:.2g} mm smaller on average so, as backlash would have them look)"
         if diagnosis.error_moved is None:
             return f"{moved}; as given the error is {diagnosis.error_before:.2f} × noise."
         if diagnosis.error_moved > _SHOWS * diagnosis.error_before:
-            return f"{moved}. That shows only once what follows is in the model."
+            return f"{moved}. That shows only beside what the model lacks."
         change = f"from {diagnosis.error_before:.2f} to {diagnosis.error_moved:.2f} × noise"
         return f"{moved}. That alone takes the error {change}."
     if diagnosis.fault_is_rival:

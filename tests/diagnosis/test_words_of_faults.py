@@ -80,13 +80,16 @@ def test_the_box_tells_a_fault_alone_in_a_line_for_each_thing(made_up, fault):
 
 
 @pytest.mark.parametrize(
-    ("error_moved", "told"), [(0.8, "That alone takes the error from"), (1.01, "That shows only once what follows")]
+    ("error_moved", "told"),
+    [(0.8, "That alone takes the error from"), (1.01, "That shows only beside what the model lacks")],
 )
 def test_a_move_that_lowers_no_error_alone_is_not_said_to(made_up, fault, error_moved, told):
     found = made_up.diagnosis("effect")
     moved = Moved((_Number("radius_m", "cup", 1e-4, np.ones(2, bool)),), np.ones(1))
     fault = dataclasses.replace(fault, moved=moved)
-    assert told in answer(dataclasses.replace(found, fault=fault, error_moved=error_moved * found.error_before))
+    said = answer(dataclasses.replace(found, fault=fault, error_moved=error_moved * found.error_before))
+    assert told in said
+    assert said.startswith("The model lacks"), "nothing is wrong with the set: the verdict comes first"
 
 
 @pytest.mark.parametrize(

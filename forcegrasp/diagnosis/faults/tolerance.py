@@ -38,7 +38,10 @@ _PERIOD, _OBJECT = "period_share", ("radius_m", "offset_m")
 _READING = (SKEW, FORCE_SKEW)
 _TIMING = (*_READING, _PERIOD)
 _GROUPS = (*((kind,) for kind in _TIMING), _TIMING, _OBJECT, (*_OBJECT, *_TIMING))
-_CHECKS = {"object": "the objects, with a calliper", "timing": "the clock, and when readings are taken"}
+_CHECKS = {
+    "object": "the objects: their radii, with a calliper, and where they stood",
+    "timing": "the clock, and when readings are taken",
+}
 
 
 @dataclass(frozen=True, eq=False)
