@@ -11,7 +11,14 @@ from forcegrasp.diagnosis.result import Step
 from forcegrasp.diagnosis.search.conclusion import Begun
 from forcegrasp.diagnosis.search.left_over import leaves_little, left_over
 from forcegrasp.diagnosis.search.screen import Screen
-from forcegrasp.diagnosis.search.several import add_several, add_up, none_stands_out, share_of_all, share_of_one
+from forcegrasp.diagnosis.search.several import (
+    add_several,
+    add_up,
+    none_stands_out,
+    share_of_alike,
+    share_of_all,
+    share_of_one,
+)
 from forcegrasp.diagnosis.search.so_far import SoFar
 from forcegrasp.diagnosis.search.stop_when import Asked
 from forcegrasp.diagnosis.study import Study
@@ -35,6 +42,8 @@ class AtOnce:
     rng: np.random.Generator
     given_first: Asked  #: see :class:`.StopWhen`
     done: bool = False  #: whether it was: no other effect promises anything beside what it found
+    #: of which one alone does as well as all that add up, though their signatures promise less; they are to be tried
+    alone: Sequence[type[Effect]] = ()
     _asked: Fit | None = None  #: the fit that it was last tried for
     _added_up: Fit | None = None  #: the same of effects that add up
 
@@ -62,6 +71,14 @@ class AtOnce:
         self._added_up = fit
         if not add_up(study, fit, screen, untried) or (one := share_of_one(study, fit, screen, untried)) > _AS_WELL:
             return False
+        alike = share_of_alike(study, fit, screen, untried)
+
+        def as_well(of_all: float) -> list[type[Effect]]:
+            return [effect for effect, share in alike.items() if share > _AS_WELL * of_all]
+
+        self.alone = as_well(1.0)
+        if self.alone:
+            return False
         begun, before = self.begun, study.error(study.heldout(fit))
 
         def enough(further: Fit) -> bool:
@@ -75,7 +92,9 @@ class AtOnce:
             return little or (enough(further) and self.given_is_first(study, further))
 
         found = add_several(study, fit, steps, begun.effects, begun.given, self.rng, keep, straight=screen)
-        if found is None or not enough(found[1]) or one > _AS_WELL * share_of_all(study, fit, found[1]):
+        of_all = 0.0 if found is None else share_of_all(study, fit, found[1])
+        self.alone = as_well(of_all) if found is not None and enough(found[1]) else ()
+        if found is None or not enough(found[1]) or one > _AS_WELL * of_all or self.alone:
             self.so_far.all = study, steps, fit
             return False
         self.so_far.all = study, *found

@@ -152,7 +152,11 @@ def _add_effects(so_far: SoFar, begun: Begun, rng: np.random.Generator, stop_whe
         ):
             _, steps, fit = so_far.all
             continue
-        step = look_further(study, fit, screen, untried, rng, richer, stop_when.most if fit is begun.fit else np.inf)
+        alone, several.alone = several.alone, ()
+        step = look_further(study, fit, screen, alone, rng, anyway=True) if alone else None
+        if step is None or not step.effects:
+            most = stop_when.most if fit is begun.fit else np.inf
+            step = look_further(study, fit, screen, untried, rng, richer, most)
         step = _of_another(step, study) if forms else step
         # what is on trial has no look-alikes that are worth the time, and what was found together takes too long
         much = (step.of_many or not step.effects) and so_far.believed is None and not several.done

@@ -13,7 +13,7 @@ from functools import partial
 import numpy as np
 
 from forcegrasp.diagnosis.evidence import LEAST_RISE, LEAST_SHARE_OF_MANY, is_beyond_chance
-from forcegrasp.diagnosis.families import may_join, problem_without
+from forcegrasp.diagnosis.families import look_alike, may_join, problem_without, roughly_as
 from forcegrasp.diagnosis.few import with_few
 from forcegrasp.diagnosis.result import Step
 from forcegrasp.diagnosis.search.forms import done_by_each
@@ -22,7 +22,7 @@ from forcegrasp.diagnosis.search.left_over import is_worth_looking
 from forcegrasp.diagnosis.search.needless import chained
 from forcegrasp.diagnosis.search.refine import fit_with, refine
 from forcegrasp.diagnosis.search.screen import MAX_GAIN_FACTOR, Screen
-from forcegrasp.diagnosis.signatures import Background, Score, direction, null_gains, of_best_effects
+from forcegrasp.diagnosis.signatures import Background, Score, direction, null_gains, of_best_effects, trials
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.diagnosis.verdict import EXPLAINED
 from forcegrasp.effects import Effect
@@ -105,6 +105,22 @@ def share_of_one(study: Study, fit: Fit, screen: Screen, effects: Sequence[type[
     """The same gain as a share of the squares that few grasps leave beyond the noise."""
     some, part = study.on_few(fit)
     return most_gained_by_one(study, fit, screen, effects) / max(some.target.beyond_noise(part.residual), 1e-9)
+
+
+def share_of_alike(
+    study: Study, fit: Fit, screen: Screen, effects: Sequence[type[Effect]]
+) -> dict[type[Effect], float]:
+    """The same of the effect whose signature promises most, and of all that look like it, whatever they promise.
+
+    One that bends with its size, or that moves base parameters far, gains more than its signature says.
+    """
+    some, part = study.on_few(fit)
+    best = _chosen(study, fit, screen, effects)[:1]
+    alike = [e for e in effects if any(e is one.setting.effect or look_alike(e, one.setting.effect) for one in best)]
+    alike = [e for e in alike if not e.of_set]
+    fits = side_by_side([partial(roughly_as, trials([e]), part, (), some, at_the_end=False) for e in alike])
+    beyond = max(some.target.beyond_noise(part.residual), 1e-9)
+    return {effect: (part.cost - one.cost) / beyond for effect, one in zip(alike, fits, strict=True)}
 
 
 def share_of_all(study: Study, fit: Fit, further: Fit) -> float:
