@@ -141,7 +141,10 @@ def after_comparison(comparison: Comparison, data: str | Path, model: str | Path
 
 def after_fit(data: str | Path, model: str | Path) -> Command:
     """What to do with a base model."""
-    return Command("find out which effect is missing, or what the set gives that is a little off", _line("diagnose", f"data={data}", f"model={model}"))
+    return Command(
+        "find out which effect is missing, or what the set gives that is a little off",
+        _line("diagnose", f"data={data}", f"model={model}"),
+    )
 
 
 def after_adding(data: str | Path, model: str | Path, gripper: Gripper) -> Command:

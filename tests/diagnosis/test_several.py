@@ -23,6 +23,7 @@ from forcegrasp.diagnosis.search.several import (
     add_up,
     most_gained_by_one,
     none_stands_out,
+    share_of_alike,
     share_of_all,
     share_of_one,
     usual_on_few,
@@ -240,6 +241,37 @@ def test_otherwise_they_are_looked_for_one_by_one(small, monkeypatch, why_not):
     assert diagnosis.preferred == ()
 
 
+@pytest.mark.parametrize(("share", "tried_together"), [(1.0, False), (0.9, True), (0.5, True)])
+def test_one_that_looks_like_the_best_of_them_is_tried_if_it_does_as_well_alone(
+    small, monkeypatch, share, tried_together
+):
+    """Its signature may promise little: it bends with its size."""
+    study, base = small
+    tried, together = [], []
+
+    def one_by_one(study, fit, screen, effects, *_, anyway=False, **__):
+        tried.append((list(effects), anyway))
+        return Step((), (), (), 1.0, 1.0)
+
+    def added(study, fit, steps, *_, **__):
+        together.append(fit)
+        return [Step((), (), (), 2.0, 2.0)], fit_with([setting("force_bias")], fit.vector, study, fit)
+
+    monkeypatch.setattr(search, "look_further", one_by_one)
+    monkeypatch.setattr(at_once, "add_several", added)
+    monkeypatch.setattr(at_once, "share_of_one", lambda *_: 0.0)
+    monkeypatch.setattr(at_once, "share_of_alike", lambda *_: {ACTUATOR_LAG: share})
+    monkeypatch.setattr(at_once, "share_of_all", lambda *_: 0.9)
+    monkeypatch.setattr(at_once, "explained_share", lambda *_, **__: 1.0)
+    search.diagnose(study.target, base, study.simulators, CATALOGUE, np.random.default_rng(0))
+    assert bool(together) == tried_together
+    if share < 0.9:
+        assert ([ACTUATOR_LAG], True) not in tried
+    else:
+        assert tried[0] == ([ACTUATOR_LAG], True)
+        assert (len(tried[1][0]), tried[1][1]) == (len(CATALOGUE), False), "it was none, and all are tried"
+
+
 def setting(name: str) -> EffectSetting:
     """An effect as it is hidden among the small ones."""
     effect, values = effect_of(name, light_gripper()), dict(size.split("=") for size in SMALL[name].split())
@@ -254,7 +286,12 @@ def test_one_of_several_effects_explains_little_and_one_that_is_alone_all(small)
     one = fit_with([setting("coulomb_friction")], base.fit.vector, study, base.fit)
     assert share_of_all(study, base.fit, one) == pytest.approx(0.55, abs=0.05)
     assert most_gained_by_one(*at_first(study, base), least=1e9) == 0  # none promises so much, and none is fitted
-    assert share_of_one(*at_first(*study_of("force_lag time_constant_s=0.06"))) == pytest.approx(1.0, abs=0.02)
+    late = at_first(*study_of("force_lag time_constant_s=0.06"))
+    assert share_of_one(*late) == pytest.approx(1.0, abs=0.02)
+    alike = {effect.name: share for effect, share in share_of_alike(*late).items()}
+    assert set(alike) == {"force_lag", "force_delay"}
+    assert alike["force_lag"] == pytest.approx(1.0, abs=0.02)
+    assert 0.5 < alike["force_delay"] < 0.98
 
 
 def test_what_is_usual_on_few_grasps_is_no_matter_of_one_reading(small):
