@@ -437,7 +437,7 @@ def test_a_search_goes_on_with_what_is_given_moved(sound, radius_std_m, moves):
 
 @pytest.mark.parametrize("names", [[], ["force_crosstalk"]])
 def test_an_effect_gets_no_credit_for_what_was_moved_and_none_need_be_found(names):
-    loaded, model = with_model(light_set("force_crosstalk share=0.07"))
+    loaded, model = with_model(light_set("force_crosstalk share=0.07 difference=0"))
     name = loaded.measured.grasps[0].object
     inexactly = dataclasses.replace(loaded, measured=inexact(name, 6e-4, 0.0, 2.5e-4)(loaded.measured))
     target, simulators, base = apply_model(inexactly, model, silent, refit=True)
