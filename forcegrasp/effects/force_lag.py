@@ -8,25 +8,47 @@ from forcegrasp.effects.base import Effect, Parameter, State, first_order_weight
 
 
 class ForceLag(Effect):
-    """A first-order filter in the force sensor."""
+    """A filter in the force sensor, of first order unless it is said.
+
+    ``butterworth``: one of second order with the same corner frequency 1/(2πτ), as amplifiers and drivers have.
+    """
 
     name = "force_lag"
     stage = "sensor"
     family = "force sensor"
     symptom = "force is smoothed, position is not"
-    formula = "τ df'/dt = f − f'"
-    source = "first-order low-pass filter, at the physics rate"
+    formula = "τ df'/dt = f − f'; τ² d²f'/dt² + √2 τ df'/dt = f − f' (butterworth)"
+    source = "low-pass filters, at the physics rate; Butterworth 1930"
     look_alikes = ("force_delay", "viscoelastic_contact")
     separates = "fast steps and first contact: a lagged force has no corner"
     parameters = (Parameter("time_constant_s", "time constant τ", "s", 0.0, 1.0, 0.08, trials=(0.01, 0.03, 0.1, 0.3)),)
+    variants = ("", "butterworth")
     order = 3
     least_channels = 1
 
     def init(self, which: np.ndarray) -> State:
-        return {"held": np.full((len(which), self.channels), np.nan)}  # the first force that comes
+        shape = len(which), self.channels
+        return {"held": np.full(shape, np.nan), "rate": np.zeros(shape)}  # at rest at the first force that comes
 
     def read_force(self, force: np.ndarray) -> np.ndarray:
         held = np.where(np.isnan(self.state["held"]), force, self.state["held"])
-        weight = first_order_weight(self.dt, self["time_constant_s"])
-        self.state["held"] = held = np.where(weight == 1, force, held + weight * (force - held))
+        if self.variant == "butterworth":
+            held, self.state["rate"] = self._second_order(held - force, self.state["rate"])
+            held += force
+        else:
+            weight = first_order_weight(self.dt, self["time_constant_s"])
+            held = np.where(weight == 1, force, held + weight * (force - held))
+        self.state["held"] = held
         return held
+
+    def _second_order(self, off: np.ndarray, rate: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """How far a reading is off the force after a step in which the force stays, and its rate; exactly.
+
+        A mass on a spring whose damper has 1/√2 of the critical damping: it rings as fast as it decays.
+        """
+        tau = np.broadcast_to(self["time_constant_s"], off.shape)
+        filters = tau > 0
+        decay = np.sqrt(0.5) / np.where(filters, tau, 1.0)
+        left = np.where(filters, np.exp(-decay * self.dt), 0.0)
+        cosine, sine = left * np.cos(decay * self.dt), left * np.sin(decay * self.dt)
+        return cosine * off + sine * (rate / decay + off), cosine * rate - sine * (rate + 2 * decay * off)

@@ -78,7 +78,7 @@ EFFECTS = {
         0.3, 0.3, 2, "assumed: 5 to 30 %; data sheets of force-sensing resistors say 10 %", variants=("lasting",)
     ),
     "force_gain_asymmetry": Prior(0.5, 0.2, 2, "assumed: sensors calibrated to 2 to 20 %"),
-    "force_lag": Prior(0.5, 0.1, 1.25, "assumed: filters of 1.6 to 20 Hz"),
+    "force_lag": Prior(0.5, 0.1, 1.25, "assumed: filters of 1.6 to 20 Hz, of first order", variants=("",)),
     "force_delay": Prior(0.3, 0.1, 0.7, "assumed: as that of commands"),
     "force_deadzone": Prior(0.3, 0.25, 1.5, "the paper's robot: 65 mN (real-table.md)"),
     "force_drift": Prior(0.2, 0.05, 0.5, "assumed: a few per cent of the range within a grasp"),

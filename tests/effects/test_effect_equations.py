@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scipy.signal import lfilter
+from scipy.signal import butter, cont2discrete, dlsim, lfilter, lti
 
 from forcegrasp.effects import Effect, catalogue, get_effect
 from forcegrasp.effects.base import Contribution
@@ -659,6 +659,18 @@ def test_force_lag_is_an_exponential():
     assert out == pytest.approx(np.where(T < 0.1, 0.2, 1.2 - np.exp(-(T - 0.1 + DT) / tau)), abs=1e-12)
     out = read(make("force_lag", tau), wave())[:, 0]
     assert out == pytest.approx(lfilter([1 - keep], [1, -keep], wave()), abs=1e-12)
+
+
+@pytest.mark.parametrize("tau", [0.003, 0.02, 0.08])
+def test_a_force_filter_may_be_a_butterworth_of_second_order(tau):
+    """SciPy's filter with the same corner, of a force that stays for a step."""
+    force = wave()
+    corner = lti(*butter(2, 1 / tau, analog=True)).to_ss()
+    held = cont2discrete((corner.A, corner.B, corner.C, corner.D), DT, method="zoh")
+    out = read(make("force_lag", tau, variant="butterworth"), force)[:, 0]
+    _, expected, _ = dlsim((*held[:4], DT), np.append(force - force[0], 0.0))
+    assert out == pytest.approx(force[0] + expected[1:, 0], abs=1e-9)
+    assert read(make("force_lag", 0.0, variant="butterworth"), force)[:, 0] == pytest.approx(force, abs=1e-12)
 
 
 @pytest.mark.parametrize("steps", [1, 7.75, 40])
