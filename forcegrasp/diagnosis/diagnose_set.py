@@ -24,7 +24,7 @@ from forcegrasp.diagnosis.givens.moved_set import (
     within_tolerance_after_all,
 )
 from forcegrasp.diagnosis.law.law import find_law
-from forcegrasp.diagnosis.result import Diagnosis, Step, kept_steps
+from forcegrasp.diagnosis.result import Diagnosis, Step
 from forcegrasp.diagnosis.search.search import diagnose
 from forcegrasp.diagnosis.search.stop_when import AT_ITS_END, StopWhen, always, never
 from forcegrasp.diagnosis.verdict import EXPLAINED_FAR, MUCH, explained_share
@@ -168,19 +168,13 @@ class _Ways:
                     return dataclasses.replace(found, stopped=rest[0].stopped), None
                 further = rest if is_answer(rest[0]) else None
             if further is None and (leave_out.names or (moves is not None and moves.asked)):  # it was neither
-                again = self._to_the_end(found, fitted)
+                again = self.search(*fitted)
                 if again.stopped:
                     return dataclasses.replace(found, stopped=again.stopped), None
                 found, further = again, self.moved(again, loaded, briefly=True)
         except REASONS as reason:
             return dataclasses.replace(found, stopped=cut_short(reason, self.progress)), None
         return found, further
-
-    def _to_the_end(self, found: Diagnosis, fitted: Fitted) -> Diagnosis:
-        """A search that was shortened, to its end: from what it has found, or anew if that is nothing."""
-        if not (steps := kept_steps(found.steps)) or found.fit is found.base.fit:
-            return self.search(*fitted)
-        return self._search_on(found.target, Simulators(found.fit.problem), found.base, found.fit, steps)
 
     def without_missed(self, loaded: Loaded[MeasurementSet], target: Target, names: Sequence[str]) -> Found:
         """The diagnosis without the grasps of these names."""
