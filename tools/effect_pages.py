@@ -310,7 +310,7 @@ def page(effect: type[Effect]) -> str:
     """An effect's page."""
     first, _, rest = inspect.cleandoc(effect.__doc__ or "").replace("``", "`").partition("\n\n")
     show = _PLANS.get(effect.name, _REVERSALS)
-    variant = f", variant `{effect.variants[0]}`" if len(effect.variants) > 1 else ""
+    variant = f", variant `{effect.variants[0]}`" if effect.variants[0] else ""
     lines = [f"# {effect.name}", "", first, ""]
     lines += [rest, ""] if rest else []
     lines += [

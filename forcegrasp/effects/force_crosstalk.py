@@ -21,7 +21,7 @@ class ForceCrosstalk(Effect):
     separates = "off-centre objects, where only one finger touches; with both in contact it is a gain and can't be told"
     parameters = (
         Parameter("share", "mean share c", "1", -0.5, 0.5, 0.08),
-        Parameter("difference", "how much larger the left one's share is, d", "1", -0.5, 0.5, 0.02, if_missing=0.0),
+        Parameter("difference", "by how much the left one's is larger than c, d", "1", -0.5, 0.5, 0.02, if_missing=0.0),
     )
     least_channels = 2
 

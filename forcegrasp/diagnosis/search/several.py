@@ -20,7 +20,7 @@ from forcegrasp.diagnosis.search.forms import done_by_each
 from forcegrasp.diagnosis.search.judge import judged
 from forcegrasp.diagnosis.search.left_over import is_worth_looking
 from forcegrasp.diagnosis.search.needless import chained
-from forcegrasp.diagnosis.search.refine import fit_with, refine
+from forcegrasp.diagnosis.search.refine import NO_BETTER, fit_with, refine
 from forcegrasp.diagnosis.search.screen import MAX_GAIN_FACTOR, Screen
 from forcegrasp.diagnosis.signatures import Background, Score, direction, null_gains, of_best_effects, trials
 from forcegrasp.diagnosis.study import Study
@@ -118,9 +118,17 @@ def share_of_alike(
     best = _chosen(study, fit, screen, effects)[:1]
     alike = [e for e in effects if any(e is one.setting.effect or look_alike(e, one.setting.effect) for one in best)]
     alike = [e for e in alike if not e.of_set]
-    fits = side_by_side([partial(roughly_as, trials([e]), part, (), some, at_the_end=False) for e in alike])
-    beyond = max(some.target.beyond_noise(part.residual), 1e-9)
-    return {effect: (part.cost - one.cost) / beyond for effect, one in zip(alike, fits, strict=True)}
+    kinds = [kind for effect in alike for kind in _by_variant(effect)]
+    fits = side_by_side([partial(roughly_as, kind, part, (), some, at_the_end=False) for kind in kinds])
+    beyond, shares = max(some.target.beyond_noise(part.residual), 1e-9), dict[type[Effect], float]()
+    for (first, *_), one in zip(kinds, fits, strict=True):
+        shares[first.effect] = max((part.cost - one.cost) / beyond, shares.get(first.effect, 0.0))
+    return shares
+
+
+def _by_variant(effect: type[Effect]) -> list[list[EffectSetting]]:
+    """The sizes of an effect that are tried, of each of its variants."""
+    return [[one for one in trials([effect]) if one.variant == variant] for variant in effect.variants]
 
 
 def share_of_all(study: Study, fit: Fit, further: Fit) -> float:
@@ -174,7 +182,7 @@ def add_several(
     if fit is not before:
         target = study.target
         worth = min(_WORTH * target.beyond_noise(before.residual), _OF_NOISE * target.cost_of_noise)
-        fit = _needed(study, fit, given, 0.0 if straight is None else worth)
+        fit = _needed(study, _in_best_variants(study, fit, before), given, 0.0 if straight is None else worth)
     if set(_names(fit)) <= set(_names(before)):
         return None
     fit = _at_the_end(study, fit)
@@ -225,6 +233,19 @@ def _without_needless(study: Study, fit: Fit, given: int) -> tuple[Fit, list[str
         needless.append(name)
         fit = _without(name, study, fit)
     return fit, needless
+
+
+def _in_best_variants(study: Study, fit: Fit, before: Fit) -> Fit:
+    """A fit with the effects that it has besides in the variants that leave least: signatures had chosen these."""
+    for name in [name for name in _names(fit) if name not in _names(before)]:
+        some, part = study.on_few(fit)
+        own = fit.effect(name)
+        kinds = [kind for kind in _by_variant(own.effect) if kind[0].variant != own.variant]
+        fits = side_by_side([partial(roughly_as, kind, part, name, some, at_the_end=False) for kind in kinds])
+        best = min(fits, key=lambda one: one.cost, default=part)
+        if best.cost < NO_BETTER * part.cost:
+            fit = roughly_as([best.effects[-1]], fit, name, study)
+    return fit
 
 
 def _without(name: str, study: Study, fit: Fit) -> Fit:
