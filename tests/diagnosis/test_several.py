@@ -150,7 +150,9 @@ def small():
 def test_signatures_of_several_effects_add_up(small):
     assert add_up(*at_first(*small))
     assert not add_up(*at_first(*study_of("force_lag time_constant_s=0.06")))  # one alone
-    assert not add_up(*at_first(*study_of("command_delay delay_s=0.01")))  # straight signatures explain too little
+    assert not add_up(*at_first(*study_of("command_delay delay_s=0.01")))  # nor that, which a few others mend
+    large = "command_delay delay_s=0.1", "coulomb_friction force_n=0.06", "force_lag time_constant_s=0.1"
+    assert not add_up(*at_first(*study_of(*large)))  # straight signatures explain too little of what bends
 
 
 def test_effects_that_add_up_are_found_at_once(small, monkeypatch):
