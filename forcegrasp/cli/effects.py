@@ -28,7 +28,6 @@ examples
 Other packages add effects under the entry point group forcegrasp.effects. Pictures of the symptoms: docs/effects/.
 """
 WIDTH = 110
-_OF_A_GRIPPER = "With gripper=GRIPPER: as that gripper has them, in its units, and which it can't have."
 
 
 def run(arguments: list[str]) -> None:
@@ -48,7 +47,8 @@ def run(arguments: list[str]) -> None:
             )
     if not given:
         print(in_full(get_effect(names[0])) if names else overview(catalogue().values()), end="")
-        print("With gripper=GRIPPER: as that gripper has it, in its units." if names else _OF_A_GRIPPER)
+        them = "it, in its units" if names else "them, in its units, and which it can't have"
+        print(f"With gripper=GRIPPER: as that gripper has {them}.")
         return
     from forcegrasp.effects.for_gripper import effect_of, effects_of, why_left_out
     from forcegrasp.physics import load_gripper

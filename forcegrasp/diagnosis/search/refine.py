@@ -57,9 +57,9 @@ def refine(scores: Sequence[Score], study: Study, fit: Fit, background: Backgrou
     pairs = sorted(((sized[i][0], scores[i]) for i in racing), key=lambda pair: -pair[0].gain)
     some, part = study.on_few(fit)
     settings = [sized.setting for sized, _ in pairs]
-    if settings:
-        study.progress(f"fitting each of {len(settings)} effects and variants, on {len(some.target.grasps)} grasps")
     where = f"on {len(some.target.grasps)} grasps"
+    if settings:
+        study.progress(f"fitting each of {len(settings)} effects and variants, {where}")
     tasks = [partial(fit_with, [setting], part.vector, some, part) for setting in settings]
     fits = side_by_side(
         [some.telling(f"{one.title}, {where}", task) for one, task in zip(settings, tasks, strict=True)]

@@ -13,7 +13,7 @@ from functools import partial
 import numpy as np
 
 from forcegrasp.diagnosis.evidence import LEAST_RISE, LEAST_SHARE_OF_MANY, is_beyond_chance
-from forcegrasp.diagnosis.families import look_alike, may_join, problem_without, roughly_as
+from forcegrasp.diagnosis.families import look_alikes_of, may_join, problem_without, roughly_as
 from forcegrasp.diagnosis.few import with_few
 from forcegrasp.diagnosis.result import Step
 from forcegrasp.diagnosis.search.forms import done_by_each
@@ -115,9 +115,8 @@ def share_of_alike(
     One that bends with its size, or that moves base parameters far, gains more than its signature says.
     """
     some, part = study.on_few(fit)
-    best = _chosen(study, fit, screen, effects)[:1]
-    alike = [e for e in effects if any(e is one.setting.effect or look_alike(e, one.setting.effect) for one in best)]
-    alike = [e for e in alike if not e.of_set]
+    best = [score.setting.effect for score in _chosen(study, fit, screen, effects)[:1]]
+    alike = [*best, *(other for own in best for other in look_alikes_of(own, effects, of_any_family=True))]
     kinds = [kind for effect in alike for kind in _by_variant(effect)]
     fits = side_by_side([partial(roughly_as, kind, part, (), some, at_the_end=False) for kind in kinds])
     beyond, shares = max(some.target.beyond_noise(part.residual), 1e-9), dict[type[Effect], float]()
