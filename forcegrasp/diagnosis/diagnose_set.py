@@ -240,6 +240,8 @@ def _put_right_or_as_said(ways: _Ways, loaded: Loaded[MeasurementSet], said: Fit
         likely = with_fault(further, fault.told_by(further.fit), (said[0], said[2].fit))
         of_most = fault.of_most and not fault.is_of_few(further.fit)
         certain = likely.verdict is Verdict.DATA and not (likely.left or fault.moved or of_most)
+        # what is as exact as was said, and leaves nothing, leaves no effect anything to explain
+        certain |= likely.verdict is Verdict.EXPLAINED and fault.moved is not None and fault.moved.is_no_surprise
         if not (certain or likely.stopped):  # effects may do as well without it
             # where next to nothing is left what does as well would show at once
             left = explained_share(likely.error_before, likely.error_after, noise=likely.floor) < EXPLAINED_FAR

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import norm
 
+from forcegrasp.diagnosis.faults.seen_places import seen_places
 from forcegrasp.identify.fit import Fit, fit_once
 from forcegrasp.identify.intervals import listed
 from forcegrasp.identify.predict import Case, predict
@@ -212,27 +213,46 @@ def wanted_moves(
     elif (first := _first_step(measured, target, fit, worth)) is None:
         return None
     columns, step = first
+    numbers = step.moved.numbers
+    placed = np.array([number.kind == "offset_m" for number in numbers])
+    by_trial = bool(placed.any()) and step.moved.is_within  # places would make up for radii that are further off
+    if by_trial and start is None:
+        step = step.with_deviations(placed, np.zeros(placed.sum()))  # slopes may point to another jolt
+    free = ~placed if by_trial else np.ones(len(numbers), bool)
     for _ in range(_STEPS):
-        grasps, before = tuple(step.moved.put(g) for g in measured.grasps), step.moved
-        problem = Problem(fit.problem.gripper, grasps, fit.problem.effects)
-        of_moved = dataclasses.replace(target, grasps=grasps)
-        led = _led_by(fit, problem, step.vector, of_moved)
+        before = step.moved.deviations
+        led, of_moved = _led_to(step, fit, measured, target)
+        if by_trial:
+            seen = seen_places(of_moved, led, _members(numbers, placed), before[placed], measured.offset_std_m)
+            step = step.with_deviations(placed, seen)
+            led, of_moved = _led_to(step, fit, measured, target)
         if led.cost > fit.cost:  # slopes say too little so far from where they were found
-            led = fit_once(of_moved, problem, Simulators(problem), fit.vector, fit.correction, rounds=1)
-            columns = _columns(target, led, before.numbers)
-        fit, step = led, _step(led, columns, before.numbers, None, before.deviations)
-        if np.abs(step.moved.deviations - before.deviations).max() < _SETTLED:
+            led = fit_once(of_moved, led.problem, Simulators(led.problem), fit.vector, fit.correction, rounds=1)
+            columns = _columns(of_moved, led, numbers)
+        moving = [numbers[index] for index in np.flatnonzero(free)]
+        fit, after = led, _step(led, columns[:, free], moving, None, step.moved.deviations[free])
+        step = dataclasses.replace(after, moved=step.with_deviations(free, after.moved.deviations).moved)
+        if np.abs(step.moved.deviations - before).max() < _SETTLED:
             break
     return step.moved if np.any(step.moved.deviations) else None
 
 
-def _led_by(fit: Fit, problem: Problem, vector: np.ndarray, target: Target) -> Fit:
-    """The fit as if it had ended at these coordinates of a problem whose grasps are a little different."""
-    vector = np.clip(vector, problem.low + 1e-9, problem.high - 1e-9)
+def _led_to(step: _Step, fit: Fit, measured: MeasurementSet, target: Target) -> tuple[Fit, Target]:
+    """The fit as if it had ended where a step leads, on the set as moved; and that set's target."""
+    grasps = tuple(step.moved.put(grasp) for grasp in measured.grasps)
+    problem = Problem(fit.problem.gripper, grasps, fit.problem.effects)
+    vector = np.clip(step.vector, problem.low + 1e-9, problem.high - 1e-9)
     replay = Replay(problem.gripper, problem.grasps, cheap_tier(problem.gripper))
     predicted = predict(replay, [problem.case(vector)])[0] + fit.correction
     residual = target.residual(predicted)
-    return dataclasses.replace(fit, problem=problem, vector=vector, predicted=predicted, residual=residual)
+    led = dataclasses.replace(fit, problem=problem, vector=vector, predicted=predicted, residual=residual)
+    return led, dataclasses.replace(target, grasps=grasps)
+
+
+def _members(numbers: Sequence[_Number], where: np.ndarray) -> np.ndarray:
+    """The grasp that each of these numbers is of, ``(k,)``."""
+    chosen = (number for number, is_chosen in zip(numbers, where, strict=True) if is_chosen)
+    return np.array([np.flatnonzero(number.members)[0] for number in chosen])
 
 
 def first_move(measured: MeasurementSet, target: Target, fit: Fit, worth: float = WORTH) -> tuple[Moved, float] | None:
@@ -248,6 +268,12 @@ class _Step:
     moved: Moved
     vector: np.ndarray  #: the parameters' coordinates after it, ``(p,)``
     left: float  #: sum of squares that it leaves
+
+    def with_deviations(self, where: np.ndarray, deviations: np.ndarray) -> _Step:
+        """The step with some numbers moved by so much in all, in standard deviations."""
+        every = self.moved.deviations.copy()
+        every[where] = deviations
+        return dataclasses.replace(self, moved=Moved(self.moved.numbers, every))
 
 
 def _first_step(measured: MeasurementSet, target: Target, fit: Fit, worth: float) -> tuple[np.ndarray, _Step] | None:
