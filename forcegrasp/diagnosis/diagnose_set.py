@@ -11,8 +11,8 @@ import numpy as np
 
 from forcegrasp.diagnosis.cut_short import REASONS, cut_short
 from forcegrasp.diagnosis.evidence import LEAST_SHARE_TOGETHER
-from forcegrasp.diagnosis.faults.suspects import Fault, besides, leaves_nothing, suspects
-from forcegrasp.diagnosis.givens.doubt import leaves_less, more_likely, with_fault
+from forcegrasp.diagnosis.faults.suspects import Fault, besides, leaves_nothing, suspects, uneven_stamps
+from forcegrasp.diagnosis.givens.doubt import leaves_less, more_likely, with_fault, with_fault_beside
 from forcegrasp.diagnosis.givens.give_back import without_move
 from forcegrasp.diagnosis.givens.givens_besides import Fitted, with_givens_put_right
 from forcegrasp.diagnosis.givens.late_rows import may_be_late_rows
@@ -78,14 +78,20 @@ def diagnose_set(
             f" {LEAST_GRASPS} are needed; record more (forcegrasp record shows a plan)"
         )
     ways = _Ways(model, chosen_effects(loaded.gripper, names), seed, progress)
-    said = ways.fitted(loaded)
+    given = said = ways.fitted(loaded)
+    stamps = None
     try:
+        stamps = ways.put_stamps_right(loaded, said)
+        if stamps is not None:
+            loaded, said = stamps[0].put_right, stamps[1]
         diagnosis, simulators = _put_right_or_as_said(ways, loaded, said)
     except REASONS as reason:  # before any search had begun
         stopped = cut_short(reason, progress)
         nothing = dataclasses.replace(ways, effects=[]).search(*said)
         diagnosis, simulators = dataclasses.replace(nothing, stopped=stopped), said[1]
     diagnosis = timing_within_tolerance_after_all(diagnosis, loaded)
+    if stamps is not None:
+        diagnosis = with_fault_beside(diagnosis, stamps[0], (given[0], given[2].fit))
     sought, found = law and not diagnosis.stopped, None
     if sought:
         try:
@@ -197,6 +203,14 @@ class _Ways:
             return with_givens_put_right(found, loaded, put_right, self._search_on, self.progress, least)
         except REASONS as reason:
             return dataclasses.replace(found, stopped=cut_short(reason, self.progress)), Simulators(found.fit.problem)
+
+    def put_stamps_right(self, loaded: Loaded[MeasurementSet], said: Fitted) -> tuple[Fault, Fitted] | None:
+        """Time stamps that scatter though rows were read evenly, and the set without that, fitted; None if none do."""
+        fault = uneven_stamps(loaded, said[0], said[2].fit)
+        if fault is None:
+            return None
+        self.progress(f"fitting the set with {fault.name} put right")
+        return fault, self.fitted(fault.put_right)
 
     def put_right(self, fault: Fault, said: Fitted, widely: bool = False) -> tuple[Fault, Fitted] | None:
         """The fault, or a wider one, and the set without it, fitted; None unless that leaves much less.

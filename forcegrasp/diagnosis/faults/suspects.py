@@ -110,6 +110,12 @@ def besides(fault: Fault, moved: Fault | None) -> Fault:
     return dataclasses.replace(fault, words=words, put_right=moved.put_right)
 
 
+def beside(first: Fault, fault: Fault) -> Fault:
+    """A fault that was found once another one was put right, with words of both."""
+    words, check = (f"{getattr(fault, of)}; besides, {getattr(first, of)}" for of in ("words", "check"))
+    return dataclasses.replace(fault, words=words, check=check)
+
+
 def leaves_nothing(fit: Fit, target: Target) -> bool:
     """Whether a fit leaves too little for the set to be doubted."""
     return rms_error(fit, target) < _NOTHING
@@ -134,10 +140,6 @@ def suspects(loaded: Loaded[MeasurementSet], target: Target, fit: Fit) -> list[F
         words = f"time stamps are {times(factor)} for commands {loaded.gripper.period_s:g} s apart"
         right = _changed(loaded, lambda _, g: _slower(g, 1 / factor))
         found.append(Fault("time_scale", words, "the clock and unit of t_s", right))
-    if are_even_in_truth(target, fit):
-        words = f"time stamps scatter by {1e3 * scatter_s(target):.2g} ms, and what was read is even in time"
-        check = "whether rows are stamped when they are read, and not when they are written"
-        found.append(Fault("uneven_stamps", words, check, _changed(loaded, lambda _, g: evenly(g))))
     tare, drift, left = find_tare(measured), session_drift(target, fit), np.inf
     if tare is not None:
         tare, left = _sharper(tare, target, fit)
@@ -186,6 +188,21 @@ def suspects(loaded: Loaded[MeasurementSet], target: Target, fit: Fit) -> list[F
     elif moved is not None and moved.is_within:
         found.append(_moved(loaded, moved))
     return found
+
+
+def uneven_stamps(loaded: Loaded[MeasurementSet], target: Target, fit: Fit) -> Fault | None:
+    """Time stamps that scatter though rows were read evenly; None if they don't, or stamps are right.
+
+    Readings say so whatever the model lacks, and no effect does the like: it is put right before all else.
+
+    Args:
+      loaded, target, fit: as for :func:`suspects`.
+    """
+    if loaded.gripper.is_servo or leaves_nothing(fit, target) or not are_even_in_truth(target, fit):
+        return None
+    words = f"time stamps scatter by {1e3 * scatter_s(target):.2g} ms, and what was read is even in time"
+    check = "whether rows are stamped when they are read, and not when they are written"
+    return Fault("uneven_stamps", words, check, _changed(loaded, lambda _, g: evenly(g)))
 
 
 def _of_recordings(loaded: Loaded[MeasurementSet], target: Target, fit: Fit) -> list[Fault]:
