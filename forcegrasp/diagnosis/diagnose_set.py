@@ -33,8 +33,9 @@ from forcegrasp.effects.for_gripper import effect_of, effects_of
 from forcegrasp.errors import MeasurementError
 from forcegrasp.identify import fit_set
 from forcegrasp.identify.base_fit import BaseFit
-from forcegrasp.identify.fit import Fit
+from forcegrasp.identify.fit import Fit, with_own_slopes
 from forcegrasp.identify.fitted_model import model_of
+from forcegrasp.identify.givens import errors_by_givens
 from forcegrasp.identify.intervals import listed
 from forcegrasp.identify.loading import Loaded
 from forcegrasp.identify.progress import Progress
@@ -92,6 +93,11 @@ def diagnose_set(
     diagnosis = timing_within_tolerance_after_all(diagnosis, loaded)
     if stamps is not None:
         diagnosis = with_fault_beside(diagnosis, stamps[0], (given[0], given[2].fit))
+    if diagnosis.fit is diagnosis.base.fit and not diagnosis.stopped:  # effects were fitted to their end
+        fit = with_own_slopes(diagnosis.fit, diagnosis.target, Simulators(diagnosis.fit.problem), progress)
+        diagnosis = dataclasses.replace(diagnosis, fit=fit, base=dataclasses.replace(diagnosis.base, fit=fit))
+    by_givens = tuple(errors_by_givens(diagnosis.fit, diagnosis.target, loaded.measured))
+    diagnosis = dataclasses.replace(diagnosis, by_givens=by_givens)
     sought, found = law and not diagnosis.stopped, None
     if sought:
         try:

@@ -147,6 +147,7 @@ class Diagnosis(ShortRepr):
     error_before: float
     error_after: float
     numerical: tuple[np.ndarray, ...] = field(default=())  #: of the final fit, each ``(G, S, C)``
+    by_givens: tuple[np.ndarray, ...] = field(default=())  #: of the final fit, as what is given is not exact, as above
     floor: float = 1.0  #: error that sensor noise and the base model's own numerical error leave
     left: str = ""  #: where there is more than that, in words; empty if nowhere
     odd: tuple[OddGrasp, ...] = ()  #: grasps that a fit of all others misses by far
@@ -167,6 +168,11 @@ class Diagnosis(ShortRepr):
     def preferred(self) -> tuple[str, ...]:
         """The effects that were found and are in the final model: of those that can't be told apart the first."""
         return tuple(step.effects[0] for step in kept_steps(self.steps))
+
+    @property
+    def inexact(self) -> tuple[np.ndarray, ...]:
+        """What may lead the final fit's parameters besides noise, each ``(G, S, C)``."""
+        return (*self.numerical, *self.by_givens)
 
     @property
     def fault_is_rival(self) -> bool:

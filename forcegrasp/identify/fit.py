@@ -13,6 +13,7 @@ from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.identify.local_slopes import LocalSlopes
 from forcegrasp.identify.predict import predict
 from forcegrasp.identify.problem import Problem
+from forcegrasp.identify.progress import Progress, silent
 from forcegrasp.identify.simulators import STEP, Simulators
 from forcegrasp.identify.target import Target
 from forcegrasp.short_repr import ShortRepr, counted
@@ -193,6 +194,23 @@ def fit_exactly(
     exact = local.value(vector)
     cheap = exact if simulators.one_model else predict(simulators.cheap, [problem.case(vector)])[0]
     return _finish(local, vector, exact, exact - cheap, free, total)
+
+
+def with_own_slopes(fit: Fit, target: Target, simulators: Simulators, progress: Progress = silent) -> Fit:
+    """The fit with slopes of the model itself, and where they lead; as it is if the cheap one's are as good.
+
+    Larger steps make another lag of a short one: slopes from them leave a fit beside the optimum where parameters are
+    hardly told apart, and make intervals too narrow.
+
+    Args:
+      fit: from :func:`fit_once`.
+      target, simulators: of the same problem.
+      progress: told that this takes long.
+    """
+    if simulators.at_the_end is simulators.cheap:
+        return fit
+    progress("base model, with the scene's own steps")
+    return fit_exactly(target, fit.problem, simulators, fit.vector)
 
 
 def _descend(

@@ -8,7 +8,7 @@ import numpy as np
 
 from forcegrasp.errors import ConfigError, PhysicsError
 from forcegrasp.identify.base_fit import BaseFit, check_gradient, cost_tolerance, fit_base
-from forcegrasp.identify.fit import fit_exactly, fit_once
+from forcegrasp.identify.fit import fit_exactly, fit_once, with_own_slopes
 from forcegrasp.identify.larger_steps import lead_astray, with_own_steps
 from forcegrasp.identify.loading import Loaded
 from forcegrasp.identify.problem import Problem
@@ -36,7 +36,10 @@ def fit_model(
     base = fit_base(target, problem, simulators, np.random.default_rng(seed), progress, hasty)
     if lead_astray(base.fit, target):
         return fit_model(_with_own_steps(loaded, progress), seed, progress, hasty)
-    return _weighed(target, simulators, base)
+    target, simulators, base = _weighed(target, simulators, base)
+    if not hasty:
+        base = dataclasses.replace(base, fit=with_own_slopes(base.fit, target, simulators, progress))
+    return target, simulators, base
 
 
 def apply_model(

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from forcegrasp.identify.fit import Fit
+from forcegrasp.identify.givens import errors_by_givens
 from forcegrasp.identify.intervals import intervals, standard_errors, warnings
 from forcegrasp.identify.loading import Loaded
 from forcegrasp.identify.target import Target
@@ -15,7 +16,8 @@ from forcegrasp.models.model_file import Fitted, FoundEffect, Model
 
 def model_of(fit: Fit, target: Target, loaded: Loaded, numerical: Sequence[np.ndarray]) -> Model:
     """A fit as a model that can be written."""
-    problem, errors = fit.problem, standard_errors(fit, target, numerical)
+    problem, measured = fit.problem, loaded.measured
+    errors = standard_errors(fit, target, [*numerical, *errors_by_givens(fit, target, measured)])
     base: dict[str, Fitted] = {}
     objects: dict[str, dict[str, Fitted]] = {}
     grasps: dict[str, dict[str, Fitted]] = {}

@@ -51,7 +51,7 @@ def found_steps(diagnosis: Diagnosis) -> list[tuple[Step, Fit]]:
 def found_parameters(diagnosis: Diagnosis) -> dict[str, dict[str, Fitted]]:
     """The parameters of all effects in the final model, by effect and by name."""
     fit, target = diagnosis.fit, diagnosis.target
-    effects = effects_of_fit(fit, target, standard_errors(fit, target, diagnosis.numerical))
+    effects = effects_of_fit(fit, target, standard_errors(fit, target, diagnosis.inexact))
     return {found.effect.name: found.parameters for found in effects}
 
 
@@ -76,7 +76,7 @@ def candidate_parameters(candidate: Candidate, diagnosis: Diagnosis) -> dict[str
 
 def final_warnings(diagnosis: Diagnosis) -> list[str]:
     """What to bear in mind about the final model's parameters."""
-    errors, too_long = standard_errors(diagnosis.fit, diagnosis.target, diagnosis.numerical), step_warning(diagnosis)
+    errors, too_long = standard_errors(diagnosis.fit, diagnosis.target, diagnosis.inexact), step_warning(diagnosis)
     return [*([too_long] if too_long else []), *warnings(diagnosis.fit, errors)]
 
 

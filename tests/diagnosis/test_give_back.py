@@ -11,11 +11,12 @@ import pytest
 
 from forcegrasp.diagnosis.diagnose_set import _Ways, diagnose_set
 from forcegrasp.diagnosis.faults.suspects import Fault
-from forcegrasp.diagnosis.faults.tolerance import Moved, _numbers
+from forcegrasp.diagnosis.faults.tolerance import Moved
 from forcegrasp.diagnosis.givens import give_back
 from forcegrasp.diagnosis.givens.give_back import without_move
 from forcegrasp.diagnosis.result import Step
 from forcegrasp.effects.for_gripper import effect_of
+from forcegrasp.identify.givens import givens_of
 from forcegrasp.identify.progress import silent
 from forcegrasp.identify.target import make_target
 from tests.light_set import light_set
@@ -35,7 +36,7 @@ def with_grasps(loaded, change):
 
 
 def moves_of(loaded) -> Moved:
-    numbers = _numbers(loaded.measured, make_target(loaded.measured, loaded.gripper))
+    numbers = givens_of(loaded.measured, make_target(loaded.measured, loaded.gripper))
     radii = tuple(number for number in numbers if number.kind == "radius_m")
     return Moved(radii, np.array(MOVES))
 

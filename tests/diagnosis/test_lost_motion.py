@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 
 from forcegrasp.diagnosis.faults.suspects import Fault
-from forcegrasp.diagnosis.faults.tolerance import Moved, _limits, _Number, _numbers
+from forcegrasp.diagnosis.faults.tolerance import Moved, _limits
 from forcegrasp.diagnosis.givens.lost_motion import with_lost_motion
 from forcegrasp.diagnosis.givens.moved_set import _Model, _with_lost_motion
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.effects import get_effect
 from forcegrasp.identify.cross_validation import evidence_folds
 from forcegrasp.identify.fit_set import fit_model
+from forcegrasp.identify.givens import Given, givens_of
 from forcegrasp.identify.simulators import Simulators
 from forcegrasp.identify.target import make_target
 from tests.light_set import light_set
@@ -28,8 +29,8 @@ def silent(text: str) -> None:
 
 def test_each_of_many_places_may_be_further_off_than_one_radius():
     of_all = np.ones(24, bool)
-    places = [_Number("offset_m", f"g{i}", 5e-4, of_all) for i in range(24)]
-    radius = _Number("radius_m", "cup", 3e-4, of_all)
+    places = [Given("offset_m", f"g{i}", 5e-4, of_all) for i in range(24)]
+    radius = Given("radius_m", "cup", 3e-4, of_all)
     limits = _limits([radius, *places])
     assert limits[0] == 3.0
     assert limits[1:] == pytest.approx(3.86, abs=0.01)
@@ -44,7 +45,7 @@ def loose():
     loaded = light_set(f"backlash loose gap_m={GAP_M}", seed=4, grasps=12)
     loaded = with_grasps(loaded, lambda g: dataclasses.replace(g, radius_m=g.radius_m + OFF_M.get(g.object, 0.0)))
     loaded = dataclasses.replace(loaded, measured=dataclasses.replace(loaded.measured, radius_std_m=3e-4))
-    numbers = _numbers(loaded.measured, make_target(loaded.measured, loaded.gripper))
+    numbers = givens_of(loaded.measured, make_target(loaded.measured, loaded.gripper))
     radii = tuple(number for number in numbers if number.kind == "radius_m")
     down = Moved(radii, np.array([(-GAP_M / 2 - OFF_M.get(number.owner, 0.0)) / 3e-4 for number in radii]))
     fitted = with_grasps(loaded, down.put)

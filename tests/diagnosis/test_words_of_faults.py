@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from forcegrasp.diagnosis.faults.suspects import Fault
-from forcegrasp.diagnosis.faults.tolerance import Moved, _Number
+from forcegrasp.diagnosis.faults.tolerance import Moved
 from forcegrasp.effects import get_effect
 from forcegrasp.effects.setting import EffectSetting
+from forcegrasp.identify.givens import Given
 from forcegrasp.identify.problem import Problem
 from forcegrasp.identify.verdict import Verdict
 from forcegrasp.reports.diagnosis import answer, diagnosis_json, lines
@@ -85,7 +86,7 @@ def test_the_box_tells_a_fault_alone_in_a_line_for_each_thing(made_up, fault):
 )
 def test_a_move_that_lowers_no_error_alone_is_not_said_to(made_up, fault, error_moved, told):
     found = made_up.diagnosis("effect")
-    moved = Moved((_Number("radius_m", "cup", 1e-4, np.ones(2, bool)),), np.ones(1))
+    moved = Moved((Given("radius_m", "cup", 1e-4, np.ones(2, bool)),), np.ones(1))
     fault = dataclasses.replace(fault, moved=moved)
     said = answer(dataclasses.replace(found, fault=fault, error_moved=error_moved * found.error_before))
     assert told in said
@@ -98,7 +99,7 @@ def test_a_move_that_lowers_no_error_alone_is_not_said_to(made_up, fault, error_
 def test_radii_that_are_smaller_on_average_may_be_backlash(made_up, fault, moves, told):
     """A gap lets fingers come nearer before they press, on every object alike; other errors of radii do not."""
     found = made_up.diagnosis("effect")
-    radii = tuple(_Number("radius_m", f"object {i}", 3e-4, np.ones(2, bool)) for i in range(len(moves)))
+    radii = tuple(Given("radius_m", f"object {i}", 3e-4, np.ones(2, bool)) for i in range(len(moves)))
     fault = dataclasses.replace(fault, moved=Moved(radii, np.array(moves)))
     said = answer(dataclasses.replace(found, fault=fault, error_moved=0.8 * found.error_before))
     assert ("smaller on average so, as backlash would have them look" in said) == told

@@ -25,6 +25,7 @@ from forcegrasp.identify.base_fit import BaseFit, check_gradient, fit_base, rms_
 from forcegrasp.identify.cross_validation import heldout_residual, make_folds, rms
 from forcegrasp.identify.fit import Fit, fit_exactly, fit_once
 from forcegrasp.identify.fitted_model import model_of
+from forcegrasp.identify.givens import errors_by_givens
 from forcegrasp.identify.intervals import intervals, standard_errors, warnings
 from forcegrasp.identify.loading import Loaded
 from forcegrasp.identify.noise_floor import beyond_fit, excess, numerical_error, numerical_floor
@@ -481,6 +482,8 @@ def test_one_interval_everywhere(fitted):
     assert all(np.array_equal(one, other) for one, other in zip(diagnosis.numerical, expected, strict=True))
     measured = MeasurementSet(Path(), "", "tiago", "", "", SIGMA[0], SIGMA[2], target.grasps, "")
     model = model_of(diagnosis.fit, target, Loaded(measured, TIAGO, []), diagnosis.numerical)
+    by_givens = tuple(errors_by_givens(diagnosis.fit, target, measured))
+    diagnosis = dataclasses.replace(diagnosis, by_givens=by_givens)  # as a diagnosis of the whole set has them
     found = diagnosis_json(diagnosis, None, [], "s")
     lines, table = "\n".join(lines_of(diagnosis, None)), Console(width=200, record=True, file=io.StringIO())
     table.print(printed(diagnosis))

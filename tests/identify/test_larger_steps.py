@@ -9,15 +9,18 @@ import numpy as np
 import pytest
 
 from forcegrasp.identify import base_fit, fit_set, larger_steps
+from forcegrasp.identify.fit import with_own_slopes
 from forcegrasp.identify.fit_set import apply_model, fit_model
 from forcegrasp.identify.fitted_model import model_of
 from forcegrasp.identify.larger_steps import lead_astray, with_larger_steps_again, with_own_steps
+from forcegrasp.identify.local_slopes import LocalSlopes
 from forcegrasp.identify.predict import predict
 from forcegrasp.identify.problem import Problem
 from forcegrasp.identify.progress import silent
 from forcegrasp.identify.simulators import cheap_tier
 from forcegrasp.identify.target import make_target
 from forcegrasp.physics.gripper_file import load_gripper
+from forcegrasp.replay.replay import Replay
 from tests.light_set import light_set
 
 
@@ -66,6 +69,31 @@ def test_a_set_is_fitted_again_with_own_steps(loaded, monkeypatch):
     asked.clear()
     apply_model(loaded, model, silent, refit=False)
     assert not asked  # nothing is fitted
+
+
+def test_a_fit_ends_with_slopes_of_the_model_itself(loaded):
+    """Those of larger steps leave it beside the optimum."""
+    target, simulators, base = fit_model(loaded, 0, silent, hasty=True)
+    told, fit = [], base.fit
+    assert with_own_slopes(fit, target, simulators, told.append) is fit  # there is only one model
+    simulators.exact = simulators.at_the_end = Replay(loaded.gripper, target.grasps, step_factor=0.5)
+    own = with_own_slopes(fit, target, simulators, told.append)
+    assert told == ["base model, with the scene's own steps"]
+    of_own = LocalSlopes(target, fit.problem, simulators.exact, simulators.exact, None, simulators.step)
+    assert own.jacobian == pytest.approx(of_own.slopes(own.vector, anew=True))
+    assert own.jacobian != pytest.approx(fit.jacobian)
+    before = target.residual(predict(simulators.exact, [fit.problem.case(fit.vector)])[0])
+    assert own.cost <= np.sum(before**2)
+    simulators.at_the_end = simulators.cheap  # somebody compared them
+    assert with_own_slopes(fit, target, simulators) is fit
+
+
+@pytest.mark.parametrize("hasty", [True, False])
+def test_a_hasty_fit_does_not(loaded, hasty, monkeypatch):
+    asked = []
+    monkeypatch.setattr(fit_set, "with_own_slopes", lambda fit, *_: asked.append(fit) or fit)
+    _, _, base = fit_model(loaded, 0, silent, hasty)
+    assert asked == ([] if hasty else [base.fit])
 
 
 def test_larger_steps_come_back_where_grasps_go_the_same_way(loaded, monkeypatch):

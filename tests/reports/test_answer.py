@@ -15,6 +15,7 @@ from forcegrasp.diagnosis.result import Diagnosis
 from forcegrasp.effects import get_effect
 from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.identify.fitted_model import model_of
+from forcegrasp.identify.givens import errors_by_givens
 from forcegrasp.identify.verdict import Verdict
 from forcegrasp.models.model_file import write_model
 from forcegrasp.reports import comparison as comparison_report
@@ -271,6 +272,8 @@ def test_a_symptom_is_of_these_data(made_up):
 
 def test_a_value_has_one_interval_wherever_it_stands(made_up, tmp_path):
     diagnosis = made_up.diagnosis("effect")
+    by_givens = tuple(errors_by_givens(diagnosis.fit, diagnosis.target, made_up.loaded.measured))
+    diagnosis = dataclasses.replace(diagnosis, by_givens=by_givens)  # as a diagnosis of the whole set has them
     write_model(model_of(diagnosis.fit, diagnosis.target, made_up.loaded, diagnosis.numerical), tmp_path / "m.yaml")
     written = yaml.safe_load((tmp_path / "m.yaml").read_text())["effects"]["force_bias"]["left_n"]
     found = diagnosis_report.diagnosis_json(diagnosis, None, made_up.tried, "s")["parameters"]["force_bias"]["left_n"]

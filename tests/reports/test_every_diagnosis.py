@@ -11,9 +11,10 @@ import pytest
 
 from forcegrasp.diagnosis.faults.odd_grasps import OddGrasp
 from forcegrasp.diagnosis.faults.suspects import Fault
-from forcegrasp.diagnosis.faults.tolerance import Moved, _Number
+from forcegrasp.diagnosis.faults.tolerance import Moved
 from forcegrasp.diagnosis.noise.noise_check import Noise
 from forcegrasp.diagnosis.result import Diagnosis
+from forcegrasp.identify.givens import Given
 from forcegrasp.identify.verdict import Verdict
 from forcegrasp.reports import diagnosis as report
 from forcegrasp.reports.diagnosis_box import answer_box
@@ -28,7 +29,7 @@ def with_faults(found: Diagnosis, made_up) -> Iterator[Diagnosis]:
     """The diagnosis of a set without a fault, and of sets with one: besides, instead, or moved within a tolerance."""
     yield found
     fault = Fault("time_scale", "stamps are too long", "the clock", made_up.loaded)
-    number = _Number("readout_skew_s", "", 0.002, np.ones(8, bool))
+    number = Given("readout_skew_s", "", 0.002, np.ones(8, bool))
     moved = dataclasses.replace(fault, name="timing_tolerance", moved=Moved((number,), np.array([-2.0])))
     yield dataclasses.replace(found, fault=moved)
     if found.verdict is Verdict.DATA:

@@ -11,8 +11,9 @@ from scipy.stats import norm
 
 from forcegrasp.diagnosis.faults.seen_places import seen_places
 from forcegrasp.identify.fit import Fit, fit_once
+from forcegrasp.identify.givens import OF_OBJECTS, OF_READING, PERIOD, Given, given_slopes, givens_of
 from forcegrasp.identify.intervals import listed
-from forcegrasp.identify.predict import Case, predict
+from forcegrasp.identify.predict import predict
 from forcegrasp.identify.problem import Problem
 from forcegrasp.identify.simulators import Simulators, cheap_tier
 from forcegrasp.identify.target import Target
@@ -35,10 +36,8 @@ _NEARLY = 0.8
 # Readings bend with what is given: so many linear steps, or until they are this small.
 _STEPS, _SETTLED = 4, 0.1
 # What is moved together, the fewest numbers first.
-_PERIOD, _OBJECT = "period_share", ("radius_m", "offset_m")
-_READING = (SKEW, FORCE_SKEW)
-_TIMING = (*_READING, _PERIOD)
-_GROUPS = (*((kind,) for kind in _TIMING), _TIMING, _OBJECT, (*_OBJECT, *_TIMING))
+_TIMING = (*OF_READING, PERIOD)
+_GROUPS = (*((kind,) for kind in _TIMING), _TIMING, OF_OBJECTS, (*OF_OBJECTS, *_TIMING))
 _CHECKS = {
     "object": "the objects: their radii, with a calliper, and where they stood",
     "timing": "the clock, and when readings are taken",
@@ -46,33 +45,10 @@ _CHECKS = {
 
 
 @dataclass(frozen=True, eq=False)
-class _Number:
-    """One number that a set gives."""
-
-    kind: str  #: base parameter that it is, or :data:`_PERIOD`
-    owner: str  #: object or grasp that it is of; "" of the set
-    std: float
-    members: np.ndarray  #: which grasps it concerns, ``(G,)``
-
-    @property
-    def group(self) -> str:
-        """What it is of: "object" or "timing"."""
-        return "object" if self.kind in _OBJECT else "timing"
-
-    def words(self, move: float) -> str:
-        """How it moved."""
-        if self.kind == _PERIOD:
-            return f"the clock's period by {100 * move:+.2g} %"
-        names = {SKEW: "time of reading", FORCE_SKEW: "time of reading forces"}
-        unit = "ms" if self.kind in names else "mm"
-        return f"{names.get(self.kind, f'radius of {self.owner}')} by {1e3 * move:+.2g} {unit}"
-
-
-@dataclass(frozen=True, eq=False)
 class Moved:
     """By how much what is given was moved."""
 
-    numbers: tuple[_Number, ...]
+    numbers: tuple[Given, ...]
     deviations: np.ndarray  #: moves ÷ standard deviation, ``(numbers,)``
 
     @property
@@ -138,7 +114,7 @@ class Moved:
         """A grasp with what is given moved."""
         moves = self.moves
         radius, offset, start = grasp.radius_m, grasp.offset_m, grasp.time_s[0]
-        slower, late = 1 + moves.get(_PERIOD, 0.0), moves.get(SKEW, 0.0)
+        slower, late = 1 + moves.get(PERIOD, 0.0), moves.get(SKEW, 0.0)
         return dataclasses.replace(
             grasp,
             radius_m=None if radius is None else radius + moves.get(f"radius_m of {grasp.object}", 0.0),
@@ -160,7 +136,7 @@ class Moved:
         return listed(told)
 
 
-def _limits(numbers: Sequence[_Number]) -> np.ndarray:
+def _limits(numbers: Sequence[Given]) -> np.ndarray:
     """By how many standard deviations each may be off, ``(numbers,)``.
 
     Each grasp has a place of its own: any of two dozen is as likely beyond 3.9 of them as one radius beyond 3.
@@ -171,7 +147,7 @@ def _limits(numbers: Sequence[_Number]) -> np.ndarray:
 
 def all_radii(measured: MeasurementSet, target: Target, move_m: float) -> Moved | None:
     """All radii moved by so much, metres; None if that is more than the tolerance of what is given leaves open."""
-    numbers = tuple(number for number in _numbers(measured, target) if number.kind == "radius_m")
+    numbers = tuple(number for number in givens_of(measured, target) if number.kind == "radius_m")
     if not numbers or abs(move_m) > _NO_SURPRISE * measured.radius_std_m:
         return None
     return Moved(numbers, np.full(len(numbers), move_m / measured.radius_std_m))
@@ -179,7 +155,7 @@ def all_radii(measured: MeasurementSet, target: Target, move_m: float) -> Moved 
 
 def time_of_reading(measured: MeasurementSet, target: Target, delay_s: float) -> Moved | None:
     """The time of reading moved by so much, s; None if that is more than the tolerance of what is given leaves open."""
-    numbers = tuple(number for number in _numbers(measured, target) if number.kind == SKEW)
+    numbers = tuple(number for number in givens_of(measured, target) if number.kind == SKEW)
     if not numbers[0].std or abs(delay_s) > _NO_SURPRISE * numbers[0].std:
         return None
     return Moved(numbers, np.array([delay_s / numbers[0].std]))
@@ -209,7 +185,7 @@ def wanted_moves(
       start: moves from which the fit started already; none by default, and then they are to explain enough.
     """
     if start is not None:
-        first = _columns(target, fit, start.numbers), _Step(start, fit.vector, fit.cost)
+        first = given_slopes(target, fit, start.numbers), _Step(start, fit.vector, fit.cost)
     elif (first := _first_step(measured, target, fit, worth)) is None:
         return None
     columns, step = first
@@ -228,7 +204,7 @@ def wanted_moves(
             led, of_moved = _led_to(step, fit, measured, target)
         if led.cost > fit.cost:  # slopes say too little so far from where they were found
             led = fit_once(of_moved, led.problem, Simulators(led.problem), fit.vector, fit.correction, rounds=1)
-            columns = _columns(of_moved, led, numbers)
+            columns = given_slopes(of_moved, led, numbers)
         moving = [numbers[index] for index in np.flatnonzero(free)]
         fit, after = led, _step(led, columns[:, free], moving, None, step.moved.deviations[free])
         step = dataclasses.replace(after, moved=step.with_deviations(free, after.moved.deviations).moved)
@@ -249,7 +225,7 @@ def _led_to(step: _Step, fit: Fit, measured: MeasurementSet, target: Target) -> 
     return led, dataclasses.replace(target, grasps=grasps)
 
 
-def _members(numbers: Sequence[_Number], where: np.ndarray) -> np.ndarray:
+def _members(numbers: Sequence[Given], where: np.ndarray) -> np.ndarray:
     """The grasp that each of these numbers is of, ``(k,)``."""
     chosen = (number for number, is_chosen in zip(numbers, where, strict=True) if is_chosen)
     return np.array([np.flatnonzero(number.members)[0] for number in chosen])
@@ -278,8 +254,8 @@ class _Step:
 
 def _first_step(measured: MeasurementSet, target: Target, fit: Fit, worth: float) -> tuple[np.ndarray, _Step] | None:
     """One step of the fewest numbers that do nearly as much as all, and their columns; None if all do too little."""
-    numbers = _numbers(measured, target)
-    columns = _columns(target, fit, numbers)
+    numbers = givens_of(measured, target)
+    columns = given_slopes(target, fit, numbers)
     groups = [kinds for kinds in _GROUPS if any(number.kind in kinds for number in numbers)]
     steps = [_step(fit, columns, numbers, kinds) for kinds in groups]
     explained = [fit.cost - step.left - 2 * step.moved.price for step in steps]
@@ -289,54 +265,10 @@ def _first_step(measured: MeasurementSet, target: Target, fit: Fit, worth: float
     return columns[:, [numbers.index(number) for number in step.moved.numbers]], step
 
 
-def _numbers(measured: MeasurementSet, target: Target) -> tuple[_Number, ...]:
-    """All that a set gives and has a tolerance."""
-    grasps = target.grasps
-    objects = dict.fromkeys(g.object for g in grasps if g.radius_m is not None)
-    placed = [g.name for g in grasps if g.offset_m is not None]
-    timing = {_PERIOD: measured.period_std_share, SKEW: measured.delay_std_s}
-    timing |= {FORCE_SKEW: measured.delay_std_s} if "force" in target.axis.kinds else {}
-
-    def numbers(kind: str, std: float, owners: Sequence[str], of: Sequence[str]) -> list[_Number]:
-        return [_Number(kind, owner, std, np.array([name == owner for name in of])) for owner in owners]
-
-    return (
-        *numbers("radius_m", measured.radius_std_m, list(objects), [g.object for g in grasps]),
-        *numbers("offset_m", measured.offset_std_m, placed, [g.name for g in grasps]),
-        *(_Number(kind, "", std, np.ones(len(grasps), bool)) for kind, std in timing.items()),
-    )
-
-
-def _columns(target: Target, fit: Fit, numbers: Sequence[_Number]) -> np.ndarray:
-    """What a standard deviation of each number changes of the signals ÷ noise, ``(N, numbers)``."""
-    gripper, grasps, case = fit.problem.gripper, fit.problem.grasps, fit.problem.case(fit.vector)
-    tier = cheap_tier(gripper)
-    stds = {number.kind: number.std for number in numbers}
-    together = {SKEW: (SKEW, FORCE_SKEW)}  # forces are read with the positions, or by so much later
-    # what is read after a command shows what it does at once, what is read before does not: slopes either way
-    trials = [(kind, way) for kind in stds if kind != _PERIOD for way in ((1, -1) if kind in _READING else (1,))]
-    moved = (
-        Case(case.base | {n: case.base[n] + way * stds[kind] for n in together.get(kind, (kind,))}, case.effects)
-        for kind, way in trials
-    )
-    as_said, *signals = predict(Replay(gripper, grasps, tier), [case, *moved])
-    if _PERIOD in stds:
-        slower = [dataclasses.replace(g, time_s=g.time_s * (1 + stds[_PERIOD])) for g in grasps]
-        signals.append(predict(Replay(gripper, slower, tier), [case])[0])
-        trials.append((_PERIOD, 1))
-    columns: dict[str, tuple[float, np.ndarray]] = {}
-    for (kind, way), one in zip(trials, signals, strict=True):
-        change = target.change(one, as_said)
-        asked = float(np.sum(change * fit.residual)) / max(float(np.linalg.norm(change)), 1e-9)
-        if kind not in columns or asked > columns[kind][0]:
-            columns[kind] = asked, way * change
-    return np.column_stack([(columns[n.kind][1] * n.members[:, None, None]).ravel() for n in numbers])
-
-
 def _step(
     fit: Fit,
     columns: np.ndarray,
-    numbers: Sequence[_Number],
+    numbers: Sequence[Given],
     kinds: Sequence[str] | None = None,
     before: np.ndarray | None = None,
 ) -> _Step:

@@ -101,7 +101,7 @@ def concluded(begun: Begun, study: Study, steps: Sequence[Step], fit: Fit, in_a_
     forms = bool(left) and verdict.names_effects and begun.may_be_forms(study, fit)
     return Diagnosis(
         verdict, tuple(dict.fromkeys(names)), tuple(steps), base, fit, target, begun.folds, error_before, error_after,
-        numerical, floor, left, odd, noise, alone=alone, may_be_forms=forms,
+        numerical, floor=floor, left=left, odd=odd, noise=noise, alone=alone, may_be_forms=forms,
     )  # fmt: skip
 
 
