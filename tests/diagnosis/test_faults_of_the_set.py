@@ -301,6 +301,25 @@ def test_a_fault_is_put_right_and_told(request, measured, name, told, change):
     assert told in found["fault"]["words"]
 
 
+def test_two_faults_are_told_together(sound):
+    """Of stamps, and of what is seen once they are put right."""
+    loaded, model = sound
+    places = {g.name: i for i, g in enumerate(loaded.measured.grasps)}
+
+    def spoilt(grasp):
+        place = places[grasp.name]
+        scatter = np.random.default_rng(place).uniform(-0.009, 0.009, len(grasp.time_s))
+        shift = [0.2 * (place >= 4), 0.0]
+        return dataclasses.replace(grasp, time_s=grasp.time_s + scatter, force_n=grasp.force_n - shift)
+
+    diagnosis, _ = diagnose_set(changed(loaded, spoilt), model, ["force_bias"], 0, silent)
+    assert (diagnosis.verdict, diagnosis.effects) == ("data", ("force_tare",))
+    assert diagnosis.error_after < 1.3
+    text = answer(diagnosis)
+    assert "force_tare (the zero changes at grasp 4" in text
+    assert "; besides, time stamps scatter by 5" in text
+
+
 def inexact(name: str, radius_m: float, offset_m: float, radius_std_m: float = 5e-5):
     """A change of the set: one object's radius, and all places."""
 
