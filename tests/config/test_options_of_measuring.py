@@ -152,6 +152,7 @@ def begun(monkeypatch, verb: str, **values: Any) -> dict[str, Any]:
     if verb == "diagnose":
         monkeypatch.setattr(fit_set, "fit_model", fitted)
         monkeypatch.setattr(diagnose_set, "suspects", lambda *_: [])
+        monkeypatch.setattr(diagnose_set, "uneven_stamps", lambda *_: None)
         whole = diagnose_set.diagnose_set
 
         def noted(*arguments, law):
