@@ -93,11 +93,7 @@ def diagnose_set(
     diagnosis = timing_within_tolerance_after_all(diagnosis, loaded)
     if stamps is not None:
         diagnosis = with_fault_beside(diagnosis, stamps[0], (given[0], given[2].fit))
-    if diagnosis.fit is diagnosis.base.fit and not diagnosis.stopped:  # effects were fitted to their end
-        fit = with_own_slopes(diagnosis.fit, diagnosis.target, Simulators(diagnosis.fit.problem), progress)
-        diagnosis = dataclasses.replace(diagnosis, fit=fit, base=dataclasses.replace(diagnosis.base, fit=fit))
-    by_givens = tuple(errors_by_givens(diagnosis.fit, diagnosis.target, loaded.measured))
-    diagnosis = dataclasses.replace(diagnosis, by_givens=by_givens)
+    diagnosis = _with_intervals(diagnosis, loaded, progress)
     sought, found = law and not diagnosis.stopped, None
     if sought:
         try:
@@ -274,6 +270,19 @@ def _put_right_or_as_said(ways: _Ways, loaded: Loaded[MeasurementSet], said: Fit
     if further is None and (further := ways.put_right_besides(found, loaded)) is None:
         return within_tolerance_after_all(found, loaded), said[1]
     return further
+
+
+def _with_intervals(found: Diagnosis, loaded: Loaded[MeasurementSet], progress: Progress) -> Diagnosis:
+    """The diagnosis with what its intervals need; as it is if that is cut short, for the search is over."""
+    try:
+        if found.fit is found.base.fit and not found.stopped:  # effects were fitted to their end
+            fit = with_own_slopes(found.fit, found.target, Simulators(found.fit.problem), progress)
+            found = dataclasses.replace(found, fit=fit, base=dataclasses.replace(found.base, fit=fit))
+        by_givens = tuple(errors_by_givens(found.fit, found.target, loaded.measured))
+        return dataclasses.replace(found, by_givens=by_givens)
+    except REASONS as reason:
+        cut_short(reason, progress)
+        return found
 
 
 def chosen_effects(gripper: Gripper, names: Sequence[str]) -> list[type[Effect]]:

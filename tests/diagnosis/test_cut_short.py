@@ -23,6 +23,7 @@ from forcegrasp.reports.diagnosis_box import answer_box
 from forcegrasp.reports.next_step import after_diagnosis
 from tests.diagnosis.test_exchange import rubbing as rubbing  # a fixture
 from tests.diagnosis.test_families import silent
+from tests.light_set import light_set
 
 REASONS = [(KeyboardInterrupt(), INTERRUPTED), (OutOfTimeError(3), "its 3 min were over")]
 SEARCH = importlib.import_module("forcegrasp.diagnosis.search.search")
@@ -91,6 +92,16 @@ def test_it_may_be_cut_short_anywhere_once_the_base_model_is_fitted(rubbing, mon
     assert found.stopped
     assert found.effects == (() if where == "suspects" else ("coulomb_friction",))
     assert not found.law_sought
+
+
+@pytest.mark.parametrize(("reason", "words"), REASONS)
+@pytest.mark.parametrize("where", ["with_own_slopes", "errors_by_givens"])
+def test_what_a_search_found_at_its_end_stands_when_its_intervals_are_cut_short(where, reason, words, monkeypatch):
+    told, loaded = [], light_set(grasps=6)
+    monkeypatch.setattr(OF_SET, where, raising(reason))
+    found, _ = diagnose_set(loaded, None, ["force_bias"], 0, told.append)
+    assert (found.verdict, found.stopped, found.by_givens) == (Verdict.EXPLAINED, "", ())
+    assert words in told[-1]
 
 
 def test_nothing_is_told_before_the_base_model_is_fitted(rubbing, monkeypatch):

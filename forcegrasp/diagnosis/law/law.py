@@ -65,9 +65,8 @@ def find_law(
     if not explains_enough(share, error, diagnosis.floor, whole_recordings=len(target.recordings) > 1):
         return None
     law, merged = _as_one(fit, after, target)
-    sizes = effects_of_fit(merged, target, standard_errors(merged, target, [*numerical, *diagnosis.by_givens]))[
-        len(fit.problem.effects)
-    ]
+    errors = standard_errors(merged, target, [*numerical, *diagnosis.by_givens])
+    sizes = effects_of_fit(merged, target, errors)[len(fit.problem.effects)]
     return FoundLaw(law, sizes.parameters, rivals, before, error, share, fit, merged)
 
 
