@@ -110,7 +110,7 @@ def besides(fault: Fault, moved: Fault | None) -> Fault:
     return dataclasses.replace(fault, words=words, put_right=moved.put_right)
 
 
-def beside(first: Fault, fault: Fault) -> Fault:
+def told_with(fault: Fault, first: Fault) -> Fault:
     """A fault that was found once another one was put right, with words of both."""
     words, check = (f"{getattr(fault, of)}; besides, {getattr(first, of)}" for of in ("words", "check"))
     return dataclasses.replace(fault, words=words, check=check)

@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 
 from forcegrasp.diagnosis.evidence import LEAST_LEAD, is_beyond_chance
-from forcegrasp.diagnosis.faults.suspects import Fault, beside, besides
+from forcegrasp.diagnosis.faults.suspects import Fault, besides, told_with
 from forcegrasp.diagnosis.result import Diagnosis, kept_steps
 from forcegrasp.diagnosis.verdict import EXPLAINED_FAR, explained_share
 from forcegrasp.identify.cross_validation import (
@@ -46,12 +46,10 @@ def with_fault(found: Diagnosis, fault: Fault, said: _Fitted) -> Diagnosis:
 def with_fault_beside(found: Diagnosis, first: Fault, said: _Fitted) -> Diagnosis:
     """The diagnosis of a set that had a fault put right before anything else, told with what was found since."""
     fault = found.fault
-    if fault is None or fault.moved is None:
-        told = with_fault(found, first, said)
-        if fault is None:
-            return told
-        return dataclasses.replace(told, verdict=found.verdict, effects=found.effects, fault=beside(first, fault))
-    return with_fault(found, besides(first, fault), said)
+    if fault is None or fault.moved is not None:
+        return with_fault(found, besides(first, fault), said)
+    told = with_fault(found, first, said)
+    return dataclasses.replace(told, verdict=found.verdict, effects=found.effects, fault=told_with(fault, first))
 
 
 def more_likely(right: Diagnosis, said: Diagnosis) -> Diagnosis:
