@@ -10,6 +10,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from forcegrasp.physics.places import places
 from forcegrasp.physics.plant import Plant
 from forcegrasp.physics.protocols import Contribution, State
 
@@ -150,12 +151,13 @@ class Effect:
     def attach(self, plant: Plant, rows: np.ndarray) -> Effect:
         """Puts the effect into a plant, on these rows of it."""
         self.plant, self.rows = plant, np.asarray(rows)
+        self._at = places(self.rows)
         return self
 
     @property
     def position(self) -> np.ndarray:
         """True positions of the motors, m or rad, ``(rows, motors)``."""
-        return self.plant.position[self.rows]
+        return self.plant.position[self._at].copy()
 
     @property
     def resting_command(self) -> np.ndarray:
@@ -171,12 +173,12 @@ class Effect:
     @property
     def velocity(self) -> np.ndarray:
         """True velocities of the motors, m/s or rad/s, ``(rows, motors)``; positive opens."""
-        return self.plant.velocity[self.rows]
+        return self.plant.velocity[self._at]
 
     @property
     def pad_force(self) -> np.ndarray:
         """Contact forces of the last physics step before any scale, newtons, ``(rows, 2)``."""
-        return self.plant.pad_force[self.rows]
+        return self.plant.pad_force[self._at].copy()
 
     def reset(self, which: np.ndarray) -> None:
         """Gives these of its rows (indices into the effect's own rows) the memory of a new grasp."""

@@ -32,6 +32,8 @@ class AttachedEffects:
         #: Names of what :meth:`contribute` may have set to something else than 0 in its last call.
         self.given = set(Contribution._fields)
         self.readings = ReadingEffects(effects)
+        #: Whether any changes what is read.
+        self.change_readings = self.readings.change_position or self.readings.change_force
         #: Whether any acts by what happens in a step, and not only by the model, by commands, or alike in every step.
         self.act_in_steps = any(
             effect.hooks() - ({"change_model", "act"} if effect.acts_alike else {"change_model"})
@@ -126,7 +128,7 @@ class AttachedEffects:
         if not self._act:
             return False
         for name in self.given:
-            totals[name][:] = 0
+            totals[name].fill(0)
         self.given.clear()
         for effect, rows in self._acting_at:
             for (name, total), added in zip(totals.items(), effect.act(), strict=True):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 
 from forcegrasp.physics.attached_effects import AttachedEffects
@@ -55,13 +57,13 @@ class ContributedFields(ModelFields):
     def _write_friction(self) -> None:
         if "dof_frictionloss" not in self._fields and not self._is_given("friction"):
             return
-        if self._friction_written is not None and np.array_equal(self.friction, self._friction_written):
+        if self._friction_written is not None and (self.friction == self._friction_written).all():
             return
         self._friction_written = self.friction.copy()
         base = self.base("dof_frictionloss")[:, self._motor_v]
         loss = self.field("dof_frictionloss")[:, self._motor_v] = base + self.friction
         active = loss > base
-        if self._friction_active is None or not np.array_equal(active, self._friction_active):
+        if self._friction_active is None or (active != self._friction_active).any():
             self._friction_active = active
             for dof in self.motor_dofs:
                 self.stiffen_friction(dof)
@@ -87,8 +89,12 @@ class ContributedFields(ModelFields):
 
     def _outward(self, side: int) -> np.ndarray:
         """Direction in which a side's pads open, in the frame of their body, ``(3,)`` or ``(n, 3)``."""
-        finger = self.gripper.fingers[side]
         if self.gripper.is_direct:
-            return self._signs[finger.motor] * self.model.joint(finger.joint).axis
+            return self._axes[side]
         turned = self.batch.bind("xmat")[:, self._pads[side].body].reshape(-1, 3, 3)
         return turned[:, self.gripper.axis] * (-1.0, 1.0)[side]  # the world's axis, seen from the body
+
+    @functools.cached_property
+    def _axes(self) -> list[np.ndarray]:
+        """The same of pads that never turn, ``(3,)`` each."""
+        return [self._signs[f.motor] * self.model.joint(f.joint).axis for f in self.gripper.fingers]

@@ -15,6 +15,8 @@ from forcegrasp.physics.protocols import PlantEffect
 
 # What motor_force and outside_force are made of.
 _FORCES = ("qfrc_actuator", "qfrc_spring", "qfrc_bias")
+# What effects contribute that is pushed with besides what the engine knows of.
+_PUSHES = ("finger_push_n", "object_push_n", "motor_push")
 
 
 class Plant(ContributedFields):
@@ -39,6 +41,7 @@ class Plant(ContributedFields):
         self._qpos, self._ctrl, self._sensors = (self.batch.bind(name) for name in ("qpos", "ctrl", "sensordata"))
         self._qvel, self._applied = self.batch.bind("qvel"), self.batch.bind("qfrc_applied")
         self._load, self._enabled = np.zeros(n), np.ones(n, bool)
+        self._pushed = False  # whether effects pushed in the last step
         self._at_start = np.ones(n, bool)  # which rows made no step since they were reset
         self._force_range: np.ndarray | None = None  # of the motors, before it was changed while they move
         self.force_scale = np.ones(n)  #: f_α, factor from the force sensors to the reading, ``(n,)``
@@ -353,6 +356,9 @@ class Plant(ContributedFields):
             return
         if self._is_given("velocity_change"):
             self._qvel[:, self._motor_v] += self._velocity_change * self._signs
+        pushed, self._pushed = self._pushed, not self.effects.given.isdisjoint(_PUSHES)
+        if not (self._pushed or pushed):
+            return
         on_motors = self._to_motors(self.finger_push_n) + self.motor_push + self._load[:, None]
         self._applied[:, self._motor_v] = on_motors * self._signs
         if not self.gripper.is_servo:
@@ -364,6 +370,7 @@ class Plant(ContributedFields):
         readings = self.measured_position[others], self.measured_force[others]
         with self.effects.kept(others):
             self._read()
+        self.measured_position, self.measured_force = self.measured_position.copy(), self.measured_force.copy()
         self.measured_position[others], self.measured_force[others] = readings
 
     def _read(self) -> None:
@@ -373,9 +380,10 @@ class Plant(ContributedFields):
         self.press_n = self.effects.interaction(self.pad_force)
         self.force = self.press_n * scale
         self.transduced_force = self._channels_of(self._sensors, self.force, scale)
-        self.measured_force = self.transduced_force.copy()
-        self.measured_position = self.position.copy()
-        self.effects.readings.apply(self.measured_position, self.measured_force)
+        self.measured_position, self.measured_force = self.position, self.transduced_force
+        if self.effects.change_readings:
+            self.measured_position, self.measured_force = self.position.copy(), self.transduced_force.copy()
+            self.effects.readings.apply(self.measured_position, self.measured_force)
 
 
 def write_base(plant: Plant, ids: np.ndarray, values: Mapping[str, np.ndarray]) -> np.ndarray:

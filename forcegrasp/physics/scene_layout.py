@@ -179,7 +179,13 @@ class SceneLayout:
         return found
 
     def _motors_of(self, qpos: np.ndarray) -> np.ndarray:
-        return (qpos[..., self._motor_q] - self._origins) * self._signs
+        angles = qpos[..., self._motor_q]
+        return angles.copy() if self._are_positions else (angles - self._origins) * self._signs
+
+    @functools.cached_property
+    def _are_positions(self) -> bool:
+        """Whether the engine's numbers for the motors' joints are the motors' positions."""
+        return bool((self._origins == 0).all() and (self._signs == 1).all())
 
     def _channels_of(self, sensors: np.ndarray, force: np.ndarray, scale: np.ndarray) -> np.ndarray:
         """What the force channels transduce, newtons, ``(..., channels)``: forces of fingers, or efforts of motors."""
@@ -192,10 +198,19 @@ class SceneLayout:
         # contiguous, lest the order of the sum depend on n
         if not self._readings:
             return np.zeros((*sensors.shape[:-1], 2))
+        if self._readings_alike is not None:
+            felt = sensors.take(self._readings_alike, axis=-1)
+            return felt.reshape(*sensors.shape[:-1], len(self._readings), -1).sum(axis=-1)
         sums = np.empty((*sensors.shape[:-1], len(self._readings)))
         for side, part in enumerate(self._readings):
             np.ascontiguousarray(sensors[..., part]).sum(axis=-1, out=sums[..., side])
         return sums
+
+    @functools.cached_property
+    def _readings_alike(self) -> np.ndarray | None:
+        """Where the numbers of all sides stand, one side after the other; None if some have more of them."""
+        each = [range(part.stop)[part] for part in self._readings]
+        return np.concatenate(each) if len({len(one) for one in each}) == 1 else None
 
 
 @dataclass(frozen=True)
@@ -203,14 +218,18 @@ class _Pads:
     """What moves with a side's pads, in the frame of their body."""
 
     body: int
-    moved: dict[str, tuple[np.ndarray, np.ndarray]]  #: field of positions → indices, and where the scene puts them
+    moved: dict[
+        str, tuple[slice | np.ndarray, np.ndarray]
+    ]  #: field of positions → indices, and where the scene puts them
 
     @classmethod
     def find(cls, model: mujoco.MjModel, name: str) -> _Pads:
         body = int(model.body(name).id)
         owners = {"geom_pos": model.geom_bodyid, "site_pos": model.site_bodyid, "body_pos": model.body_parentid}
         inside = {field: np.flatnonzero(of == body) for field, of in owners.items()}
-        return cls(body, {field: (own, getattr(model, field)[own]) for field, own in inside.items() if len(own)})
+        return cls(
+            body, {field: (places(own), getattr(model, field)[own]) for field, own in inside.items() if len(own)}
+        )
 
 
 def _reading(model: mujoco.MjModel, side: str, finger: Finger) -> slice:

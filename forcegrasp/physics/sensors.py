@@ -45,6 +45,11 @@ class ReadingEffects:
         """Whether positions are changed at all."""
         return bool(self._position)
 
+    @property
+    def change_force(self) -> bool:
+        """Whether forces are changed at all."""
+        return bool(self._force)
+
     def apply(self, position: np.ndarray, force: np.ndarray) -> None:
         """Changes what was transduced at one instant, in place: ``(n, motors)`` and ``(n, channels)``."""
         for effect in self._position:

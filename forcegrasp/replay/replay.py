@@ -217,9 +217,9 @@ class Replay:
         else:
             for step in range(self._steps - 1):
                 check_time()
-                new = self._fresh[step, grasp]
+                new = self._fresh[step].take(grasp)
                 if self._encoders_known:
-                    plant.recorded_position = self._encoder[step, grasp]
+                    plant.recorded_position = self._encoder[step].take(grasp, axis=0)
                 elif driver_reads is not None and new.any():
                     sample = self._fresh[: step + 1, grasp].sum(axis=0) - 1
                     reads = driver_reads(plant.measured_position, grasp, sample)
@@ -229,7 +229,7 @@ class Replay:
                     plant.disturb(self._load[step, grasp], self._enabled[step, grasp] > 0)
                 if self._stretch is not None and step % self._steps_at_once == 0:
                     plant.stretch_steps(self._stretch[step // self._steps_at_once, grasp])
-                plant.advance(self._command[step, grasp], 1, new)
+                plant.advance(self._command[step].take(grasp, axis=0), 1, new)
                 position[:, step + 1], force[:, step + 1] = plant.position, plant.transduced_force
                 objects[:, step + 1] = plant.object_position
         bad = plant.warnings().any(axis=1)
