@@ -55,6 +55,7 @@ def final(run: RunDir) -> bytes:
     return max(run.checkpoints.iterdir()).read_bytes()
 
 
+@pytest.mark.long
 def test_two_experiments_and_two_seeds_side_by_side(tiny, tmp_path, capfd):
     """In two processes of joblib's, which know from here what names a run: experiment, model and seed."""
     Path("far").mkdir()
@@ -169,6 +170,7 @@ def test_a_run_that_another_sweep_trains_is_named_and_the_others_are_trained(tin
     assert not list(Path("sweep").rglob("failed.txt"))
 
 
+@pytest.mark.long
 def test_a_sweep_that_is_stopped_side_by_side_saves_its_runs(tiny, capfd):
     """The signal goes to the sweep alone, as a scheduler's may; the third run does not begin."""
     options = [*tiny["train"], "ppo.total_frames=800000", "log.checkpoint_every=100000"]

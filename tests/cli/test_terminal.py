@@ -37,6 +37,7 @@ def test_everything_is_printed(name, tmp_path):
     assert "tau" in told
 
 
+@pytest.mark.long
 def test_files_are_written_whatever_the_locale_and_the_setting_of_mujocos_renderer(tiny, tmp_path):
     """Training renders in a process of its own, if at all."""
     lines = [

@@ -71,6 +71,7 @@ def test_a_rival_that_does_better_takes_the_place(found):
     assert left[1].error_after == pytest.approx(study.error(study.heldout(better)))
 
 
+@pytest.mark.long
 def test_what_the_whole_model_can_not_tell_apart_stays_tied(found):
     study, steps, fit = tied(found, FRICTION, "presliding")
     left, same = ask_again(study, steps, fit)
@@ -78,6 +79,7 @@ def test_what_the_whole_model_can_not_tell_apart_stays_tied(found):
     assert same is fit
 
 
+@pytest.mark.long
 def test_one_of_its_family_that_does_better_takes_the_place(found):
     study, (step, last), fit = tied(found, "load_friction")
     one = dataclasses.replace(step.candidates[0], signature=np.eye(1, fit.residual.size)[0])

@@ -55,6 +55,7 @@ def recorded(gripper: Gripper, hidden: list[str], grasps: int, monkeypatch, obje
     return Loaded(made.measured, gripper, [])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["franka_hand", "so101_gripper"])
 def test_finds_what_was_hidden(name, monkeypatch, tmp_path):
     """A coupled hand with two force sensors; one jaw whose motor's effort is read. And all that is told of it."""

@@ -59,6 +59,7 @@ def test_only_a_log_that_scatters_by_itself_is_doubted(of_log, hidden, error):
     assert are_even_in_truth(target, base.fit) is of_log
 
 
+@pytest.mark.long
 def test_it_is_told_beside_an_effect():
     loaded = light_set("coulomb_friction")
     grasps = [uneven(g, i) for i, g in enumerate(loaded.measured.grasps)]

@@ -129,11 +129,13 @@ def fitted(sticking) -> tuple[Target, Simulators, BaseFit]:
     return fit_model(sticking, 0, silent)
 
 
+@pytest.mark.long
 def test_dry_friction_is_not_called_stiction():
     diagnosis, _ = diagnose_set(jaw_with("coulomb_friction", force_n=0.08), None, FRICTION, 0, silent)
     assert (diagnosis.verdict, diagnosis.effects) == ("effect", ("coulomb_friction",))
 
 
+@pytest.mark.long
 def test_friction_in_the_model_gives_way_to_stiction(sticking, fitted):
     """The step that found the simple one stays in the record; the answer has the richer one alone."""
     target, _, base = fitted

@@ -454,6 +454,7 @@ def test_a_search_goes_on_with_what_is_given_moved(sound, radius_std_m, moves):
         assert f"radius of {name} by -0." in answer(diagnosis)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("names", [[], ["force_crosstalk"]])
 def test_an_effect_gets_no_credit_for_what_was_moved_and_none_need_be_found(names):
     loaded, model = with_model(light_set("force_crosstalk share=0.07 difference=0"))

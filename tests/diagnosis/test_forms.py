@@ -117,6 +117,7 @@ def small():
     return study_of(*SMALL)
 
 
+@pytest.mark.long
 def test_another_effect_that_explains_all_of_it_is_found(small):
     study, base, fit = small
     assert may_be_forms(study, fit)

@@ -51,6 +51,7 @@ def search_on(loaded):
     return _Ways(None, [lag], 0, silent)._search_on
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("truly_off", [False, True])
 def test_a_move_is_taken_back_unless_grasps_ask_for_it(as_truly, truly_off):
     """Of a set whose radii are as said, or off by what they are moved."""

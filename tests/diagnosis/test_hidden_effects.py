@@ -53,10 +53,12 @@ def test_finds_what_was_hidden_in_the_whole_catalogue(tmp_path):
     check_found(diagnosed(recorded(tmp_path, {"force_lag": "medium"})), "force_lag")
 
 
+@pytest.mark.long
 def test_finds_what_was_hidden_among_its_look_alikes(tmp_path):
     check_found(diagnosed(recorded(tmp_path, {"object_friction": "medium"}), LIKE_FRICTION), "object_friction")
 
 
+@pytest.mark.long
 def test_finds_nothing_where_nothing_is_hidden(tmp_path):
     diagnosis, _ = diagnose_set(recorded(tmp_path, {}), None, [], 0, silent, law=True)
     assert (diagnosis.verdict, diagnosis.effects, diagnosis.law) == ("explained", (), None)
@@ -71,6 +73,7 @@ def test_finds_no_law_where_nothing_is_hidden_though_one_is_looked_for():
     assert find_law(doubted, simulators, np.random.default_rng(1), silent) is None
 
 
+@pytest.mark.long
 def test_does_not_name_an_effect_for_one_that_it_does_not_know(tmp_path):
     diagnosis = diagnosed(recorded(tmp_path, {"motor_cogging": "medium"}), LIKE_COGGING)
     assert (diagnosis.verdict, diagnosis.effects) == ("unknown", ())
@@ -99,6 +102,7 @@ def negate_forces(grasps):
     return [dataclasses.replace(g, force_n=-g.force_n) for g in grasps]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("spoil", [shuffle, swap_fingers, negate_forces])
 def test_spoilt_sets_do_not_pass(spoil):
     loaded = respoil(light_set("force_lag time_constant_s=0.03", grasps=GRASPS, samples=54), spoil)

@@ -78,6 +78,7 @@ def shaken():
     return dataclasses.replace(loaded, measured=dataclasses.replace(loaded.measured, grasps=grasps)), model
 
 
+@pytest.mark.long
 def test_a_grasp_that_shook_is_left_out_and_told(shaken):
     loaded, model = shaken
     diagnosis, _ = diagnose_set(loaded, model, ["force_deadzone", "command_delay"], 0, silent)

@@ -59,6 +59,7 @@ def with_grasps(loaded, change):
     return dataclasses.replace(loaded, measured=dataclasses.replace(loaded.measured, grasps=grasps))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("up_m", "names"), [(0.0, ["backlash"]), (2e-3, [])])
 def test_it_is_tried_where_radii_were_moved_down(loose, up_m, names):
     loaded, moved, down = loose
@@ -70,6 +71,7 @@ def test_it_is_tried_where_radii_were_moved_down(loose, up_m, names):
         assert np.mean(list(raised.moves.values())) == pytest.approx(0.0, abs=1e-9)
 
 
+@pytest.mark.long
 def test_what_moved_radii_had_taken_is_given_back(loose):
     """The radii, moved down, stand for backlash; with that in the model they are moved to where they are."""
     loaded, moved, _ = loose

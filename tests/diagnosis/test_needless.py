@@ -65,6 +65,7 @@ def test_a_look_alike_goes_once_what_was_hidden_is_there(found):
     assert kept_steps([first, left]) == [left]
 
 
+@pytest.mark.long
 def test_what_has_become_a_simpler_effect_is_named_so(found):
     study, step, fit = found("motor_offset", "presliding")
     left, less = drop_needless(study, dataclasses.replace(step, effects=("presliding", "coulomb_friction")), fit, 0)
@@ -109,6 +110,7 @@ def test_a_step_takes_the_place_of_one_effect_at_most(found):
     assert drop_needless(study, step, fit, 0) == (step, fit)
 
 
+@pytest.mark.long
 def test_what_only_a_richer_effect_has_goes_where_another_found_later_makes_up_for_it(found):
     study, step, fit = found("stiction", "motor_offset")
     first = dataclasses.replace(found("stiction")[1], error_before=9.0)

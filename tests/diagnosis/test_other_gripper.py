@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from forcegrasp.diagnosis.diagnose_set import diagnose_set
 from forcegrasp.identify.fitted_model import model_of
@@ -18,6 +19,7 @@ from tests.made_up import shortened
 SECOND = Path(__file__).parent.parent / "grippers" / "second.yaml"
 
 
+@pytest.mark.long
 def test_finds_what_was_hidden_in_another_gripper(tmp_path):
     recorded = record(
         load_gripper(str(SECOND)),

@@ -152,6 +152,7 @@ def test_a_setting_is_fitted_and_told_in_the_answer(recorded):
     assert found.fault.check == "what payload_kg was in release, and recordings.csv"
 
 
+@pytest.mark.long
 def test_it_is_told_beside_an_effect_that_had_hidden_it(tmp_path, monkeypatch):
     """As if the base model had given no reason to look for it."""
     monkeypatch.setattr(import_module("forcegrasp.diagnosis.diagnose_set"), "suspects", lambda *_: [])

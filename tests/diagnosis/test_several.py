@@ -122,6 +122,7 @@ def test_each_is_shown_beside_all_others(mixed, found):
     assert found_steps(SimpleNamespace(base=base, steps=single))[0][1] is base.fit
 
 
+@pytest.mark.long
 def test_what_was_found_before_stays_if_it_is_needed_and_goes_if_others_make_it_needless(mixed):
     study, base = mixed
     known = [EffectSetting.typical(one) for one in (CATALOGUE[0], ACTUATOR_LAG)]

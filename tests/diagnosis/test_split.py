@@ -41,6 +41,7 @@ def split_delay(*hidden: str):
     return split(study, step.candidates[0].fit, screen, others, [step], rng), step, study
 
 
+@pytest.mark.long
 def test_positions_and_forces_late_in_their_own_ways_are_no_late_command():
     found, old, study = split_delay("readout_skew delay_s=0.03", "force_lag time_constant_s=0.03")
     assert found is not None
@@ -62,5 +63,6 @@ def test_positions_and_forces_late_in_their_own_ways_are_no_late_command():
     assert first.error_after == pytest.approx(study.error(study.heldout(alone)), rel=0.1)
 
 
+@pytest.mark.long
 def test_a_late_command_stays():
     assert split_delay("command_delay delay_s=0.03")[0] is None

@@ -73,6 +73,7 @@ def shorten(folder: Path) -> None:
         csv.writer(file).writerows([head, *(row for row in rows if float(row[head.index("t_s")]) < SECONDS)])
 
 
+@pytest.mark.long
 def test_the_loop_runs_as_written(text, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     # reports are drawn in tests/cli/test_measuring_verbs.py, evaluations in tests/evaluate

@@ -20,6 +20,7 @@ def tool(root) -> dict:
     return runpy.run_path(str(root / "tools" / "tutorial_notebook.py"))
 
 
+@pytest.mark.long
 def test_page_runs_and_says_what_it_shows(tool, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     outputs = tool["execute"](PAGE)

@@ -306,6 +306,7 @@ def test_recommended_is_gentle_and_ib_is_not(tmp_path, undrawn):
     assert reward["force_pi"] + 5 < reward["recommended"]
 
 
+@pytest.mark.long
 def test_many_policies_and_one_softness(tmp_path):
     config = evaluate_config(policies=["force_pi", "informed", "close", "nothing"], kappas=1, trials=2)
     report = evaluate(config, tmp_path / "out", Console(file=io.StringIO()))

@@ -222,6 +222,7 @@ def test_four_rows_are_fitted_and_prove_nothing():
 # --- error rates -----------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("std", "tables"), [(None, 200), (0.03, 100)])
 def test_false_alarms_are_rare(std, tables):
     curves = {"sponge": 283 * DELTA_M, "wood": 339 * DELTA_M}
@@ -321,6 +322,7 @@ def simulated_onsets(again_and_again: bool, names: Iterable[str] = catalogue()) 
     return moved
 
 
+@pytest.mark.long
 def test_causes_of_a_dead_zone_are_those_that_simulation_shows():
     again, once = simulated_onsets(True), simulated_onsets(False, ["adhesion", "backlash"])
     late = {name for name, moved in again.items() if moved > 5e-5}

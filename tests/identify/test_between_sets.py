@@ -130,6 +130,7 @@ def test_what_one_set_alone_has_is_not_compared(parts):
     }  # fmt: skip
 
 
+@pytest.mark.long
 def test_an_effect_of_the_model_is_compared_as_well(parts):
     play = FoundEffect(get_effect("backlash"), "play", {"gap_m": Fitted(5e-4, 4e-4, 6e-4, "m")})
     pair = [measured("e", 5, play_m=4e-4), measured("f", 6, play_m=8e-4)]

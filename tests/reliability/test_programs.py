@@ -21,6 +21,7 @@ def tool(root, monkeypatch):
     return __main__
 
 
+@pytest.mark.long
 def test_a_few_trials_of_everything(root, tool):
     """In a process of its own, as the programs fork and other tests have started threads."""
     command = [sys.executable, "-m", "tools.reliability", "--few"]

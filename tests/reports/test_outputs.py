@@ -357,6 +357,7 @@ def all_reports(made_up):
         yield diagnosis_report.sections(made_up.diagnosis(verdict), made_up.advice, made_up.tried)
 
 
+@pytest.mark.long
 def test_reports_are_harmless_and_load_nothing(made_up, tmp_path, capsys):
     name = made_up.loaded.measured.name
     for number, sections in enumerate(all_reports(made_up)):

@@ -44,6 +44,7 @@ def test_what_was_stopped_goes_on_and_what_is_done_stays(tmp_path, monkeypatch):
     assert ran[1] == ["train", "-m", f"resume={tmp_path / 'sac'}"]
 
 
+@pytest.mark.long
 def test_the_table_has_all_seeds_of_what_is_done(tmp_path, monkeypatch):
     monkeypatch.setitem(COMPARISONS, "two", TWO)
     runs, out = tmp_path / "quick", tmp_path / "evaluations" / "quick"

@@ -349,6 +349,7 @@ def test_resuming_a_finished_run_leaves_it_alone(whole, capsys):
     assert (final(whole), whole.metrics_path.read_bytes()) == before
 
 
+@pytest.mark.long
 def test_command_line_after_ctrl_c(tmp_path, metrics):
     """The whole way: a process is interrupted, says so, and another one goes on."""
     options = ["ppo.total_frames=800", "ppo.grasps=2", "grasp.steps=10", "physics.threads=1", "ppo.hidden=[8]"]
@@ -379,6 +380,7 @@ def test_command_line_after_ctrl_c(tmp_path, metrics):
     assert metrics(run) == metrics(uninterrupted)
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("hang_ups_arrive")
 def test_command_line_after_a_lost_terminal(tmp_path, metrics):
     """As when an ssh connection breaks: the terminal is gone, what is printed has no reader, and the run is saved."""
