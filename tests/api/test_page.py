@@ -10,6 +10,7 @@ from forcegrasp.physics.scene_renderer import NoRendererError
 from tests.docs.doc_pages import blocks
 
 
+@pytest.mark.long
 def test_page_runs(work, capsys):
     names: dict = {"__name__": "__main__"}
     functions, environment, gymnasium = blocks("docs/python.md", "python")

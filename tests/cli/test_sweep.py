@@ -113,6 +113,7 @@ def test_ctrl_c_ends_the_sweep_and_not_just_one_run(tiny, monkeypatch, capsys):
     assert started == [0]
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("hang_ups_arrive", "undrawn")
 def test_the_same_sweep_again_goes_on(tiny, monkeypatch, capsys):
     """As after a job that a scheduler ended and started anew: finished runs stay, the others end bit for bit alike."""

@@ -46,6 +46,7 @@ def names_in(fit) -> set[str]:
     return {one.effect.name for one in fit.problem.effects}
 
 
+@pytest.mark.long
 def test_a_rival_that_the_whole_model_rejects_goes(found):
     study, steps, fit = tied(found, FRICTION, DEADBAND)
     left, same = ask_again(study, steps, fit)
@@ -54,6 +55,7 @@ def test_a_rival_that_the_whole_model_rejects_goes(found):
     assert left[1].error_after == pytest.approx(study.error(study.heldout(fit)))
 
 
+@pytest.mark.long
 def test_a_rival_stays_where_more_is_left_than_tells_it_apart(found, monkeypatch):
     study, steps, fit = tied(found, FRICTION, DEADBAND)
     monkeypatch.setattr(Target, "beyond_noise", lambda target, residual: 1e9)
@@ -61,6 +63,7 @@ def test_a_rival_stays_where_more_is_left_than_tells_it_apart(found, monkeypatch
     assert [step.effects for step in left] == [(FRICTION, DEADBAND), (LAG,)]
 
 
+@pytest.mark.long
 def test_a_rival_that_does_better_takes_the_place(found):
     study, steps, fit = tied(found, DEADBAND, FRICTION)
     left, better = ask_again(study, steps, fit)
@@ -100,6 +103,7 @@ def test_of_the_last_step_all_was_in_the_model(found, monkeypatch):
     assert ask_again(study, alone, fit) == (alone, fit)
 
 
+@pytest.mark.long
 def test_what_was_found_at_once_is_asked_among_look_alikes_of_any_family(found, monkeypatch):
     study, steps, fit = tied(found, FRICTION)
     asked = []

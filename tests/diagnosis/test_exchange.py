@@ -48,6 +48,7 @@ def exchanged(found, *names: str, only_last: bool = False):
     return exchange(study, fit, screen, others, steps, np.random.default_rng(0)), steps
 
 
+@pytest.mark.long
 def test_what_was_hidden_takes_the_place_of_its_look_alike(found):
     taken, steps = exchanged(found, "actuator_lag", "position_deadband")
     assert taken is not None
@@ -88,6 +89,7 @@ def test_look_alikes_are_tried_and_mistakes_of_the_set(found, monkeypatch, other
     assert (one in asked) == tried
 
 
+@pytest.mark.long
 def test_what_would_leave_far_more_is_not_fitted_to_the_end(found):
     study, _, fit = found("actuator_lag", "position_deadband")
     friction = get_effect("coulomb_friction")
@@ -111,6 +113,7 @@ def test_alike_are_look_alikes_either_way_and_effects_of_one_kind():
         assert all(are_alike(one, get_effect(name)) for name in one.look_alikes)
 
 
+@pytest.mark.long
 def test_a_search_that_ends_with_more_than_noise_looks_for_exchanges_and_goes_on(rubbing, found, monkeypatch):
     _, target, simulators, base = rubbing
     names = ("actuator_lag", "position_deadband")

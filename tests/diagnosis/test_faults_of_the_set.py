@@ -103,6 +103,7 @@ def test_an_error_of_all_radii_within_their_tolerance_is_no_fault(sound, refitte
         assert within_tolerance_after_all(larger_or_not_enough, loaded) is larger_or_not_enough
 
 
+@pytest.mark.long
 def test_one_wrong_radius_is_told_and_fitted(sound, refitted):
     loaded, _ = sound
     wrong = changed(loaded, lambda g: dataclasses.replace(g, radius_m=g.radius_m + 0.002 * (g.object == "thing_1")))
@@ -146,6 +147,7 @@ def test_in_place_of_a_fault_that_leaves_next_to_nothing_an_effect_must_do_as_we
     assert (stop_when.most < np.inf) == limited
 
 
+@pytest.mark.long
 def test_the_first_effect_must_come_down_to_what_is_asked_for(sound):
     loaded, model = sound
     late = changed(loaded, lambda g: dataclasses.replace(g, command_m=np.roll(g.command_m, -1, axis=0)))
@@ -158,6 +160,7 @@ def test_the_first_effect_must_come_down_to_what_is_asked_for(sound):
     assert [one.effects for one in found] == [("command_delay",), ()]
 
 
+@pytest.mark.long
 def test_radii_that_a_ruler_gave_are_doubted_where_no_effect_would_do(sound):
     loaded, model = sound
     off = {"thing_0": 12e-4, "thing_1": -9e-4, "thing_2": 0.0}
@@ -383,6 +386,7 @@ def test_a_small_lag_is_taken_by_the_tolerance_and_told(sound):
     assert "time of reading by -3." in str(answer_box(diagnosis, None, []))
 
 
+@pytest.mark.long
 def test_a_delay_beyond_the_tolerance_is_an_effect(sound):
     diagnosis, _ = diagnose_set(late(0.02), sound[1], ["command_delay", "actuator_lag"], 0, silent)
     assert suspects(late(0.02), diagnosis.target, diagnosis.base.fit) == []

@@ -65,6 +65,7 @@ def test_finds_nothing_where_nothing_is_hidden(tmp_path):
     assert diagnosis.error_after < 1.1
 
 
+@pytest.mark.long
 def test_finds_no_law_where_nothing_is_hidden_though_one_is_looked_for():
     loaded = light_set(grasps=GRASPS, samples=SAMPLES)
     diagnosis, simulators = diagnose_set(loaded, None, ["force_bias"], 0, silent)

@@ -39,6 +39,7 @@ def written_late(rows: int) -> Loaded:
     return dataclasses.replace(loaded, measured=dataclasses.replace(loaded.measured, grasps=grasps))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("rows", [1, 2])
 def test_forces_that_are_written_late_are_told_beside_the_delay(model, rows):
     diagnosis, _ = diagnose_set(written_late(rows), model, ["force_delay", "force_lag"], 0, silent)
@@ -48,6 +49,7 @@ def test_forces_that_are_written_late_are_told_beside_the_delay(model, rows):
     assert row_sentence(diagnosis) == ""
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("hidden", "rival"),
     [

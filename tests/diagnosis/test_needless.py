@@ -126,6 +126,7 @@ def test_what_only_a_richer_effect_has_goes_where_another_found_later_makes_up_f
     assert simplify(study, [first], found("stiction")[2], 0)[0] == [first]  # nothing was found after it
 
 
+@pytest.mark.long
 def test_what_only_a_richer_effect_has_stays_where_most_of_the_rest_is_of_it():
     """Coulomb's friction explains 97 % of what friction does here, and leaves twice the noise."""
     loaded = jaw_with("stiction", breakaway_n=0.08, kinetic_share=0.9)

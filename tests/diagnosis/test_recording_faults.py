@@ -143,6 +143,7 @@ def test_nothing_is_told_of_noise_or_of_what_all_recordings_lack(recorded, tmp_p
     assert not suspects(limited, *fitted(limited))
 
 
+@pytest.mark.long
 def test_a_setting_is_fitted_and_told_in_the_answer(recorded):
     loaded = changed(recorded, "release", settings=lambda s: {"payload_kg": 0.45})
     found, _ = diagnose_set(loaded, None, ["coulomb_friction"], 0, silent)

@@ -148,6 +148,7 @@ def small():
     return study_of(*(f"{name} {sizes}" for name, sizes in SMALL.items()))
 
 
+@pytest.mark.long
 def test_signatures_of_several_effects_add_up(small):
     assert add_up(*at_first(*small))
     assert not add_up(*at_first(*study_of("force_lag time_constant_s=0.06")))  # one alone
@@ -156,6 +157,7 @@ def test_signatures_of_several_effects_add_up(small):
     assert not add_up(*at_first(*study_of(*large)))  # straight signatures explain too little of what bends
 
 
+@pytest.mark.long
 def test_effects_that_add_up_are_found_at_once(small, monkeypatch):
     study, base = small
 
@@ -281,6 +283,7 @@ def setting(name: str) -> EffectSetting:
     return EffectSetting(effect, "", np.array([float(values.get(p.name, 0.0)) for p in effect.parameters]))
 
 
+@pytest.mark.long
 def test_one_of_several_effects_explains_little_and_one_that_is_alone_all(small):
     study, base = small
     every = fit_with([setting(name) for name in SMALL], base.fit.vector, study, base.fit)
@@ -327,6 +330,7 @@ def test_nothing_is_found_where_nothing_is_hidden():
     assert add_several(study, base.fit, (), CATALOGUE, 0, np.random.default_rng(0), kept_by_nobody) is None
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("straight", [True, False])
 @pytest.mark.parametrize("enough", [True, False])
 def test_a_search_that_is_stopped_keeps_what_rounds_found_if_it_explains_enough(

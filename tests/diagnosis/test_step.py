@@ -194,6 +194,7 @@ def test_what_is_worth_no_fit_roughly_is_not_fitted_to_the_end_where_others_were
         assert (other.effect.name in fitted) == (gains.sum() > 1)
 
 
+@pytest.mark.long
 def test_signatures_that_promise_nothing_ask_for_no_fit_to_the_end_where_rough_fits_show_nothing(creeping, monkeypatch):
     monkeypatch.setattr(_Start, "_at_the_end", lambda _, some, __: pytest.fail("fitted to the end") if some else [])
     monkeypatch.setattr(_Start, "shows", lambda *_: False)
@@ -229,6 +230,7 @@ def test_what_promises_too_little_is_fitted_where_it_is_asked_for(creeping, fitt
     assert fitted_anyway.candidates[0].parameters()["force_n"] == pytest.approx(0.1, rel=0.1)
 
 
+@pytest.mark.long
 def test_of_rough_fits_those_that_gain_much_less_than_the_best_one_are_left_out(creeping):
     study, base = creeping
     fits = refine_anyway([SMOOTH, DELAY, OFFSET], study, base.fit)
@@ -422,6 +424,7 @@ def test_what_an_effect_contains_comes_first_where_the_set_may_be_wrong_instead(
     assert start.simpler_first(ordered)[0].effect.name == "backlash_asymmetry"
 
 
+@pytest.mark.long
 def test_a_mistake_of_the_set_is_held_against_effects_that_look_like_it(monkeypatch):
     """Whatever their signatures promise: behind a motor that touches late, objects seem smaller."""
     loaded = light_set("object_size error_m=-0.0006", grasps=9, samples=48)
@@ -435,6 +438,7 @@ def test_a_mistake_of_the_set_is_held_against_effects_that_look_like_it(monkeypa
     assert looked((study, base), effects, "object_size").effects == ("object_size",)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("much", "begun"), [(0.5, 2), (1e3, 0)])
 def test_where_much_is_left_effects_are_fitted_from_parameters_as_given_too(creeping, monkeypatch, much, begun):
     study, base = creeping

@@ -34,6 +34,7 @@ def example() -> MeasurementSet:
     return example_set()
 
 
+@pytest.mark.long
 def test_the_friction_hidden_in_the_starter_set_is_found(example, tmp_path):
     few = dataclasses.replace(example, grasps=example.grasps[1:4])
     loaded = loading.load(write_servo_set(few, tmp_path / "set"))

@@ -48,6 +48,7 @@ def runs() -> list[Recording]:
     return [recorded("slow", 1.5), recorded("fast", 3.0)]
 
 
+@pytest.mark.long
 def test_friction_hidden_in_an_arm_is_found(runs, tmp_path):
     loaded = loading.load(write_servo_set(as_set(runs, load_gripper(str(ARM)), "", ""), tmp_path / "set"))
     assert loaded.measured.columns.position == ("q_shoulder_rad", "q_elbow_rad")

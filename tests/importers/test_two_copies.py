@@ -43,6 +43,7 @@ def recorded(tmp_path_factory):
     return record
 
 
+@pytest.mark.long
 def test_the_gain_of_the_second_copy_is_all_that_differs(recorded, tmp_path, capsys):
     sets = [recorded("first", 1), recorded("second", 2, gain=1.1)]
     assert main(["compare", *map(str, sets), f"out={tmp_path}"]) == 0

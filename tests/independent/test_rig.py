@@ -97,6 +97,7 @@ def test_symptoms_of_the_command() -> None:
     assert np.max(abs(np.diff(slow.q[0], axis=0))) < 0.02 * 0.04 * 1.1
 
 
+@pytest.mark.long
 def test_symptoms_of_the_drive() -> None:
     plain, settled = rig(), [NUDGE, SQUEEZE, EASE, RELEASE]
     friction = rig("coulomb_friction", level=0.03)
@@ -168,6 +169,7 @@ def test_symptoms_of_contact_and_object() -> None:
     assert slid[0] > pushed + 1e-4 > pushed - 1e-4 > slid[1]
 
 
+@pytest.mark.long
 def test_symptoms_of_the_sensors() -> None:
     plain = rig()
     for name in CATALOGUE:

@@ -150,6 +150,7 @@ def test_policies_beside_a_sweep_are_trained_as_its_own_runs_are(policy):
         assert repr(compose("train", [*asked, "action.bias_one_contact=0"])) == repr(sweep)
 
 
+@pytest.mark.long
 def test_trainings_and_evaluations_are_commands_that_there_are(every):
     from forcegrasp.cli.options import compose
 

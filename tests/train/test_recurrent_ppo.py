@@ -45,6 +45,7 @@ class Recall(EnvBase):
         torch.manual_seed(seed)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("mirrored", [True, False])
 def test_what_only_a_memory_can_know_is_learned(mirrored, tiny):
     """Without a memory, or with one that does nothing, no policy does better than −1 a step."""
