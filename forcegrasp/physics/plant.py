@@ -19,6 +19,10 @@ _FORCES = ("qfrc_actuator", "qfrc_spring", "qfrc_bias")
 _PUSHES = ("finger_push_n", "object_push_n", "motor_push")
 
 
+# Numbers of sensors that :meth:`Plant.play` asks of the engine at a time: many, but no more than a core keeps at hand.
+_NUMBERS_AT_ONCE = 1_000_000
+
+
 class Plant(ContributedFields):
     """Simulates ``n`` grasps, each with its own parameters and effects.
 
@@ -302,17 +306,19 @@ class Plant(ContributedFields):
         commands = self.effects.commands(commands, fresh)
         control[..., self._drives] = self._controls(commands)
         self._apply_actions()
-        parts: list[dict[str, np.ndarray]] = []
-        length = commands.shape[1] if stretch is None else at_once
-        for low in range(0, commands.shape[1], length):
-            part = control[:, low : low + length]
+        steps, scale = commands.shape[1], self.force_scale[:, None, None]
+        position, force = (np.empty((self.n, steps, width)) for width in (self.motors, self.channels))
+        objects = np.empty((self.n, steps))
+        length = max(1, _NUMBERS_AT_ONCE // max(1, self._sensors.size)) if stretch is None else at_once
+        for low in range(0, steps, length):
+            part = slice(low, min(low + length, steps))
             if stretch is not None:
                 self.stretch_steps(stretch[low // length])
-            parts.append(self.batch.rollout(part.shape[1], part, record=["qpos", "sensordata"]))
-        positions, sensors = (np.concatenate([one[name] for one in parts], axis=1) for name in ("qpos", "sensordata"))
-        scale = self.force_scale[:, None, None]
-        force = self._channels_of(sensors, self._pads_of(sensors) * scale, scale)
-        return self._motors_of(positions), force, self._object_of(positions)
+            made = self.batch.rollout(part.stop - low, control[:, part], record=["qpos", "sensordata"])
+            qpos, sensors = made["qpos"], made["sensordata"]
+            position[:, part], objects[:, part] = self._motors_of(qpos), self._object_of(qpos)
+            force[:, part] = self._channels_of(sensors, self._pads_of(sensors) * scale, scale)
+        return position, force, objects
 
     @property
     def acts_in_steps(self) -> bool:

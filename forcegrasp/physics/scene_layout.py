@@ -199,7 +199,7 @@ class SceneLayout:
         if not self._readings:
             return np.zeros((*sensors.shape[:-1], 2))
         if self._readings_alike is not None:
-            felt = sensors.take(self._readings_alike, axis=-1)
+            felt = np.ascontiguousarray(sensors[..., self._readings_alike])
             return felt.reshape(*sensors.shape[:-1], len(self._readings), -1).sum(axis=-1)
         sums = np.empty((*sensors.shape[:-1], len(self._readings)))
         for side, part in enumerate(self._readings):
@@ -207,10 +207,10 @@ class SceneLayout:
         return sums
 
     @functools.cached_property
-    def _readings_alike(self) -> np.ndarray | None:
+    def _readings_alike(self) -> slice | np.ndarray | None:
         """Where the numbers of all sides stand, one side after the other; None if some have more of them."""
         each = [range(part.stop)[part] for part in self._readings]
-        return np.concatenate(each) if len({len(one) for one in each}) == 1 else None
+        return places(np.concatenate(each)) if len({len(one) for one in each}) == 1 else None
 
 
 @dataclass(frozen=True)
