@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from forcegrasp.effects.base import Effect, Parameter, State, first_order_weight
+from forcegrasp.effects.base import Effect, Parameter, State
 
 
 class ActuatorLag(Effect):
@@ -25,6 +25,6 @@ class ActuatorLag(Effect):
         return {"held": self.resting_command[which]}
 
     def command(self, command: np.ndarray, fresh: np.ndarray) -> np.ndarray:
-        held, weight = self.state["held"], first_order_weight(self.dt, self["time_constant_s"])
+        held, weight = self.state["held"], self.lag_weight("time_constant_s")
         self.state["held"] = held = np.where(weight == 1, command, held + weight * (command - held))
         return held

@@ -131,6 +131,7 @@ class Effect:
             self.largest = np.maximum(self.largest, largest)
         self.rows = np.arange(len(self.values))
         self._state: State | None = None
+        self._weights: dict[str | float, np.ndarray] = {}
 
     @property
     def state(self) -> State:
@@ -147,6 +148,13 @@ class Effect:
     def longest(self, parameter: str) -> float:
         """The largest value that a parameter will have: what it has, unless it is drawn anew at resets."""
         return float(self.largest[self.index(parameter)])
+
+    def lag_weight(self, time_constant: str | float) -> np.ndarray:
+        """:func:`first_order_weight` of a parameter, ``(rows, 1)``, or of a number of seconds; kept until a reset."""
+        if time_constant not in self._weights:
+            tau = self[time_constant] if isinstance(time_constant, str) else time_constant
+            self._weights[time_constant] = first_order_weight(self.dt, tau)
+        return self._weights[time_constant]
 
     def attach(self, plant: Plant, rows: np.ndarray) -> Effect:
         """Puts the effect into a plant, on these rows of it."""
@@ -182,6 +190,7 @@ class Effect:
 
     def reset(self, which: np.ndarray) -> None:
         """Gives these of its rows (indices into the effect's own rows) the memory of a new grasp."""
+        self._weights.clear()
         for name, values in self.init(which).items():
             self.state[name][which] = values
 
@@ -197,6 +206,17 @@ class Effect:
     def command(self, command: np.ndarray, fresh: np.ndarray) -> np.ndarray:
         """Commanded positions on their way to the motors, m or rad. ``fresh`` ``(rows,)``: this is a new command."""
         return command
+
+    def commands(self, commands: np.ndarray, fresh: np.ndarray) -> np.ndarray:
+        """What :meth:`command` makes of the commands of many steps, the last ones of a grasp.
+
+        Asked only of variants that are :attr:`known_beforehand`; an effect that can do it at once overrides it.
+
+        Args:
+          commands: ``(steps, rows, motors)``.
+          fresh: which of them are new ones, ``(steps, rows)``.
+        """
+        return np.stack([self.command(*step) for step in zip(commands, fresh, strict=True)])
 
     def rests_at(self, command: np.ndarray) -> np.ndarray:
         """Where motors have come to rest in free air by commands ``(rows, motors)``, m or rad; grasps start there."""
@@ -225,6 +245,14 @@ class Effect:
     def read_position(self, position: np.ndarray) -> np.ndarray:
         """What the encoders say, m or rad."""
         return position
+
+    def read_forces(self, forces: np.ndarray) -> np.ndarray:
+        """What :meth:`read_force` makes of the forces of many steps, the last ones, ``(steps, rows, channels)``."""
+        return np.stack([self.read_force(force) for force in forces])
+
+    def read_positions(self, positions: np.ndarray) -> np.ndarray:
+        """What :meth:`read_position` makes of those of many steps, the last ones, ``(steps, rows, motors)``."""
+        return np.stack([self.read_position(position) for position in positions])
 
     # --- what the class knows about itself -----------------------------------------------------------------------
 
@@ -314,6 +342,19 @@ def delay_line(past: np.ndarray, steps: np.ndarray, longest: float) -> State:
         "whole": whole.astype(int),
         "part": (steps - whole)[:, None],
     }
+
+
+def all_delayed(line: State, signals: np.ndarray) -> np.ndarray:
+    """What :func:`delayed` would return of the last steps' values ``(steps, rows, width)``, bit for bit."""
+    past, part, whole = line["past"], line["part"], line["whole"]
+    rows, length = np.arange(len(past)), past.shape[1]
+    before = past[rows[:, None], (line["newest"][:, None] + 1 + np.arange(length)) % length].swapaxes(0, 1)
+    unknown = np.isnan(past[:, 0, 0])
+    before[:, unknown] = signals[0, unknown]
+    every = np.concatenate([before, signals])
+    at = length + np.arange(len(signals))[:, None] - whole
+    near, far = every[at, rows], every[at - 1, rows]
+    return np.where(part == 0, near, (1 - part) * near + part * far)
 
 
 def delayed(line: State, signal: np.ndarray) -> np.ndarray:

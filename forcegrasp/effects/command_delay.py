@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from forcegrasp.effects.base import Effect, Parameter, State, delay_line, delayed
+from forcegrasp.effects.base import Effect, Parameter, State, all_delayed, delay_line, delayed
 
 
 class CommandDelay(Effect):
@@ -34,3 +34,6 @@ class CommandDelay(Effect):
 
     def command(self, command: np.ndarray, fresh: np.ndarray) -> np.ndarray:
         return delayed(self.state, command)
+
+    def commands(self, commands: np.ndarray, fresh: np.ndarray) -> np.ndarray:
+        return all_delayed(self.state, commands)

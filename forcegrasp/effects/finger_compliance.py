@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from forcegrasp.effects.base import Contribution, Effect, Parameter, State, first_order_weight
+from forcegrasp.effects.base import Contribution, Effect, Parameter, State
 
 #: Time in which the spring settles, s: far below what 25 Hz can see, far above a physics step.
 SETTLING_S = 0.008
@@ -50,5 +50,5 @@ class FingerCompliance(Effect):
     def act(self) -> Contribution:
         before = self.state["deflection"]
         gap = self.compliance * self.plant.press_n[self.rows] - before
-        self.state["deflection"] = deflection = before + first_order_weight(self.dt, SETTLING_S) * gap
+        self.state["deflection"] = deflection = before + self.lag_weight(SETTLING_S) * gap
         return Contribution(pad_shift_m=deflection)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from forcegrasp.effects.base import Contribution, Effect, Nested, Parameter, State, first_order_weight
+from forcegrasp.effects.base import Contribution, Effect, Nested, Parameter, State
 from forcegrasp.effects.finger_compliance import SETTLING_S
 
 
@@ -61,7 +61,7 @@ class FingerCreep(Effect):
         to_come = self["compliance_m_n"] * self.plant.press_n[self.rows]
         for part, target, lag in (
             ("at_once", share * to_come, SETTLING_S),
-            ("creep", (1 - share) * to_come, self["time_constant_s"]),
+            ("creep", (1 - share) * to_come, "time_constant_s"),
         ):
-            state[part] = state[part] + first_order_weight(self.dt, lag) * (target - state[part])
+            state[part] = state[part] + self.lag_weight(lag) * (target - state[part])
         return Contribution(pad_shift_m=state["at_once"] + state["creep"])

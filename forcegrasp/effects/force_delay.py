@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from forcegrasp.effects.base import Effect, Parameter, State, delay_line, delayed
+from forcegrasp.effects.base import Effect, Parameter, State, all_delayed, delay_line, delayed
 
 
 class ForceDelay(Effect):
@@ -29,3 +29,6 @@ class ForceDelay(Effect):
 
     def read_force(self, force: np.ndarray) -> np.ndarray:
         return delayed(self.state, force)
+
+    def read_forces(self, forces: np.ndarray) -> np.ndarray:
+        return all_delayed(self.state, forces)

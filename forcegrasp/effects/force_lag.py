@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from forcegrasp.effects.base import Effect, Parameter, State, first_order_weight
+from forcegrasp.effects.base import Effect, Parameter, State
 
 
 class ForceLag(Effect):
@@ -36,7 +36,7 @@ class ForceLag(Effect):
             held, self.state["rate"] = self._second_order(held - force, self.state["rate"])
             held += force
         else:
-            weight = first_order_weight(self.dt, self["time_constant_s"])
+            weight = self.lag_weight("time_constant_s")
             held = np.where(weight == 1, force, held + weight * (force - held))
         self.state["held"] = held
         return held

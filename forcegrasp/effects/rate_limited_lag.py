@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from forcegrasp.effects.base import Effect, Nested, Parameter, State, first_order_weight
+from forcegrasp.effects.base import Effect, Nested, Parameter, State
 
 
 class RateLimitedLag(Effect):
@@ -38,7 +38,7 @@ class RateLimitedLag(Effect):
 
     def command(self, command: np.ndarray, fresh: np.ndarray) -> np.ndarray:
         held, most = self.state["held"], self["rate_m_s"] * self.dt
-        weight = first_order_weight(self.dt, self["time_constant_s"])
+        weight = self.lag_weight("time_constant_s")
         followed = held + np.clip(weight * (command - held), -most, most)
         self.state["held"] = held = np.where(np.isinf(most) & (weight == 1), command, followed)
         return held

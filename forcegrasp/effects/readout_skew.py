@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from forcegrasp.effects.base import Effect, Parameter, State, delay_line, delayed
+from forcegrasp.effects.base import Effect, Parameter, State, all_delayed, delay_line, delayed
 from forcegrasp.physics.gripper import SKEW
 
 
@@ -34,3 +34,6 @@ class ReadoutSkew(Effect):
 
     def read_position(self, position: np.ndarray) -> np.ndarray:
         return delayed(self.state, position)
+
+    def read_positions(self, positions: np.ndarray) -> np.ndarray:
+        return all_delayed(self.state, positions)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from forcegrasp.effects.base import Effect, Parameter, State, delay_line, delayed, first_order_weight
+from forcegrasp.effects.base import Effect, Parameter, State, delay_line, delayed
 
 
 class VelocityLag(Effect):
@@ -51,7 +51,7 @@ class VelocityLag(Effect):
         """The velocity that the servo knows, ``(rows, motors)``."""
         lag, state = self["lag_s"], self.state
         if self.variant == "filter":
-            state["late"] = late = state["late"] + first_order_weight(self.dt, lag) * (velocity - state["late"])
+            state["late"] = late = state["late"] + self.lag_weight("lag_s") * (velocity - state["late"])
             return late
         # before the start it moved as at the start: so what is kept is the way besides that steady motion
         besides = self.position - state["at_first"] * state["time"]

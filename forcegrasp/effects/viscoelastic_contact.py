@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from forcegrasp.effects.base import Contribution, Effect, Parameter, State, first_order_weight
+from forcegrasp.effects.base import Contribution, Effect, Parameter, State
 from forcegrasp.effects.touch import contact_push, depth_in_object, untouched
 
 
@@ -59,7 +59,7 @@ class ViscoelasticContact(Effect):
 
     def act(self) -> Contribution:
         depth, before = np.maximum(depth_in_object(self, self.pad_force), 0.0), self.state["relaxed"]
-        relaxed = before + first_order_weight(self.dt, self["time_constant_s"]) * (depth - before)
+        relaxed = before + self.lag_weight("time_constant_s") * (depth - before)
         if self.variant == "following":
             relaxed = np.minimum(relaxed, depth)
         least = -self.pad_force if self.variant.startswith("solid") else 0.0

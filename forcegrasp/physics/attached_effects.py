@@ -80,10 +80,11 @@ class AttachedEffects:
 
     def commands(self, commands: np.ndarray, fresh: np.ndarray) -> np.ndarray:
         """The same for the commands of many steps ``(n, steps, motors)``, where nothing else acts in them."""
-        if not self._command:
-            return commands
-        steps = range(commands.shape[1])
-        return np.stack([self.command(commands[:, step], fresh[:, step]) for step in steps], axis=1)
+        commands, fresh = np.array(commands.swapaxes(0, 1), order="C"), fresh.T
+        for effect in self._command:
+            rows = places(effect.rows)
+            commands[:, rows] = effect.commands(commands[:, rows].copy(), fresh[:, rows])
+        return commands.swapaxes(0, 1)
 
     @property
     def remember(self) -> bool:

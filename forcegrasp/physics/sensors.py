@@ -57,6 +57,13 @@ class ReadingEffects:
         for effect in self._force:
             force[effect.rows] = effect.read_force(force[effect.rows])
 
+    def apply_to_all(self, position: np.ndarray, force: np.ndarray) -> None:
+        """The same of all instants of grasps, ``(n, steps, motors)`` and ``(n, steps, channels)``."""
+        for effect in self._position:
+            position[effect.rows] = effect.read_positions(position[effect.rows].swapaxes(0, 1)).swapaxes(0, 1)
+        for effect in self._force:
+            force[effect.rows] = effect.read_forces(force[effect.rows].swapaxes(0, 1)).swapaxes(0, 1)
+
 
 def with_noise(value: Any, std: Any, normal: Any, step: float = 0.0) -> Any:
     """A reading: noise added, and then rounded as the converter does.

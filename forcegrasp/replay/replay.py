@@ -278,8 +278,7 @@ class Replay:
         force = self._transduced(motion.force[rows] * scale)
         live = ReadingEffects([self._on_readings(effect) for effect in effects])
         true_position = motion.position[rows] if live.change_position else motion.position[:0]
-        for step in range(self._steps):
-            live.apply(true_position[:, step], force[:, step])
+        live.apply_to_all(true_position, force)
         count = np.arange(len(rows))
         if live.change_position:
             position = at.of(true_position, count)
