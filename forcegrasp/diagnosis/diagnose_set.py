@@ -162,8 +162,8 @@ class _Ways:
             move = moves is not None and moves(target, fit)
             return leave_out(target, fit) or move
 
-        given_first = never if moves is None else moves.before_more
-        found = self.search(*fitted, stop_when=StopWhen(something_else_first, given_first))
+        first, explains = (never, never) if moves is None else (moves.before_more, moves.explain)
+        found = self.search(*fitted, stop_when=StopWhen(something_else_first, first, explains))
         if found.stopped:
             return found, None
         try:

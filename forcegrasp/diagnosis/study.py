@@ -47,6 +47,8 @@ class Study:
     progress: Progress = silent
     few: Few | None = None  #: grasps that stand for all where a rough answer will do; none are chosen by default
     rough: Replay | None = None  #: simulates what only ranks; the cheap one by default
+    #: whether what the set gives, moved within its tolerance, explains what a fit leaves; not asked by default
+    given_explains: Callable[[Target, Fit], bool] = lambda _target, _fit: False
 
     def heldout(self, fit: Fit) -> np.ndarray:
         """Residuals of held-out grasps, ``(G, S, C)``."""

@@ -159,13 +159,14 @@ class Effect:
     def attach(self, plant: Plant, rows: np.ndarray) -> Effect:
         """Puts the effect into a plant, on these rows of it."""
         self.plant, self.rows = plant, np.asarray(rows)
-        self._at = places(self.rows)
+        #: the same places, as a slice if they are evenly spaced; what is read by it may be the plant's own array
+        self.at = places(self.rows)
         return self
 
     @property
     def position(self) -> np.ndarray:
         """True positions of the motors, m or rad, ``(rows, motors)``."""
-        return self.plant.position[self._at].copy()
+        return self.plant.position[self.at].copy()
 
     @property
     def resting_command(self) -> np.ndarray:
@@ -181,12 +182,12 @@ class Effect:
     @property
     def velocity(self) -> np.ndarray:
         """True velocities of the motors, m/s or rad/s, ``(rows, motors)``; positive opens."""
-        return self.plant.velocity[self._at]
+        return self.plant.velocity[self.at]
 
     @property
     def pad_force(self) -> np.ndarray:
         """Contact forces of the last physics step before any scale, newtons, ``(rows, 2)``."""
-        return self.plant.pad_force[self._at].copy()
+        return self.plant.pad_force[self.at].copy()
 
     def reset(self, which: np.ndarray) -> None:
         """Gives these of its rows (indices into the effect's own rows) the memory of a new grasp."""

@@ -49,6 +49,6 @@ class FingerCompliance(Effect):
 
     def act(self) -> Contribution:
         before = self.state["deflection"]
-        gap = self.compliance * self.plant.press_n[self.rows] - before
+        gap = self.compliance * self.plant.press_n[self.at] - before
         self.state["deflection"] = deflection = before + self.lag_weight(SETTLING_S) * gap
         return Contribution(pad_shift_m=deflection)

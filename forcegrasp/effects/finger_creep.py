@@ -58,7 +58,7 @@ class FingerCreep(Effect):
 
     def act(self) -> Contribution:
         state, share = self.state, self["at_once_share"]
-        to_come = self["compliance_m_n"] * self.plant.press_n[self.rows]
+        to_come = self["compliance_m_n"] * self.plant.press_n[self.at]
         for part, target, lag in (
             ("at_once", share * to_come, SETTLING_S),
             ("creep", (1 - share) * to_come, "time_constant_s"),

@@ -6,6 +6,9 @@ import numpy as np
 
 from forcegrasp.effects.base import Contribution, Effect
 
+# the right finger stands on the object's positive side
+_TOWARDS_OBJECT = np.array([1, -1])
+
 
 def untouched(which: np.ndarray) -> np.ndarray:
     """The entry ``"surface"`` in the memory of effects that ask for a depth: surfaces of objects not yet felt."""
@@ -37,9 +40,8 @@ def depth_in_object(effect: Effect, force: np.ndarray, reach: np.ndarray | None 
 
 def pad_reach(effect: Effect) -> np.ndarray:
     """How far pads stand from the object's middle, from where they are when closed on it, metres, ``(rows, 2)``."""
-    plant, rows = effect.plant, effect.rows
-    # the right finger stands on the object's positive side
-    return plant.pad_position[rows] + plant.pad_shift_m[rows] + plant.object_position[rows, None] * np.array([1, -1])
+    plant, at = effect.plant, effect.at
+    return plant.pad_position[at] + plant.pad_shift_m[at] + plant.object_position[at, None] * _TOWARDS_OBJECT
 
 
 def contact_push(push: np.ndarray) -> Contribution:

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from forcegrasp.physics.places import places
 from forcegrasp.physics.protocols import Contribution, PlantEffect
 from forcegrasp.physics.sensors import ReadingEffects
 
@@ -28,7 +27,6 @@ class AttachedEffects:
         )
         self._of_commands = [effect for effect in self._command if effect.is_known_beforehand]
         self._of_motion = [effect for effect in self._act if effect.follows_motion]
-        self._acting_at = [(effect, places(effect.rows)) for effect in self._act]
         #: Names of what :meth:`contribute` may have set to something else than 0 in its last call.
         self.given = set(Contribution._fields)
         self.readings = ReadingEffects(effects)
@@ -75,15 +73,14 @@ class AttachedEffects:
             return command
         command = np.array(command, float)
         for effect in self._command:
-            command[effect.rows] = effect.command(command[effect.rows], fresh[effect.rows])
+            command[effect.at] = effect.command(command[effect.at].copy(), fresh[effect.at])
         return command
 
     def commands(self, commands: np.ndarray, fresh: np.ndarray) -> np.ndarray:
         """The same for the commands of many steps ``(n, steps, motors)``, where nothing else acts in them."""
         commands, fresh = np.array(commands.swapaxes(0, 1), order="C"), fresh.T
         for effect in self._command:
-            rows = places(effect.rows)
-            commands[:, rows] = effect.commands(commands[:, rows].copy(), fresh[:, rows])
+            commands[:, effect.at] = effect.commands(commands[:, effect.at].copy(), fresh[:, effect.at])
         return commands.swapaxes(0, 1)
 
     @property
@@ -131,10 +128,10 @@ class AttachedEffects:
         for name in self.given:
             totals[name].fill(0)
         self.given.clear()
-        for effect, rows in self._acting_at:
+        for effect in self._act:
             for (name, total), added in zip(totals.items(), effect.act(), strict=True):
                 if added is not None:
-                    total[rows] += added
+                    total[effect.at] += added
                     self.given.add(name)
         return True
 
@@ -159,5 +156,5 @@ def _in_turn(
         return values
     values = values.copy()
     for effect in effects:
-        values[effect.rows] = hook(effect, values[effect.rows])
+        values[effect.at] = hook(effect, values[effect.at].copy())
     return values

@@ -11,6 +11,7 @@ from forcegrasp.physics.attached_effects import AttachedEffects
 from forcegrasp.physics.contact_law import contact_numbers
 from forcegrasp.physics.contributed_fields import ContributedFields
 from forcegrasp.physics.gripper import MASS, OF_READINGS, START_VELOCITY, Gripper
+from forcegrasp.physics.places import places
 from forcegrasp.physics.protocols import PlantEffect
 
 # What motor_force and outside_force are made of.
@@ -46,6 +47,7 @@ class Plant(ContributedFields):
         self._qvel, self._applied = self.batch.bind("qvel"), self.batch.bind("qfrc_applied")
         self._load, self._enabled = np.zeros(n), np.ones(n, bool)
         self._pushed = False  # whether effects pushed in the last step
+        self._running: np.ndarray | None = None  # which rows steps advance, ascending; all by default
         self._at_start = np.ones(n, bool)  # which rows made no step since they were reset
         self._force_range: np.ndarray | None = None  # of the motors, before it was changed while they move
         self.force_scale = np.ones(n)  #: f_α, factor from the force sensors to the reading, ``(n,)``
@@ -231,7 +233,7 @@ class Plant(ContributedFields):
         """
         if not len(self.effects):
             self._send(command)
-            self.batch.step(nstep=steps)
+            self.batch.step(self._running, steps)
             self._read()
             return
         fresh = fresh if isinstance(fresh, np.ndarray) else np.full(self.n, fresh)
@@ -239,7 +241,7 @@ class Plant(ContributedFields):
         for _ in range(steps):
             self._send(self.effects.command(command, fresh))
             self._apply_actions()
-            self.batch.step(nstep=1)
+            self.batch.step(self._running, 1)
             self._at_start[:] = False
             self._read()
             fresh = stale
@@ -280,8 +282,17 @@ class Plant(ContributedFields):
         """
         self.field("opt.timestep")[:] = self.dt * times
 
+    def run_only(self, ids: np.ndarray) -> None:
+        """Lets the other rows than these, ascending, stand as they are from now on."""
+        self._running = ids
+
     def play(
-        self, commands: np.ndarray, fresh: np.ndarray, stretch: np.ndarray | None = None, at_once: int = 1
+        self,
+        commands: np.ndarray,
+        fresh: np.ndarray,
+        stretch: np.ndarray | None = None,
+        at_once: int = 1,
+        needed: np.ndarray | None = None,
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Holds each command for one physics step, as :meth:`advance` does, in one call of the engine.
 
@@ -292,6 +303,8 @@ class Plant(ContributedFields):
           fresh: which of them are new ones, ``(n, steps)``.
           stretch: how many times as long as :attr:`dt` steps are, ``(steps ÷ at_once, n)``; as long by default.
           at_once: number of steps that are equally long.
+          needed: how many of the steps each row is to make, ``(n,)``, or a few more; after those it stands still. All
+            by default.
 
         Returns:
           Positions ``(n, steps, motors)``, force readings ``(n, steps, channels)`` and object positions ``(n, steps)``
@@ -310,14 +323,19 @@ class Plant(ContributedFields):
         position, force = (np.empty((self.n, steps, width)) for width in (self.motors, self.channels))
         objects = np.empty((self.n, steps))
         length = max(1, _NUMBERS_AT_ONCE // max(1, self._sensors.size)) if stretch is None else at_once
+        needed = np.full(self.n, steps) if needed is None else needed
         for low in range(0, steps, length):
             part = slice(low, min(low + length, steps))
             if stretch is not None:
                 self.stretch_steps(stretch[low // length])
-            made = self.batch.rollout(part.stop - low, control[:, part], record=["qpos", "sensordata"])
+            rows, stand = places(np.flatnonzero(needed > low)), needed <= low
+            for held in (position, force, objects):
+                held[stand, part] = held[stand, low - 1][:, None]
+            running = np.arange(self.n)[rows]
+            made = self.batch.rollout(part.stop - low, control[rows, part], record=["qpos", "sensordata"], ids=running)
             qpos, sensors = made["qpos"], made["sensordata"]
-            position[:, part], objects[:, part] = self._motors_of(qpos), self._object_of(qpos)
-            force[:, part] = self._channels_of(sensors, self._pads_of(sensors) * scale, scale)
+            position[rows, part], objects[rows, part] = self._motors_of(qpos), self._object_of(qpos)
+            force[rows, part] = self._channels_of(sensors, self._pads_of(sensors) * scale[rows], scale[rows])
         return position, force, objects
 
     @property

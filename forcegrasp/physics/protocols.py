@@ -32,6 +32,7 @@ class PlantEffect(Protocol):
     after_noise: ClassVar[bool]
     follows_motion: ClassVar[bool]
     rows: np.ndarray
+    at: slice | np.ndarray
 
     @property
     def state(self) -> State: ...

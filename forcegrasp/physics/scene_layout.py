@@ -136,8 +136,16 @@ class SceneLayout:
         """Forces on the pads as what they do to the motors that move them, N or N·m, ``(n, motors)``."""
         if self.gripper.is_direct:
             return push_n
-        work = push_n * self.travel
-        return np.stack([work[:, self._moved_by(motor)].sum(axis=1) for motor in range(self.motors)], axis=1)
+        work, sums = push_n * self.travel, np.zeros((len(push_n), self.motors))
+        for motor, sides in enumerate(self._sides):
+            for side in sides:
+                sums[:, motor] += work[:, side]
+        return sums
+
+    @functools.cached_property
+    def _sides(self) -> list[list[int]]:
+        """Which sides each motor moves."""
+        return [np.flatnonzero(self._moved_by(motor)).tolist() for motor in range(self.motors)]
 
     @functools.cached_property
     def gearing(self) -> np.ndarray:

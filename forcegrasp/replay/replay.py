@@ -106,7 +106,9 @@ class Replay:
         self.sample_steps = np.stack([np.pad(start, (0, samples - len(start)), "edge") for start in starts])
         self._instants = self.sample_steps  # when each sample is taken, in steps
         latest_s = max(gripper.latest_reading_s, *(max(g.late_s) for g in self.grasps))
-        self._steps += math.ceil(latest_s / self.dt) + 1
+        more = math.ceil(latest_s / self.dt) + 1
+        self._steps += more
+        self._needed = np.array([start[-1] + more for start in starts])  # steps of each grasp until its last reading
         #: how many times as long as usual steps are, a row for so many at once, ``(…, grasps)``
         self._stretch = placed.lengths(self._steps)
         if gripper.is_servo:
@@ -212,11 +214,14 @@ class Replay:
             commands = self._command[:-1, grasp].swapaxes(0, 1)
             fresh = self._fresh[:-1, grasp].T
             stretch = None if self._stretch is None else self._stretch[:, grasp]
-            played = plant.play(commands, fresh, stretch, self._steps_at_once)
+            played = plant.play(commands, fresh, stretch, self._steps_at_once, self._needed[grasp])
             position[:, 1:], force[:, 1:], objects[:, 1:] = played
         else:
+            needed = self._needed[grasp]
             for step in range(self._steps - 1):
                 check_time()
+                if (needed == step).any():
+                    plant.run_only(np.flatnonzero(needed > step))
                 new = self._fresh[step].take(grasp)
                 if self._encoders_known:
                     plant.recorded_position = self._encoder[step].take(grasp, axis=0)

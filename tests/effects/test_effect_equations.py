@@ -118,7 +118,7 @@ def test_finger_creep_deflects_with_time_and_comes_to_what_a_spring_does(share, 
     compliance = 0.001
     creeps = make("finger_creep", compliance, share, time_constant)
     squeeze = np.concatenate([np.full(1000, 0.8), np.zeros(1000)])  # 2 s of it, then 2 s of rest
-    creeps.plant = SimpleNamespace(press_n=np.zeros((1, 2)))
+    creeps.attach(SimpleNamespace(press_n=np.zeros((1, 2))), [0])
     shift = []
     for force in squeeze:
         creeps.plant.press_n[:] = force

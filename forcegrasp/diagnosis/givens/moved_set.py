@@ -62,6 +62,10 @@ class MovesFirst:
         self.asked |= first
         return first
 
+    def explain(self, target: Target, fit: Fit) -> bool:
+        """Whether moves within the tolerance explain most of what a fit leaves, and leave little."""
+        return _most_explained(self.loaded.measured, target, fit) is not None
+
     def before_more(self, target: Target, fit: Fit) -> bool:
         """Whether moves explain most of what effects leave, and leave little, so that they come before more effects.
 

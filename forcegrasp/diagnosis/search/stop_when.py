@@ -34,6 +34,8 @@ class StopWhen:
     #: It explains most of what a fit with effects leaves: then no more are looked for, and what was found is told
     #: without rivals, for the set to be moved first.
     given_first: Asked = never
+    #: The same of a fit with one more effect: then it is not begun elsewhere, for no effect leaves what sizes do.
+    given_explains: Asked = never
     #: Cost that the first effect must come down to: one that stays too far from it is not looked for.
     most: float = np.inf
 

@@ -23,8 +23,8 @@ FAR = 10.0
 def to_the_end(rough: Fit, study: Study) -> Fit:
     """A fit of the model itself from where a rough one ended.
 
-    Where that leaves more than noise, it may have ended where an effect's size meets a step of the simulation, or in
-    another valley: then it is led by the grasps that it fits, and starts elsewhere.
+    Where that leaves more than noise and more than what the set gives, it may have ended where an effect's size meets a
+    step of the simulation, or in another valley: then it is led by the grasps that it fits, and starts elsewhere.
 
     Args:
       rough: with an effect as its last one.
@@ -33,6 +33,8 @@ def to_the_end(rough: Fit, study: Study) -> Fit:
     target, simulators = study.target, study.simulators
     exact = fit_exactly(target, rough.problem, simulators, rough.vector, rough.jacobian)
     exact = look_beside(exact, target, simulators)
+    if _leaves_more(exact, target) and study.given_explains(target, exact):
+        return exact
     if _leaves_more(exact, target):
         exact = fit_led_by_others(exact, target, simulators)
     if not _leaves_more(exact, target):
