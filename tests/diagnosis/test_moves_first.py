@@ -34,6 +34,8 @@ def test_radii_that_are_off_either_way_come_before_more_effects(by_m, first):
     bias = EffectSetting(effect_of("force_bias", given.gripper), "", np.array([0.05, -0.02]))
     fit = fit_with([bias], base.fit.vector, Study(target, simulators, ()), base.fit)
     moves = MovesFirst(given)
+    assert moves.explain(target, fit) is (first and max(by_m) < 3e-4)
+    assert not moves.asked  # it is a question about a fit alone
     assert moves.before_more(target, fit) is first
     assert moves.asked is first
     assert moves.beyond is (max(by_m) > 3e-4)

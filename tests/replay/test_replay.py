@@ -12,6 +12,7 @@ import pytest
 from forcegrasp.effects import Effect, catalogue, get_effect
 from forcegrasp.errors import PhysicsError
 from forcegrasp.measure import MeasuredGrasp
+from forcegrasp.physics import plant
 from forcegrasp.physics.gripper_file import load_gripper
 from forcegrasp.physics.plant import Plant, write_base
 from forcegrasp.replay import replay
@@ -208,6 +209,23 @@ def test_grasps_of_different_lengths_and_rates():
         assert simulator.mask[index].tolist() == [True] * count + [False] * (longest - count)
         assert together[index, :count].tobytes() == by_hand(one).tobytes()
         assert np.all(together[index, count:] == together[index, count - 1])  # its last reading again
+
+
+@pytest.mark.parametrize("effect", ["none", "viscoelastic_contact"])
+def test_a_grasp_that_is_over_stands_still(effect, monkeypatch):
+    """In one call of the engine, and step by step; what is simulated of it until then is what it is by itself."""
+    monkeypatch.setattr(plant, "_NUMBERS_AT_ONCE", 2000)
+    short, whole = grasp(REGULAR[:10]), grasp(REGULAR)  # it ends on its way in
+    one = get_effect(effect)
+    on = [EffectOn(one, "", np.tile(one.typical_values(), (rows, 1)), np.arange(rows)) for rows in (1, 2)]
+    alone, both = Replay(TIAGO, [short], "fast"), Replay(TIAGO, [short, whole], "fast")
+    by_itself, motion = alone.simulate(np.arange(1), {}, on[:1]), both.simulate(np.arange(2), {}, on[1:])
+    until, after = int(alone.sample_steps[0, -1]) + 1, motion.position.shape[1] // 2 + 20
+    for name in ("position", "force", "object_position"):
+        made, expected = getattr(motion, name), getattr(by_itself, name)
+        assert made[0, :until].tobytes() == expected[0, :until].tobytes()
+        assert (made[0, after:] == made[0, -1]).all()
+    assert (np.ptp(motion.position[:, after:], axis=1) > 0).tolist() == [[False, False], [True, True]]
 
 
 @functools.cache
