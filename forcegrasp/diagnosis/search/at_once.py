@@ -88,7 +88,7 @@ class AtOnce:
         def keep(found: list[Step], further: Fit) -> bool:
             if enough(further):
                 self.so_far.all = study, found, further
-            little = leaves_little(study, further, begun.error, begun.floor) or begun.may_be_forms(study, further)
+            little = leaves_little(study, further, begun.error, begun.floor)
             return little or (enough(further) and self.given_is_first(study, further))
 
         found = add_several(study, fit, steps, begun.effects, begun.given, self.rng, keep, straight=screen)
