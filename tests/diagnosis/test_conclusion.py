@@ -86,6 +86,20 @@ def test_where_the_base_fit_stopped_short_what_led_a_fit_to_its_end_is_an_answer
         assert found_by(Step(("force_bias",), (half,), (), 2.0, 1.6), converged=False).verdict == verdict
 
 
+def test_what_was_found_in_a_hurry_is_told_though_no_fit_came_to_its_end(made_up, found_by, monkeypatch):
+    """What the set gives is to be moved then, or time is over."""
+    bias, drift = made_up.diagnosis("one_of").steps[0].candidates
+    half = dataclasses.replace(bias, fit=drift.fit)
+    end = dataclasses.replace(made_up.base, converged=False)
+    monkeypatch.setattr(conclusion, "check_gradient", lambda *_: end)
+    found = []
+    monkeypatch.setattr(at_once.AtOnce, "given_is_first", lambda *_: found.append(None) or len(found) > 1)
+    diagnosis = found_by(Step(("force_bias",), (half,), (), 2.0, 1.6), converged=False)
+    assert (diagnosis.verdict, diagnosis.effects) == ("effect", ("force_bias",))
+    found.append(None)
+    assert found_by(converged=False).verdict == "not_fitted"  # nor where nothing was found by then
+
+
 def test_an_effect_that_explains_little_is_not_believed_before_a_fresh_look(made_up, found_by):
     """Beside what was found since, signatures of others may be other than they were."""
     bias, drift = made_up.diagnosis("one_of").steps[0].candidates

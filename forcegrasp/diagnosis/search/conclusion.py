@@ -72,7 +72,7 @@ def concluded(begun: Begun, study: Study, steps: Sequence[Step], fit: Fit, in_a_
     # unless with it the fit came to an end
     beyond_floor = explained_share(error_before, error_after, noise=floor)
     leaves_more = error_after > AS_GOOD_AS_NOTHING * floor and beyond_floor < EXPLAINED_FAR
-    led_on = bool(found) and check_gradient(fit, target).converged
+    led_on = bool(found) and (in_a_hurry or check_gradient(fit, target).converged)  # in a hurry no fit came to its end
     told = not found or leaves_more
     if left and base.unfinished and not (led_on or in_a_hurry) and told:
         base = _finished(base, study)
