@@ -328,10 +328,12 @@ class Plant(ContributedFields):
             part = slice(low, min(low + length, steps))
             if stretch is not None:
                 self.stretch_steps(stretch[low // length])
-            rows, stand = places(np.flatnonzero(needed > low)), needed <= low
+            running, stand = np.flatnonzero(needed > low), needed <= low
             for held in (position, force, objects):
                 held[stand, part] = held[stand, low - 1][:, None]
-            running = np.arange(self.n)[rows]
+            if not len(running):
+                continue
+            rows = places(running)
             made = self.batch.rollout(part.stop - low, control[rows, part], record=["qpos", "sensordata"], ids=running)
             qpos, sensors = made["qpos"], made["sensordata"]
             position[rows, part], objects[rows, part] = self._motors_of(qpos), self._object_of(qpos)

@@ -218,7 +218,7 @@ class Replay:
             position[:, 1:], force[:, 1:], objects[:, 1:] = played
         else:
             needed = self._needed[grasp]
-            for step in range(self._steps - 1):
+            for step in range(needed.max()):
                 check_time()
                 if (needed == step).any():
                     plant.run_only(np.flatnonzero(needed > step))
@@ -237,6 +237,8 @@ class Replay:
                 plant.advance(self._command[step].take(grasp, axis=0), 1, new)
                 position[:, step + 1], force[:, step + 1] = plant.position, plant.transduced_force
                 objects[:, step + 1] = plant.object_position
+            for held in (position, force, objects):
+                held[:, needed.max() + 1 :] = held[:, needed.max()][:, None]
         bad = plant.warnings().any(axis=1)
         if bad.any():
             row = int(np.flatnonzero(bad)[0])

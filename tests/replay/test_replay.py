@@ -226,6 +226,10 @@ def test_a_grasp_that_is_over_stands_still(effect, monkeypatch):
         assert made[0, :until].tobytes() == expected[0, :until].tobytes()
         assert (made[0, after:] == made[0, -1]).all()
     assert (np.ptp(motion.position[:, after:], axis=1) > 0).tolist() == [[False, False], [True, True]]
+    without = both.simulate(np.arange(1), {}, on[:1])  # the longer one is not asked for
+    assert without.position[0, :until].tobytes() == by_itself.position[0, :until].tobytes()
+    for made in (without.position, without.force, without.object_position):
+        assert (made[0, after:] == made[0, -1]).all()
 
 
 @functools.cache
