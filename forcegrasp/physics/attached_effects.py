@@ -30,8 +30,6 @@ class AttachedEffects:
         #: Names of what :meth:`contribute` may have set to something else than 0 in its last call.
         self.given = set(Contribution._fields)
         self.readings = ReadingEffects(effects)
-        #: Whether any changes what is read.
-        self.change_readings = self.readings.change_position or self.readings.change_force
         #: Whether any acts by what happens in a step, and not only by the model, by commands, or alike in every step.
         self.act_in_steps = any(
             effect.hooks() - ({"change_model", "act"} if effect.acts_alike else {"change_model"})

@@ -407,7 +407,7 @@ class Plant(ContributedFields):
         self.force = self.press_n * scale
         self.transduced_force = self._channels_of(self._sensors, self.force, scale)
         self.measured_position, self.measured_force = self.position, self.transduced_force
-        if self.effects.change_readings:
+        if len(self.effects.readings):
             self.measured_position, self.measured_force = self.position.copy(), self.transduced_force.copy()
             self.effects.readings.apply(self.measured_position, self.measured_force)
 

@@ -226,9 +226,8 @@ class _Pads:
     """What moves with a side's pads, in the frame of their body."""
 
     body: int
-    moved: dict[
-        str, tuple[slice | np.ndarray, np.ndarray]
-    ]  #: field of positions → indices, and where the scene puts them
+    #: field of positions → indices, and where the scene puts them
+    moved: dict[str, tuple[slice | np.ndarray, np.ndarray]]
 
     @classmethod
     def find(cls, model: mujoco.MjModel, name: str) -> _Pads:

@@ -45,10 +45,8 @@ class ReadingEffects:
         """Whether positions are changed at all."""
         return bool(self._position)
 
-    @property
-    def change_force(self) -> bool:
-        """Whether forces are changed at all."""
-        return bool(self._force)
+    def __len__(self) -> int:
+        return len(self._position) + len(self._force)
 
     def apply(self, position: np.ndarray, force: np.ndarray) -> None:
         """Changes what was transduced at one instant, in place: ``(n, motors)`` and ``(n, channels)``."""

@@ -72,7 +72,7 @@ class MovesFirst:
         Not where radii are moved down alike: pads that stand further out, or lost motion, would have them so.
         """
         measured = self.loaded.measured
-        first = _most_explained(measured, target, fit) is not None
+        first = self.explain(target, fit)
         if not first and measured.radius_std_m < _RULER_M:
             moved = _most_explained(dataclasses.replace(measured, radius_std_m=_RULER_M), target, fit)
             # if all are off alike it may be an effect

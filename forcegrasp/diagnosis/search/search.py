@@ -84,8 +84,10 @@ def diagnose(
     """
     first, before = (base.fit, ()) if start is None else start
     numerical = numerical_error(first, target)
-    study = Study(target, simulators, evidence_folds(target.grasps), beyond_fit(first, numerical), progress)
-    study = dataclasses.replace(study, given_explains=stop_when.given_explains)
+    study = Study(
+        target, simulators, evidence_folds(target.grasps), beyond_fit(first, numerical), progress,
+        given_explains=stop_when.given_explains,
+    )  # fmt: skip
     folds = tuple(make_folds(target.grasps))
     error_before = study.error(target.before_rounding(study.heldout(base.fit)))
     odd = odd_grasps(target, first)

@@ -33,10 +33,9 @@ def to_the_end(rough: Fit, study: Study) -> Fit:
     target, simulators = study.target, study.simulators
     exact = fit_exactly(target, rough.problem, simulators, rough.vector, rough.jacobian)
     exact = look_beside(exact, target, simulators)
-    if _leaves_more(exact, target) and study.given_explains(target, exact):
+    if not _leaves_more(exact, target) or study.given_explains(target, exact):
         return exact
-    if _leaves_more(exact, target):
-        exact = fit_led_by_others(exact, target, simulators)
+    exact = fit_led_by_others(exact, target, simulators)
     if not _leaves_more(exact, target):
         return exact
     # few grasps tell where else; slopes of all but its last effect hardly change
