@@ -54,6 +54,10 @@ _OFF_CENTRE = Show(
     ((25.8, 0.015, 0.4), (22.5, 0.003, 0.3), (27.2, 0.006, 0.2)),
     offset_m=0.002,
 )
+_STRONGER = Show(
+    "squeezes of growing strength, as fast steps",
+    ((23.8, JUMP, 0.5), (22.5, JUMP, 0.5), (21, JUMP, 0.6), (19, JUMP, 0.6), (26, JUMP, 0.4)),
+)
 _STEPS_OF_SEVERAL_SIZES = Show(
     "steps of 0.6, 1.8 and 4.5 mm, and a slow ramp",
     ((26.9, JUMP, 0.4), (25.1, JUMP, 0.5), (26.5, 0.006, 0.2), (22, JUMP, 0.7), (23.2, 0.006, 0.2)),
@@ -117,10 +121,8 @@ _PLANS = {
     "elastic_joint": Show("steps of a servo with a pendulum", ()),
     "loose_joint": Show("steps of a servo with a pendulum", ()),
     "velocity_lag": Show("steps of a servo's jaw", ()),
-    "force_limit": Show(
-        "squeezes of growing strength, as fast steps",
-        ((23.8, JUMP, 0.5), (22.5, JUMP, 0.5), (21, JUMP, 0.6), (19, JUMP, 0.6), (26, JUMP, 0.4)),
-    ),
+    "force_limit": _STRONGER,
+    "smooth_force_limit": _STRONGER,
     "force_saturation": Show(
         "squeezes of growing strength",
         ((23.8, 0.02, 0.4), (22, 0.02, 0.4), (20, 0.02, 0.4), (18, 0.02, 0.4), (26.5, 0.03, 0.2)),
@@ -159,6 +161,7 @@ _PLANS = {
     "contact_friction": _OFF_CENTRE,
     "table_friction": _OFF_CENTRE,
     "object_mass": _OFF_CENTRE,
+    "object_pull": _SQUEEZES,
     "force_crosstalk": _OFF_CENTRE,
     "swapped_forces": _OFF_CENTRE,
     "object_size": Show("a squeeze, a hold, a release", ((25.8, 0.02, 0.2), (22, 0.01, 0.6), (26.5, 0.01, 0.2))),

@@ -20,7 +20,7 @@ class BackEmf(Effect):
     symptom = "large steps start with full force and end in one highest speed; small ones are right"
     formula = "−F_s (1 + v / v_0) ≤ F_motor ≤ F_s (1 − v / v_0)"
     source = "torque over speed of a DC motor at constant voltage, U = R i + K v; the step's own change of v included"
-    look_alikes = ("rate_limit", "force_limit", "actuator_lag")
+    look_alikes = ("rate_limit", "force_limit", "smooth_force_limit", "actuator_lag")
     separates = (
         "steps of several sizes: a force limit has no highest speed, a rate limit no slow start; more load lowers the"
         " speed at a voltage limit, and the slope of a rate limit stays"

@@ -17,7 +17,7 @@ class ForceGainAsymmetry(Effect):
     symptom = "left and right forces differ by a factor"
     formula = "f'_l = (1 + a) f_l, f'_r = (1 − a) f_r"
     source = "calibration of each sensor"
-    look_alikes = ("force_crosstalk", "object_friction", "motor_asymmetry")
+    look_alikes = ("force_crosstalk", "object_friction", "object_pull", "motor_asymmetry")
     separates = "long holds, where both fingers press alike"
     parameters = (Parameter("share", "share a", "1", -0.9, 0.9, 0.1, trials=(0.05,)),)
     order = 2

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 
 from forcegrasp.effects.base import Effect, Parameter
+from forcegrasp.effects.bent import KNEE, bent
 
 
 class ForceSaturation(Effect):
@@ -19,7 +22,7 @@ class ForceSaturation(Effect):
     symptom = "force reaches a plateau at one value, for all objects alike, while the finger goes on closing"
     formula = "f' = f / (1 + |f / F|^(1/k))^k, which is clip(f, −F, F) at k = 0"
     source = "range of the sensor or its amplifier; the blend of two asymptotes of Churchill and Usagi (1972)"
-    look_alikes = ("force_limit",)
+    look_alikes = ("force_limit", "smooth_force_limit")
     separates = "the finger's position, and objects that need more force"
     parameters = (
         Parameter(
@@ -34,18 +37,10 @@ class ForceSaturation(Effect):
             trials=tuple(np.geomspace(0.08, 5, 14)),
             follows="force",
         ),
-        Parameter("knee", "how early it bends k", "1", 0.0, 1.0, 0.1, null=0.1, trials=(0.0, 0.4), if_missing=0.0),
+        dataclasses.replace(KNEE, trials=(0.0, 0.4), if_missing=0.0),
     )
     order = 8
     least_channels = 1
 
     def read_force(self, force: np.ndarray) -> np.ndarray:
-        level, knee = self["level_n"], self["knee"]
-        clipped = np.clip(force, -level, level)
-        bends = (knee > 0) & np.isfinite(level)
-        if not bends.any():
-            return clipped
-        power = 1 / np.where(bends, knee, 1.0)
-        with np.errstate(divide="ignore"):  # no force at all; by logarithms, as powers grow beyond all numbers
-            bent = np.exp(-np.logaddexp(-power * np.log(np.abs(force)), -power * np.log(level)) / power)
-        return np.where(bends, np.sign(force) * bent, clipped)
+        return bent(force, self["level_n"], self["knee"])

@@ -16,7 +16,7 @@ class MotorOffset(Effect):
     symptom = "each motor rests off its command by a constant, to the same side wherever it comes from"
     formula = "F' = F + F_0, per motor; positive opens"
     source = "offset of the drive's force: Janot, Gautier and Brunot (2019), identification of EMPS"
-    look_alikes = ("encoder_bias", "motor_asymmetry", "force_bias", "coulomb_friction")
+    look_alikes = ("encoder_bias", "motor_asymmetry", "force_bias", "object_pull", "coulomb_friction")
     separates = (
         "a harder servo rests nearer to its command, a biased encoder does not; the effort that is read is right, a"
         " biased reading's is not; friction flips with the direction"

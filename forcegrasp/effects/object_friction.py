@@ -18,7 +18,14 @@ class ObjectFriction(Effect):
     symptom = "the second finger's force lags; off-centre grasps push the object less far"
     formula = "|F| ≤ F_t at rest, F = −F_t sign(v) in motion"
     source = "MuJoCo's `frictionloss` on the object, with a stiff constraint"
-    look_alikes = ("smooth_object_friction", "table_friction", "contact_friction", "backlash", "force_gain_asymmetry")
+    look_alikes = (
+        "smooth_object_friction",
+        "table_friction",
+        "contact_friction",
+        "backlash",
+        "force_gain_asymmetry",
+        "object_pull",
+    )
     separates = "off-centre objects, where one finger touches first and pushes"
     parameters = (Parameter("force_n", "friction F_t", "N", 0.0, 5.0, 0.1, trials=(0.02, 0.06, 0.2), follows="force"),)
 

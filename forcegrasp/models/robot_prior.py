@@ -31,13 +31,13 @@ class Prior:
 
 #: By effect of the catalogue. No robot has what is not here: mistakes of a measurement set, effects of drives alone,
 #: smooth_friction, which coulomb_friction and presliding stand for, lest a robot rubs three times, nor the smooth forms
-#: of stiction and load_friction, smooth_object_friction, which object_friction stands for, finger_creep, which
-#: finger_compliance and viscoelastic_contact do, rate_limited_lag, which rate_limit and actuator_lag do,
+#: of stiction, load_friction and force_limit, smooth_object_friction, which object_friction stands for, finger_creep,
+#: which finger_compliance and viscoelastic_contact do, rate_limited_lag, which rate_limit and actuator_lag do,
 #: contact_friction, table_friction and object_mass, which object_body stands for, hunt_crossley_contact, for robots
 #: keep the scene's contact and stiffen it, and rounded_force_hysteresis, which force_hysteresis stands for. Nor has one
 #: an effect that came later (encoder_scale, return_spring, contact_damping, contact_onset, two_mass_backlash,
-#: viscous_friction, the asymmetries of motors, friction, lost motion and compliance), or such a variant: policies were
-#: compared on robots as they are.
+#: viscous_friction, object_pull, the asymmetries of motors, friction, lost motion and compliance), or such a variant:
+#: policies were compared on robots as they are.
 EFFECTS = {
     "command_deadband": Prior(0.3, 1 / 3, 3, "the paper's robot: its driver sends no command below 0.3 mm"),
     "command_delay": Prior(0.6, 0.1, 0.7, "assumed: from a bus cycle to one control step of 40 ms"),
@@ -56,7 +56,7 @@ EFFECTS = {
     ),
     "presliding": Prior(0.15, 1 / 3, 3, "assumed: as Coulomb friction"),
     "direction_friction": Prior(0.15, 0.2, 1, "found in a real drive (real-data.md); sizes assumed"),
-    "position_deadband": Prior(0.2, 0.2, 2, "found in a jaw (real-data.md); sizes assumed"),
+    "position_deadband": Prior(0.2, 0.2, 2, "found in a jaw (real-data.md); sizes assumed", variants=("",)),
     "back_emf": Prior(0.15, 2, 10, "assumed: as the limit of force"),
     "backlash": Prior(0.4, 0.2, 2, "assumed: 0.1 to 1.2 mm at a fingertip 45 mm from open to closed"),
     "finger_compliance": Prior(0.3, 0.1, 2, "assumed: printed fingers and soft pads, 500 to 10 000 N/m"),

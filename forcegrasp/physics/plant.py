@@ -91,6 +91,14 @@ class Plant(ContributedFields):
         return np.where(self._at_start[:, None], 0.0, given)
 
     @property
+    def asked_force(self) -> np.ndarray:
+        """What position loops ask of the motors now, before any limit, N or N·m, ``(n, motors)``; positive opens."""
+        gain, bias = (self.field(f"actuator_{kind}")[:, self.actuators] for kind in ("gainprm", "biasprm"))
+        off = self._ctrl[:, self.actuators] - self._controls(self.joint_position)
+        speed = self._command_scale * gain[..., 0] / -bias[..., 1] * self.velocity
+        return (gain[..., 0] * off + bias[..., 2] * speed) * self._drive_signs
+
+    @property
     def outside_force(self) -> np.ndarray:
         """What acts on the motors' joints from outside, N or N·m, ``(n, motors)``; positive opens.
 

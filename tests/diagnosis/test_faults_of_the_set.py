@@ -257,6 +257,12 @@ def row_early(values: np.ndarray) -> np.ndarray:
         ("sound", "force_tare", "at grasp 4", lambda i, g: {"force_n": g.force_n - [0.2 * (i >= 4), 0.0]}),
         (
             "sound",
+            "force_tare",
+            "another zero in grasp 4 (f_l_n by -0.4",
+            lambda i, g: {"force_n": g.force_n - [0.4 * (i == 4), 0.0]},
+        ),
+        (
+            "sound",
             "force_unit",
             "10 times in",
             lambda i, g: {"force_n": g.force_n * [1.0, 10.0 if i in (3, 5, 7) else 1]},

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from forcegrasp.diagnosis.diagnose_set import diagnose_set
+from forcegrasp.diagnosis.faults.odd_grasps import OddGrasp
 from forcegrasp.diagnosis.givens.left_out import is_answer, most_missed, without
 from forcegrasp.identify.verdict import Verdict
 from forcegrasp.reports.diagnosis import answer, diagnosis_json
@@ -60,6 +61,13 @@ def test_only_effects_that_explain_as_good_as_all_of_the_rest_are_an_answer(made
     assert is_answer(found) == good
 
 
+@pytest.mark.parametrize(("names", "good"), [("7", True), ("78", False)])
+def test_one_grasp_went_wrong_where_the_model_explains_all_others_and_several_may_show_an_effect(made_up, names, good):
+    odd = tuple(OddGrasp(name, "a", 9.0) for name in names)
+    found = dataclasses.replace(made_up.diagnosis("explained"), left="", error_after=1.0, floor=1.0, left_out=odd)
+    assert is_answer(found) == good
+
+
 @pytest.mark.parametrize(("of_model", "good"), [(2.9, False), (3.1, True)])
 def test_so_are_effects_that_leave_no_more_than_their_model_can_foretell(made_up, monkeypatch, of_model, good):
     found = dataclasses.replace(made_up.diagnosis("effect"), left="in all", error_after=3.0, floor=1.0)
@@ -94,6 +102,20 @@ def test_a_grasp_that_shook_is_left_out_and_told(shaken):
     assert of_json["name"] == "7"
     result = DiagnoseResult(loaded, diagnosis, None, (), ())
     assert result.model.warnings[0].startswith("fitted without 7, which the model misses far more")
+
+
+@pytest.mark.long
+def test_a_grasp_that_went_wrong_is_told_where_the_model_explains_all_others():
+    """Its left finger was read 3 mm off: no effect is of one grasp."""
+    loaded, model = with_model(light_set(grasps=12))
+    bad = loaded.measured.grasps[7]
+    off = dataclasses.replace(bad, position_m=bad.position_m + np.array([0.003, 0.0]))
+    grasps = tuple(off if g is bad else g for g in loaded.measured.grasps)
+    spoilt = dataclasses.replace(loaded, measured=dataclasses.replace(loaded.measured, grasps=grasps))
+    diagnosis, _ = diagnose_set(spoilt, model, ["force_deadzone", "command_delay"], 0, silent)
+    assert diagnosis.verdict is Verdict.EXPLAINED
+    assert diagnosis.error_after < diagnosis.floor < diagnosis.left_out[0].error / 2
+    assert f"Left out: grasp 7 of {bad.object} (" in answer(diagnosis)
 
 
 def test_a_set_without_grasps_has_all_others(shaken):

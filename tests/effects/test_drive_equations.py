@@ -219,6 +219,32 @@ def test_position_deadband_gives_no_force_within_it():
     assert np.array_equal(send(make("position_deadband", 5e-4), far, position=0.01), far)
 
 
+def test_position_deadband_that_subtracts_lets_the_force_grow_from_zero():
+    band, error = 5e-4, np.array([-2e-3, -6e-4, -4e-4, 0.0, 3e-4, 6e-4, 2e-3])
+    sent = send(make("position_deadband", band, variant="subtract"), 0.01 + error, position=0.01)
+    assert sent - 0.01 == pytest.approx(np.sign(error) * np.maximum(np.abs(error) - band, 0), abs=1e-15)
+
+
+@pytest.mark.parametrize("knee", [0.0, 0.4])
+def test_smooth_force_limit_bends_what_is_asked(knee):
+    """At rest the pads feel what the motor gives of kp (u − q)."""
+    limit, command = 0.3, 0.019
+    uses = [(get_effect("smooth_force_limit"), [limit, knee], "", [0]), (get_effect("force_limit"), [limit], "", [1])]
+    plant = make_plant(2, uses, "reference")
+    start(plant, [0, 1], np.zeros(2))
+    plant.advance(np.full((2, 2), command), 3000)
+    asked = GAIN * (plant.position[0] - command)
+    assert np.all(asked > 1.2 * limit)
+    assert plant.asked_force[0] == pytest.approx(-asked, rel=1e-3)
+    given = limit * np.tanh(asked / limit) if knee else np.full(2, limit)
+    assert -plant.motor_force[0] == pytest.approx(given, rel=0.02)
+    assert plant.pad_force[0].sum() == pytest.approx(given.sum(), rel=0.02)  # the table holds the object a little
+    assert (np.max(np.abs(plant.pad_force[0] - plant.pad_force[1])) < 1e-12) == (knee == 0)
+    start(plant, [0, 1], np.zeros(2))
+    plant.advance(plant.position + limit / GAIN)  # it opens
+    assert plant.motor_force[0] == pytest.approx(limit * np.tanh(1) if knee else limit, rel=0.02)
+
+
 def test_position_deadband_stops_short_and_lets_itself_be_pushed():
     band, command = 8e-4, 0.032
     for before, side in ((command + 0.008, 1), (command - 0.004, -1)):

@@ -452,6 +452,20 @@ def test_table_friction_is_felt_by_the_ground_alone(tier):
     assert pressed[1] > 0.1
 
 
+@pytest.mark.parametrize("tier", ["reference", "fast"])
+def test_object_pull_is_held_by_the_fingers(tier):
+    """At rest f_l − f_r + F_0 = 0, but for what the table holds; however hard they press."""
+    pull = np.array([0.1, -0.1, 0.1, -0.1])
+    plant = make_plant(4, [(get_effect("object_pull"), pull[:, None], "", range(4))], tier)
+    start(plant, range(4), np.zeros(4))
+    plant.advance(np.repeat([0.021, 0.018], 2)[:, None] * [1, 1], 2000)
+    assert np.all(plant.pad_force > 0.1)
+    between = plant.pad_force[:, 0] - plant.pad_force[:, 1]
+    by_pull = (between[0::2] - between[1::2]) / 2
+    assert by_pull == pytest.approx([-0.1, -0.1], rel=0.1)
+    assert np.all(np.sign(plant.object_position) == np.sign(pull))
+
+
 @pytest.mark.parametrize("priorities", [(0, 1), (1, 1), (2, 1)])
 @pytest.mark.parametrize("solref", [(0.02, 1.0), (-2500.0, -100.0)])
 def test_a_ground_that_decides_changes_nothing_by_itself(priorities, solref):

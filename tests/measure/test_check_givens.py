@@ -9,7 +9,7 @@ import pytest
 from measured_rig import make_grasp, make_set
 
 from forcegrasp.measure import MeasurementSet
-from forcegrasp.measure.check_givens import check_givens, clock_factor, find_tare
+from forcegrasp.measure.check_givens import check_givens, clock_factor, find_odd_zeros, find_tare
 
 PERIOD_S = 0.04
 
@@ -74,6 +74,36 @@ def test_a_zero_that_changes_for_good(sound):
     assert tare.change_n == pytest.approx([-0.3, 0.0], abs=0.02)
     (warning,) = check_givens(pressed(sound, lambda i, f: f - 0.3 * (i >= 4)), PERIOD_S)
     assert "grasp 'g4': from here on forces are shifted (f_l_n by -0.3" in warning
+
+
+EXACT_N = 6.4e-3  #: how exactly the zeros of these grasps are known
+SCATTER_N = EXACT_N * np.array([-5, 3, 4, -4, 6, 0])
+
+
+@pytest.mark.parametrize(("shift", "told"), [(-0.3, 1), (0.3, 0)])
+def test_a_single_grasp_that_starts_from_another_zero(sound, shift, told):
+    """Where it reads more, fingers may press from the start on: a diagnosis tries it, and nobody is warned."""
+    spoilt = pressed(sound, lambda i, f: f + np.array([shift * (i == 5), 0.0]))
+    (odd,) = find_odd_zeros(spoilt)
+    assert (odd.first, odd.end) == (5, 6)
+    assert odd.change_n == pytest.approx([shift, 0.0], abs=0.02)
+    warnings = check_givens(spoilt, PERIOD_S)
+    assert len(warnings) == told
+    assert all("grasp 'g5': forces are shifted in this grasp alone (f_l_n by -0.3" in one for one in warnings)
+
+
+@pytest.mark.parametrize(
+    "drift",
+    [
+        lambda i, f: f,
+        lambda i, f: f + 0.3 * (i % 2),  # zeros wander
+        lambda i, f: f - 0.3 * (i in (1, 5)),  # a quarter of eight
+        lambda i, f: f - 0.005 * (i == 5),  # less than noise
+        lambda i, f: f + SCATTER_N[i] - 20 * EXACT_N * (i == 5),  # they scatter by as much
+    ],
+)
+def test_zeros_of_which_no_few_are_odd(sound, drift):
+    assert find_odd_zeros(pressed(sound, drift)) == []
 
 
 def test_a_small_change_of_zero_amid_noise_and_grasps_that_start_pressed(sound):

@@ -25,7 +25,7 @@ from forcegrasp.identify.fit import Fit
 from forcegrasp.identify.intervals import listed
 from forcegrasp.identify.loading import Loaded
 from forcegrasp.identify.target import Target
-from forcegrasp.measure.check_givens import Tare, clock_factor, find_tare, times
+from forcegrasp.measure.check_givens import Tare, clock_factor, find_odd_zeros, find_tare, times
 from forcegrasp.measure.force_units import find_odd_unit
 from forcegrasp.measure.schema import MeasuredGrasp, MeasurementSet
 from forcegrasp.models.model_file import Fitted, Model
@@ -144,17 +144,18 @@ def suspects(loaded: Loaded[MeasurementSet], target: Target, fit: Fit) -> list[F
     if tare is not None:
         tare, left = _sharper(tare, target, fit)
     if tare is not None and (drift is None or left <= drift.left):
-        first = measured.grasps[tare.first].name
-        changed = [f"{n} by {x:+.3g} N" for n, x in zip(measured.columns.force, tare.change_n, strict=True) if x]
-        words = f"the zero changes at grasp {first}: {listed(changed)}"
-        right = _changed(loaded, lambda index, g: _levelled(g, tare) if index >= tare.first else g)
-        found.append(Fault("force_tare", words, "whether sensors were set to zero there", right))
+        words = f"the zero changes at grasp {measured.grasps[tare.first].name}: {tare.words(measured)}"
+        found.append(_tared(loaded, [tare], words, "whether sensors were set to zero there"))
     elif drift is not None:
         order = order_in_session(measured.grasps)
         check = "whether sensors or motors warm up meanwhile: grasp one object first and last, and compare"
         right = _changed(loaded, lambda index, g: drift.taken_out(g, order[index]))
         words = drift.words(measured.columns.force)
         found.append(Fault(f"force_{drift.of}_drift", words, check, right, worth=LEAST_SHARE))
+    elif odd := [_sharper(one, target, fit)[0] for one in find_odd_zeros(measured)]:
+        each = [f"grasp {measured.grasps[one.first].name} ({one.words(measured)})" for one in odd]
+        words = f"forces have another zero in {listed(each)} alone"
+        found.append(_tared(loaded, odd, words, "whether sensors were set to zero there while something was held"))
     if (unit := find_odd_unit(measured)) is not None:
         words = f"column {measured.columns.force[unit.channel]} {unit.words(measured.grasps)}"
         right = _changed(loaded, lambda index, g: unit.put_right(g) if index in unit.grasps else g)
@@ -281,7 +282,7 @@ def _sharper(tare: Tare, target: Target, fit: Fit) -> tuple[Tare, float]:
     changed = np.flatnonzero(tare.change_n)
     per_unit = np.zeros((*target.signals.shape, len(changed)))
     for column, channel in enumerate(changed):
-        per_unit[tare.first :, :, target.axis.forces.start + channel, column] = 1.0
+        per_unit[tare.first : tare.end, :, target.axis.forces.start + channel, column] = 1.0
     step, left = linear_step(target, fit, Background(fit, ()), per_unit)
     change = tare.change_n.copy()
     change[changed] = np.where(
@@ -290,8 +291,14 @@ def _sharper(tare: Tare, target: Target, fit: Fit) -> tuple[Tare, float]:
     return dataclasses.replace(tare, change_n=change), left
 
 
-def _levelled(grasp: MeasuredGrasp, tare: Tare) -> MeasuredGrasp:
-    return dataclasses.replace(grasp, force_n=grasp.force_n - tare.change_n)
+def _tared(loaded: Loaded[MeasurementSet], tares: Sequence[Tare], words: str, check: str) -> Fault:
+    """Zeros that are others in some grasps, and the set with the usual ones there."""
+
+    def levelled(index: int, grasp: MeasuredGrasp) -> MeasuredGrasp:
+        changes = [tare.change_n for tare in tares if tare.first <= index < tare.end]
+        return dataclasses.replace(grasp, force_n=grasp.force_n - sum(changes)) if changes else grasp
+
+    return Fault("force_tare", words, check, _changed(loaded, levelled))
 
 
 def _one_row_later(grasp: MeasuredGrasp, kinds: Sequence[str]) -> MeasuredGrasp:

@@ -20,6 +20,7 @@ from forcegrasp.identify.cross_validation import rms_of_grasps
 from forcegrasp.identify.fit import Fit
 from forcegrasp.identify.loading import Loaded
 from forcegrasp.identify.target import Target
+from forcegrasp.identify.verdict import Verdict
 from forcegrasp.measure import MeasurementSet
 
 # A grasp is missed by far if its error is so many times the median of all.
@@ -64,8 +65,11 @@ def without(loaded: Loaded[MeasurementSet], names: Sequence[str]) -> Loaded[Meas
 def is_answer(found: Diagnosis) -> bool:
     """Whether effects explain as good as all that the other grasps show: else nothing was gained by leaving out any.
 
-    Or all that the model with them can foretell: others may shake as well, a little.
+    Or all that the model with them can foretell: others may shake as well, a little. Where the model needs no effect
+    for the others, a single grasp went wrong; several may show together what it lacks.
     """
+    if found.verdict is Verdict.EXPLAINED:
+        return len(found.left_out) == 1
     little = not found.left or (found.explained >= EXPLAINED_FAR and found.error_after <= MUCH * found.floor)
     return found.verdict.lacks_effects and (little or found.error_after <= found.floor_of_model)
 
