@@ -16,6 +16,7 @@ from forcegrasp.identify.noise_floor import at_floor, most_at_floor
 from forcegrasp.identify.target import Target
 from forcegrasp.reports import between_sets, figures
 from forcegrasp.reports.html import Answer, Command, Picture, Section, Table, Text
+from forcegrasp.reports.physics_step import short_enough, step_of_scene
 from forcegrasp.reports.view import view_section
 
 # Beyond it an error below the floor is excused by the simulation's numerical error, and not by noise.
@@ -143,7 +144,9 @@ def answer(comparison: Comparison) -> str:
         where = f"on the {comparison.target.part}s that it was fitted to (too few to hold any out)"
     error = f"The model's error {where} is {value:.2f} × the sensor noise"
     half, other = comparison.numerical
-    cure = "a smaller timestep" if 2 * half > other else "<flag multiccd='disable'/> or rounder pads"
+    cure = "<flag multiccd='disable'/> or rounder pads"
+    if 2 * half > other:
+        cure = f'<option timestep="{short_enough(step_of_scene(comparison.target.gripper), half):g}"/>'
     own = float(np.sqrt(1 + 4 * half**2 + other**2))  # the floor without what noise makes unsure of the start
     if at_floor(value, floor) and not at_floor(value, _MOST_NOISE):
         cause = "the simulation's own numerical error" if own > _ALL_NOISE else "what is unsure of where windows start"

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import ceil, log2
+
+import numpy as np
 
 from forcegrasp.diagnosis.result import Diagnosis
 from forcegrasp.identify.cross_validation import rms
+from forcegrasp.identify.fit import Fit
 from forcegrasp.identify.noise_floor import beyond_fit
+from forcegrasp.identify.target import Target
 from forcegrasp.identify.verdict import Verdict
+from forcegrasp.physics.gripper import Gripper
 
 # Half a step may change what is foretold by this share of the noise, and with steps short enough by no more than that.
 _TOO_LONG, _SHORT_ENOUGH = 0.33, 0.15
@@ -23,23 +29,43 @@ def shorter_step(diagnosis: Diagnosis) -> float | None:
     of_half = _of_half(diagnosis)
     if of_half < _TOO_LONG:
         return None
-    return step_of_scene(diagnosis) / 2 ** ceil(log2(of_half / _SHORT_ENOUGH))
+    return short_enough(step_of_scene(diagnosis.target.gripper), of_half)
 
 
-def step_of_scene(diagnosis: Diagnosis) -> float:
+def short_enough(step_s: float, of_half: float) -> float:
+    """The physics step, s, with which half of it would change next to nothing of what is foretold.
+
+    Args:
+      step_s: the scene's own.
+      of_half: what half of that changes, ÷ noise.
+    """
+    return step_s / 2 ** max(1, ceil(log2(of_half / _SHORT_ENOUGH)))
+
+
+def step_of_scene(gripper: Gripper) -> float:
     """The scene's own physics step, s."""
-    return float(diagnosis.target.gripper.compile().opt.timestep)
+    return float(gripper.compile().opt.timestep)
 
 
 def step_warning(diagnosis: Diagnosis) -> str:
     """What too long a step costs, and what to do; empty if it is short enough."""
-    shorter = shorter_step(diagnosis)
-    if shorter is None:
+    if shorter_step(diagnosis) is None:
         return ""
+    return _warning(step_of_scene(diagnosis.target.gripper), _of_half(diagnosis))
+
+
+def warning_of_fit(fit: Fit, target: Target, numerical: Sequence[np.ndarray]) -> str:
+    """The same of a fit that did not converge; empty if its steps are short enough."""
+    of_half = rms(beyond_fit(fit, numerical)[0], target)
+    return "" if of_half < _TOO_LONG else _warning(step_of_scene(target.gripper), of_half)
+
+
+def _warning(step_s: float, of_half: float) -> str:
     return (
-        f"half the scene's physics step of {1e3 * step_of_scene(diagnosis):g} ms changes what the model foretells by"
-        f" {_of_half(diagnosis):.2g} × noise: what is missing may hide behind that, or look like something else. With"
-        f' <option timestep="{shorter:g}"/> in the scene it would be {_SHORT_ENOUGH:g} at most, as it falls with it'
+        f"half the scene's physics step of {1e3 * step_s:g} ms changes what the model foretells by {of_half:.2g} ×"
+        " noise: what is missing may hide behind that, or look like something else. With"
+        f' <option timestep="{short_enough(step_s, of_half):g}"/> in the scene it would be {_SHORT_ENOUGH:g} at most,'
+        " as it falls with it"
     )
 
 

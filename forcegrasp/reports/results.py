@@ -31,6 +31,7 @@ from forcegrasp.reports import fit as fit_report
 from forcegrasp.reports import next_step
 from forcegrasp.reports.diagnosis_box import answer_box
 from forcegrasp.reports.html import Answer, Command, Section
+from forcegrasp.reports.physics_step import warning_of_fit
 from forcegrasp.short_repr import ShortRepr, counted, cut, some
 
 #: The base model that compare and diagnose fit where none is given, beside their report.
@@ -399,7 +400,9 @@ ModelResult = CompareResult | FitResult | DiagnoseResult | AddResult
 
 def base_model(base: BaseFit, target: Target, loaded: Loaded[MeasurementSet]) -> Model:
     """A fitted base model, which says if it is not to be believed."""
-    model = model_of(base.fit, target, loaded, numerical_error(base.fit, target))
+    numerical = numerical_error(base.fit, target)
+    model = model_of(base.fit, target, loaded, numerical)
     if base.converged:
         return model
-    return dataclasses.replace(model, warnings=(f"the fit did not converge: {base.reason}", *model.warnings))
+    why = (f"the fit did not converge: {base.reason}", warning_of_fit(base.fit, target, numerical))
+    return dataclasses.replace(model, warnings=(*filter(None, why), *model.warnings))

@@ -9,10 +9,11 @@ import pytest
 
 from forcegrasp.diagnosis.result import Diagnosis
 from forcegrasp.identify.verdict import Verdict
+from forcegrasp.reports import results
 from forcegrasp.reports.diagnosis import answer, lines
 from forcegrasp.reports.diagnosis_box import answer_box
 from forcegrasp.reports.next_step import after_diagnosis
-from forcegrasp.reports.physics_step import shorter_step, step_of_scene
+from forcegrasp.reports.physics_step import shorter_step, step_of_scene, warning_of_fit
 
 
 def with_error_of_steps(diagnosis: Diagnosis, size: float, left: str = "in all") -> Diagnosis:
@@ -24,7 +25,7 @@ def with_error_of_steps(diagnosis: Diagnosis, size: float, left: str = "in all")
 @pytest.mark.parametrize("verdict", ["unknown", "not_fitted", "effect"])
 def test_a_step_that_would_do_is_told_and_is_the_first_thing_to_do(made_up, verdict):
     diagnosis = with_error_of_steps(dataclasses.replace(made_up.diagnosis(verdict), error_after=9.0), 0.5)
-    step = step_of_scene(diagnosis)
+    step = step_of_scene(diagnosis.target.gripper)
     assert shorter_step(diagnosis) == step / 4  # an eighth of the noise, where 0.15 will do
     told = f"timestep {step / 4:g} s"
     commands = after_diagnosis(diagnosis, None, "my_set", "known.yaml", "found.yaml")
@@ -40,3 +41,15 @@ def test_steps_that_are_short_enough_are_not_spoken_of(made_up):
     assert shorter_step(dataclasses.replace(unknown, left="in all")) is None, "nobody simulated with half the step"
     explained = dataclasses.replace(made_up.diagnosis("explained"), verdict=Verdict.EXPLAINED)
     assert shorter_step(with_error_of_steps(explained, 0.5, left="")) is None, "nothing is left to be told"
+
+
+@pytest.mark.parametrize(("size", "told"), [(0.5, True), (0.3, False)])
+def test_a_fit_that_did_not_converge_says_so_too(made_up, monkeypatch, size, told):
+    diagnosis = with_error_of_steps(made_up.diagnosis("not_fitted"), size)
+    monkeypatch.setattr(results, "numerical_error", lambda *_: diagnosis.numerical)
+    base = dataclasses.replace(diagnosis.base, converged=False, reason="the error still falls")
+    first, *others = results.base_model(base, diagnosis.target, made_up.loaded).warnings
+    assert first == "the fit did not converge: the error still falls"
+    step = step_of_scene(diagnosis.target.gripper) / 4
+    assert any(f'<option timestep="{step:g}"/> in the scene' in line for line in others) == told
+    assert bool(warning_of_fit(diagnosis.fit, diagnosis.target, diagnosis.numerical)) == told
