@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
 
 from forcegrasp.diagnosis.result import Candidate, Step, kept_steps
-from forcegrasp.diagnosis.search import needless
+from forcegrasp.diagnosis.search import needless, search
 from forcegrasp.diagnosis.search.needless import drop_all_needless, drop_needless, simplify
+from forcegrasp.diagnosis.search.so_far import SoFar
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.effects.for_gripper import effect_of
 from forcegrasp.effects.setting import EffectSetting
@@ -88,6 +91,29 @@ def test_all_that_is_no_longer_needed_goes_and_its_step_with_it(found):
     assert steps == [step]
     assert [one.effect.name for one in less.problem.effects] == ["coulomb_friction"]
     assert drop_all_needless(study, [first, step], fit, 2) == ([first, step], fit)  # they were given
+    assert drop_all_needless(study, [first, step], fit, 0, {"coulomb_friction"}) == ([first, step], fit)  # not doubted
+
+
+@pytest.mark.parametrize("at_once", [True, False])
+def test_what_was_found_at_once_is_asked_for_again_at_the_end(found, monkeypatch, at_once):
+    """Beside others that have become simpler since; what was found one by one was held against these already."""
+    study, step, fit = found("motor_offset", "coulomb_friction")
+    (last,) = step.candidates
+    last = dataclasses.replace(last, without=fit if at_once else None)
+    first = dataclasses.replace(last, setting=fit.effect("motor_offset"))
+    steps = [
+        dataclasses.replace(step, effects=(one.effect.name,), candidates=(one,), error_before=before, error_after=after)
+        for one, before, after in ((first, 5.0, 4.0), (last, 4.0, 1.0))
+    ]
+    for name in ("simplify", "merge", "_look_beside_all"):
+        monkeypatch.setattr(search, name, lambda study, steps, fit, *_: (steps, fit))
+    so_far = SoFar((study, steps, fit))
+    search._tidy_up(so_far, cast(Any, SimpleNamespace(given=0, effects=())))
+    _, left, less = so_far.all
+    names = ["coulomb_friction"] if at_once else ["motor_offset", "coulomb_friction"]
+    assert [one.effect.name for one in less.problem.effects] == names
+    assert [one.effects for one in kept_steps(left)] == [(name,) for name in names]
+    assert left[0].error_before == 5.0
 
 
 @pytest.mark.parametrize(

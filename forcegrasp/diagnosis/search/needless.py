@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from functools import partial
 
 import numpy as np
@@ -158,7 +158,9 @@ def _with_simpler(step: Step, name: str, fit: Fit) -> Step:
     return dataclasses.replace(step, effects=names, candidates=(first, *others), error_after=tried.error_after)
 
 
-def drop_all_needless(study: Study, steps: Sequence[Step], fit: Fit, given: int) -> tuple[list[Step], Fit]:
+def drop_all_needless(
+    study: Study, steps: Sequence[Step], fit: Fit, given: int, of: Collection[str] | None = None
+) -> tuple[list[Step], Fit]:
     """The steps whose effects held-out grasps still ask for, and the fit without the others.
 
     Args:
@@ -166,9 +168,12 @@ def drop_all_needless(study: Study, steps: Sequence[Step], fit: Fit, given: int)
       steps: that found the effects.
       fit: with all effects.
       given: as for :func:`drop_needless`.
+      of: names of the effects that are doubted; all by default.
     """
     left = list(steps)
-    while found := _without_needless(study, fit, [one.effect.name for one in fit.problem.effects[given:]]):
+    while found := _without_needless(
+        study, fit, [one.effect.name for one in fit.problem.effects[given:] if of is None or one.effect.name in of]
+    ):
         name, fit = found
         study.progress(f"{name} is needless now")
         left = [step for step in left if name not in step.effects[:1]]
