@@ -152,7 +152,10 @@ def _grasp(gripper: Gripper) -> Iterator[Finding]:
         yield note("end stops", f"{told}; give joints the range that your gripper's own stops leave them, {_PAGE}")
     if (heavier := _heavier(plant)) > _HEAVIER:
         told = f"implicit steps of {1e3 * plant.dt:g} ms make motors {100 * heavier:.0f} % heavier than the scene says"
-        yield note("time step", f"{told}, and forces that are fitted to a set with them; shorter steps do so less")
+        yield note("time step", f"{told}; gains and forces that are fitted may be off by half as much, {_PAGE}")
+    if (lighter := _lighter(plant)) > _HEAVIER:
+        told = f"Euler's steps of {1e3 * plant.dt:g} ms make motors up to {100 * lighter:.0f} % lighter"
+        yield note("time step", f'{told}, as kv acts by the speed at their start; take integrator="implicitfast"')
     if (speed := _creep(gripper, plant)) > _CREEPS:
         told = f"creeps by {1e3 * speed:.2g} mm a second under half of its frictionloss; dry friction would hold it"
         yield note("object", f"{told}; make it harder by solreffriction and solimpfriction, {_PAGE}")
@@ -242,11 +245,33 @@ def _heavier(plant: Plant) -> float:
 
     model = plant.model
     resists = plant.gearing**2 @ model.dof_damping
-    of_joints = model.actuator_trntype[plant.actuators] == mujoco.mjtTrn.mjTRN_JOINT
     if model.opt.integrator in (mujoco.mjtIntegrator.mjINT_IMPLICIT, mujoco.mjtIntegrator.mjINT_IMPLICITFAST):
-        per_speed = -model.actuator_biasprm[plant.actuators, 2] * model.actuator_gear[plant.actuators, 0] ** 2
-        resists += np.where(of_joints, per_speed, 0.0)
+        resists += _force_per_speed(plant)
     return float(np.max(plant.dt * resists / plant.inertia[0]))
+
+
+def _lighter(plant: Plant) -> float:
+    """Largest share of a motor's inertia M by which it seems lighter as Euler's steps h take its servo: h k_v ÷ M.
+
+    The speed at a step's beginning is one step older than that at its end, with which implicit steps add as much.
+    """
+    import mujoco
+    import numpy as np
+
+    if plant.model.opt.integrator != mujoco.mjtIntegrator.mjINT_EULER:
+        return 0.0
+    return float(np.max(plant.dt * _force_per_speed(plant) / plant.inertia[0]))
+
+
+def _force_per_speed(plant: Plant) -> np.ndarray:
+    """What servos of joints give against their speed, N·s/m or N·m·s/rad, ``(motors,)``."""
+    import mujoco
+    import numpy as np
+
+    model = plant.model
+    of_joints = model.actuator_trntype[plant.actuators] == mujoco.mjtTrn.mjTRN_JOINT
+    per_speed = -model.actuator_biasprm[plant.actuators, 2] * model.actuator_gear[plant.actuators, 0] ** 2
+    return np.where(of_joints, per_speed, 0.0)
 
 
 def _creep(gripper: Gripper, plant: Plant) -> float:

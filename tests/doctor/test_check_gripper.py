@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from forcegrasp.cli.main import main
-from forcegrasp.doctor.gripper import _creep, _heavier, check_gripper
+from forcegrasp.doctor.gripper import _creep, _heavier, _lighter, check_gripper
 from forcegrasp.errors import ConfigError
 from forcegrasp.physics import load_gripper, shipped_grippers
 from forcegrasp.physics.plant import Plant, write_base
@@ -68,6 +68,19 @@ def test_how_much_heavier_steps_make_a_motor_is_what_a_push_shows(changed, servo
     still, pushed = (_speed_after_a_step(plant, push) for push in (0.0, 0.5))
     inertia = 0.5 * plant.dt / (pushed - still)
     assert inertia / plant.inertia[0] == pytest.approx(1 + _heavier(plant), rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("servo", "integrator", "told"), [("40", "Euler", True), ("20", "Euler", False), ("40", "RK4", False)]
+)
+def test_a_servo_whose_steps_make_its_motor_lighter(changed, servo, integrator, told):
+    lines = {'integrator="implicitfast"': f'integrator="{integrator}"', 'kv="20"': f'kv="{servo}"'}
+    path = changed(xml=lines)
+    notes = said(path).get("note", [])
+    lighter = 'lighter, as kv acts by the speed at their start; take integrator="implicitfast"'
+    assert any(lighter in line for line in notes) == told
+    plant = Plant(load_gripper(path), 1, threads=1)
+    assert (_lighter(plant) > 0) == (integrator == "Euler")
 
 
 @pytest.mark.parametrize(
