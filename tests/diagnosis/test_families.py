@@ -13,9 +13,10 @@ from forcegrasp.diagnosis.add_effect import add_effect
 from forcegrasp.diagnosis.diagnose_set import diagnose_set
 from forcegrasp.diagnosis.evidence import add_nothing
 from forcegrasp.diagnosis.result import kept_steps
-from forcegrasp.diagnosis.search import step
+from forcegrasp.diagnosis.search import finalists as finalists_module
+from forcegrasp.diagnosis.search.finalists import Finalists
 from forcegrasp.diagnosis.search.search import left_to_try
-from forcegrasp.diagnosis.search.step import _Start
+from forcegrasp.diagnosis.search.start import Start
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.effects import get_effect
 from forcegrasp.effects.for_gripper import effect_of, effects_of
@@ -190,10 +191,10 @@ def test_what_takes_an_effects_place_does_so_though_another_seemed_better_at_fir
     )
     nothing = (np.zeros_like(made_up.base.fit.residual),) * 2
     study = Study(made_up.target, Simulators(made_up.base.fit.problem), (), nothing)
-    start = _Start(study, made_up.base.fit)
-    monkeypatch.setattr(step, "to_the_end", lambda rough, _: rough)
-    monkeypatch.setattr(start, "_judge", lambda *_: dataclasses.replace(other, gains=np.full(8, 10.0)))
-    ordered, _ = start.refine_on_reference_tier([[other], [richer]], [], np.zeros(1))
+    start = Start(study, made_up.base.fit)
+    monkeypatch.setattr(finalists_module, "to_the_end", lambda rough, _: rough)
+    monkeypatch.setattr(start, "judge", lambda *_: dataclasses.replace(other, gains=np.full(8, 10.0)))
+    ordered, _ = Finalists(start, [], np.zeros(1)).fitted([[other], [richer]])
     assert [(c.effect.name, c.replaces) for c in ordered] == [("back_emf", "force_limit"), ("rate_limit", "")]
 
 
@@ -210,15 +211,15 @@ def test_variants_that_rough_fits_cannot_tell_apart_are_all_fitted_to_the_end(ma
         for variant, share in (("loose", 1.0), ("play", 1.001), ("command", 1.02))
     )
     nothing = (np.zeros_like(fit.residual),) * 2
-    start, ended = _Start(Study(made_up.target, Simulators(fit.problem), (), nothing), fit), []
+    start, ended = Start(Study(made_up.target, Simulators(fit.problem), (), nothing), fit), []
 
     def to_the_end(rough, _):
         ended.append(rough)
         return dataclasses.replace(rough, residual=0.5 * rough.residual) if rough is play.fit else rough
 
-    monkeypatch.setattr(step, "to_the_end", to_the_end)
-    monkeypatch.setattr(start, "_judge", lambda fit, *_: dataclasses.replace(loose, fit=fit))
-    ordered, _ = start.refine_on_reference_tier([[loose, play, command]], [], np.zeros(1))
+    monkeypatch.setattr(finalists_module, "to_the_end", to_the_end)
+    monkeypatch.setattr(start, "judge", lambda fit, *_: dataclasses.replace(loose, fit=fit))
+    ordered, _ = Finalists(start, [], np.zeros(1)).fitted([[loose, play, command]])
     assert [any(one is rough for one in ended) for rough in (loose.fit, play.fit, command.fit)] == [True, True, False]
     assert [c.fit.cost for c in ordered] == [pytest.approx(0.25 * play.fit.cost)]
 

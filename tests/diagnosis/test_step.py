@@ -12,14 +12,19 @@ from forcegrasp.diagnosis.families import look_alike, roughly_as
 from forcegrasp.diagnosis.faults.odd_grasps import OddGrasp
 from forcegrasp.diagnosis.few import with_few
 from forcegrasp.diagnosis.result import Step, kept_steps
-from forcegrasp.diagnosis.search import at_once, conclusion, search
+from forcegrasp.diagnosis.search import at_once, conclusion, rough_fits, search
+from forcegrasp.diagnosis.search import finalists as finalists_module
 from forcegrasp.diagnosis.search import refine as refine_module
+from forcegrasp.diagnosis.search import start as start_module
 from forcegrasp.diagnosis.search import step as step_module
+from forcegrasp.diagnosis.search.finalists import Finalists
 from forcegrasp.diagnosis.search.left_over import leaves_forms, leaves_little
 from forcegrasp.diagnosis.search.refine import best_as_given, fit_with, refine_anyway
+from forcegrasp.diagnosis.search.rough_fits import RoughFits
 from forcegrasp.diagnosis.search.screen import Screen
 from forcegrasp.diagnosis.search.stalled_base import better_without
-from forcegrasp.diagnosis.search.step import _Start, look_further
+from forcegrasp.diagnosis.search.start import Start
+from forcegrasp.diagnosis.search.step import look_further
 from forcegrasp.diagnosis.signatures import Score
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.effects import catalogue
@@ -86,7 +91,7 @@ def test_whatever_promises_half_of_the_best_is_refitted(creeping, monkeypatch):
     refitted: list[str] = []
     monkeypatch.setattr(step_module, "_REFITTED", 1)
     monkeypatch.setattr(
-        _Start, "refit", lambda self, scores, null: refitted.extend(s.setting.effect.name for s in scores) or []
+        RoughFits, "of", lambda self, scores: refitted.extend(s.setting.effect.name for s in scores) or []
     )
 
     class Three(Screen):
@@ -113,19 +118,19 @@ def test_a_rough_fit_that_gained_nearly_as_much_is_held_against_what_leaves_more
     vector[-2] *= 0.8
     rough = fit_once(study.target, problem, study.simulators, vector, base.fit.correction, rounds=0, free=fixed)
     rough = dataclasses.replace(truth, fit=rough, share=0.8 * ahead.share, gains=0.8 * ahead.gains)
-    start = _Start(study, base.fit)
-    monkeypatch.setattr(_Start, "_at_the_end", lambda _, some, __: [at_the_end[c.effect] for c in some])
-    monkeypatch.setattr(_Start, "_better_look_alikes", lambda *_: [])
-    ordered, _ = start.refine_on_reference_tier([[ahead], [rough]], [PRESLIDING, SMOOTH], np.zeros(1))
+    finalists = Finalists(Start(study, base.fit), [PRESLIDING, SMOOTH], np.zeros(1))
+    monkeypatch.setattr(Finalists, "_at_the_end", lambda _, some, __: [at_the_end[c.effect] for c in some])
+    monkeypatch.setattr(Finalists, "_better_look_alikes", lambda *_: [])
+    ordered, _ = finalists.fitted([[ahead], [rough]])
     assert [one.effect for one in ordered] == [SMOOTH, PRESLIDING]
     assert ordered[0].error_after < 1.05
-    assert start._rivals(ahead, [rough], set()) == [rough]
-    assert start._rivals(ahead, [rough], {"smooth_friction"}) == []
-    assert start._rivals(ahead, [dataclasses.replace(rough, fit=base.fit)], set()) == []
-    assert not start._leads_further(ahead, truth.fit, "it")
+    assert finalists._rivals(ahead, [rough], set()) == [rough]
+    assert finalists._rivals(ahead, [rough], {"smooth_friction"}) == []
+    assert finalists._rivals(ahead, [dataclasses.replace(rough, fit=base.fit)], set()) == []
+    assert not finalists._leads_further(ahead, truth.fit, "it")
     # what contains the best one takes its place in the next step, if it earns that
     simple = dataclasses.replace(ahead, setting=EffectSetting.typical(effect_of("coulomb_friction", light_gripper())))
-    assert start._rivals(simple, [rough], set()) == []
+    assert finalists._rivals(simple, [rough], set()) == []
 
 
 @pytest.mark.parametrize(("known", "times", "errors"), [(False, 1.3, 1.0), (True, 1.3, 2.0), (True, 1.6, 1.0)])
@@ -134,7 +139,7 @@ def test_where_effects_leave_little_a_gain_is_to_be_two_standard_errors(creeping
     study, base = creeping
     fit = alike.candidates[0].fit if known else base.fit
     noise = np.random.default_rng(2).standard_normal(fit.residual.shape) * study.target.mask[..., None]
-    start = _Start(study, dataclasses.replace(fit, residual=times * noise))
+    start = Start(study, dataclasses.replace(fit, residual=times * noise))
     assert start.error == pytest.approx(times, rel=0.05)
     count = len(study.target.grasps)
     even = 10.0 * np.sqrt(count / (count - 1)) * np.resize([-1.0, 1.0], count)  # their standard deviation is 10
@@ -151,10 +156,10 @@ def test_what_leaves_more_than_the_model_without_it_is_fitted_to_the_end_only_if
     study, base = creeping
     (best, *_), fitted = alike.candidates, []
     worse = dataclasses.replace(best, fit=dataclasses.replace(best.fit, residual=1.01 * base.fit.residual))
-    monkeypatch.setattr(_Start, "_leads_further", lambda *_: leads)
-    monkeypatch.setattr(_Start, "_at_the_end", lambda _, some, __: fitted.extend(some) or some)
-    start = _Start(study, base.fit)
-    ordered, _ = start.refine_on_reference_tier([[dataclasses.replace(worse, gains=-best.gains)]], [], np.zeros(1))
+    monkeypatch.setattr(Finalists, "_leads_further", lambda *_: leads)
+    monkeypatch.setattr(Finalists, "_at_the_end", lambda _, some, __: fitted.extend(some) or some)
+    finalists = Finalists(Start(study, base.fit), [], np.zeros(1))
+    ordered, _ = finalists.fitted([[dataclasses.replace(worse, gains=-best.gains)]])
     assert bool(fitted) == leads
     assert [one.effect for one in ordered] == [best.effect]
 
@@ -164,9 +169,7 @@ def test_what_was_fitted_for_another_screen_is_not_fitted_again(creeping, alike,
     study, base = creeping
     screen = promising("presliding", "smooth_friction")([PRESLIDING, SMOOTH], study)
     rng, refitted = np.random.default_rng(0), []
-    monkeypatch.setattr(
-        _Start, "refit", lambda self, scores, null: refitted.extend(s.setting.effect for s in scores) or []
-    )
+    monkeypatch.setattr(RoughFits, "of", lambda self, scores: refitted.extend(s.setting.effect for s in scores) or [])
     nothing = [dataclasses.replace(c, gains=0 * c.gains, share=0.0) for c in alike.candidates if c.effect is PRESLIDING]
     before = dataclasses.replace(alike, effects=(), candidates=tuple(nothing))
     step = look_further(study, base.fit, screen, [PRESLIDING, SMOOTH], rng, before=before.candidates)
@@ -185,24 +188,26 @@ def test_what_is_worth_no_fit_roughly_is_not_fitted_to_the_end_where_others_were
     nothing = dataclasses.replace(best, gains=0 * best.gains)
     fitted: list[str] = []
     monkeypatch.setattr(
-        _Start, "_at_the_end", lambda _, some, __: fitted.extend(c.effect.name for c in some) or [nothing for _ in some]
+        Finalists,
+        "_at_the_end",
+        lambda _, some, __: fitted.extend(c.effect.name for c in some) or [nothing for _ in some],
     )
     for gains in (other.gains, 0 * other.gains + 0.01):
         fitted.clear()
-        start = _Start(study, base.fit)
-        start.refine_on_reference_tier([[best], [dataclasses.replace(other, gains=gains)]], [], np.zeros(1))
+        finalists = Finalists(Start(study, base.fit), [], np.zeros(1))
+        finalists.fitted([[best], [dataclasses.replace(other, gains=gains)]])
         assert (other.effect.name in fitted) == (gains.sum() > 1)
 
 
 @pytest.mark.long
 def test_signatures_that_promise_nothing_ask_for_no_fit_to_the_end_where_rough_fits_show_nothing(creeping, monkeypatch):
-    monkeypatch.setattr(_Start, "_at_the_end", lambda _, some, __: pytest.fail("fitted to the end") if some else [])
-    monkeypatch.setattr(_Start, "shows", lambda *_: False)
+    monkeypatch.setattr(Finalists, "_at_the_end", lambda _, some, __: pytest.fail("fitted to the end") if some else [])
+    monkeypatch.setattr(Start, "shows", lambda *_: False)
     assert looked(creeping, [SMOOTH, DELAY], anyway=True).effects == ()
 
 
 def test_where_noise_alone_is_left_no_look_alike_is_fitted(creeping, monkeypatch):
-    monkeypatch.setattr("forcegrasp.diagnosis.search.step.refine_anyway", lambda *_: pytest.fail("fitted another"))
+    monkeypatch.setattr("forcegrasp.diagnosis.search.finalists.refine_anyway", lambda *_: pytest.fail("fitted another"))
     assert looked(creeping, [PRESLIDING, SMOOTH], "smooth_friction").effects == ("smooth_friction",)
 
 
@@ -213,10 +218,10 @@ def test_what_explains_little_may_be_of_the_wrong_family(creeping, fitted_anyway
     best = dataclasses.replace(fitted_anyway.candidates[0], share=share)
     tried = []
     monkeypatch.setattr(
-        "forcegrasp.diagnosis.search.step.refine_anyway", lambda effects, *_: tried.extend(effects) or []
+        "forcegrasp.diagnosis.search.finalists.refine_anyway", lambda effects, *_: tried.extend(effects) or []
     )
     effects = list(catalogue().values())
-    assert _Start(study, base.fit)._better_look_alikes(best, effects, np.zeros(1)) == []
+    assert Finalists(Start(study, base.fit), [], np.zeros(1))._better_look_alikes(best, effects) == []
     alike = {e for e in effects if look_alike(e, SMOOTH) and (of_any_family or e.family == SMOOTH.family)}
     richer = {e for e in alike if SMOOTH.name in {nested.effect for nested in e.contains}}
     assert richer
@@ -353,11 +358,11 @@ def test_forms_leave_a_very_small_part_of_a_large_error(before, after, of_forms)
 def test_what_replaces_the_law_of_contacts_is_fitted_however_little_it_promises(creeping, monkeypatch):
     study, base = creeping
     fitted: list[str] = []
-    monkeypatch.setattr(step_module, "refine_anyway", lambda effects, *_: fitted.extend(e.name for e in effects) or [])
-    monkeypatch.setattr(step_module, "best_as_given", lambda *_: [])
+    monkeypatch.setattr(rough_fits, "refine_anyway", lambda effects, *_: fitted.extend(e.name for e in effects) or [])
+    monkeypatch.setattr(rough_fits, "best_as_given", lambda *_: [])
     effects = sorted(catalogue().values(), key=lambda effect: bool(effect.instead_of))
     scores = [Score(EffectSetting.typical(effect), 0.0, np.zeros(1)) for effect in effects]
-    _Start(study, base.fit).fit_anyway(scores, np.zeros(1))
+    RoughFits(Start(study, base.fit), np.zeros(1)).anyway(scores)
     assert fitted == [effect.name for effect in effects[:12]] + ["hunt_crossley_contact"]
 
 
@@ -409,19 +414,21 @@ def test_what_an_effect_contains_comes_first_where_the_set_may_be_wrong_instead(
     monkeypatch, left, alike, of_set, first
 ):
     """Encoders that are off, and objects that are smaller than the set says, are backlash that differs by finger."""
-    monkeypatch.setattr(step_module, "rms_error", lambda *_: left)
-    monkeypatch.setattr(step_module, "indistinguishable", lambda *_: alike)
-    monkeypatch.setattr(step_module, "is_significant", lambda one, least, *_: least < 0.1)
-    monkeypatch.setattr(_Start, "_at_the_end", lambda _, some, __: some)
-    start = object.__new__(_Start)
-    start._study, start.least_gain, start._least_errors = SimpleNamespace(target=None), 0.02, 1.0
+    monkeypatch.setattr(finalists_module, "rms_error", lambda *_: left)
+    monkeypatch.setattr(finalists_module, "indistinguishable", lambda *_: alike)
+    monkeypatch.setattr(start_module, "is_significant", lambda one, least, *_: least < 0.1)
+    monkeypatch.setattr(Finalists, "_at_the_end", lambda _, some, __: some)
+    start = object.__new__(Start)
+    start.study, start.fit = SimpleNamespace(target=None), None
+    start.least_gain, start._least_errors = 0.02, 1.0
+    finalists = Finalists(start, [], np.zeros(1))
     names = ("backlash_asymmetry", "backlash", "object_size" if of_set else "encoder_bias")
     ordered = [SimpleNamespace(effect=effect_of(n, light_gripper()), replaces="", fit=None) for n in names]
-    winner, later = start.simpler_first(ordered)
+    winner, later = finalists.simpler_first(ordered)
     assert winner.effect.name == first
     assert later == {"backlash_asymmetry"} - {first}
     start.least_gain = 0.1  # the simpler one explains too little
-    assert start.simpler_first(ordered)[0].effect.name == "backlash_asymmetry"
+    assert finalists.simpler_first(ordered)[0].effect.name == "backlash_asymmetry"
 
 
 @pytest.mark.long
@@ -434,7 +441,7 @@ def test_a_mistake_of_the_set_is_held_against_effects_that_look_like_it(monkeypa
     effects = [effect_of(name, light_gripper()) for name in ("object_size", "backlash", "coulomb_friction")]
     step = looked((study, base), effects, "object_size")
     assert set(step.effects) == {one.effect.name for one in step.candidates} == {"object_size", "backlash"}
-    monkeypatch.setattr(step_module, "refine_anyway", lambda *_: [])
+    monkeypatch.setattr(finalists_module, "refine_anyway", lambda *_: [])
     assert looked((study, base), effects, "object_size").effects == ("object_size",)
 
 
@@ -472,11 +479,11 @@ def test_which_effects_leave_least_beside_parameters_as_given(creeping, monkeypa
     ordered = best_as_given(effects, study, base.fit, 9)
     assert len(ordered) == 3 * len(found)
     asked = []
-    monkeypatch.setattr(step_module, "refine_anyway", lambda effects, *_: asked.extend(effects) or [])
-    monkeypatch.setattr(step_module, "_FITTED_ANYWAY", 1)
-    monkeypatch.setattr(step_module, "_AS_GIVEN", 1)
-    scores = Screen(effects, study).look(study, base.fit, _Start(study, base.fit).background, effects, None,
+    monkeypatch.setattr(rough_fits, "refine_anyway", lambda effects, *_: asked.extend(effects) or [])
+    monkeypatch.setattr(rough_fits, "_FITTED_ANYWAY", 1)
+    monkeypatch.setattr(rough_fits, "_AS_GIVEN", 1)
+    scores = Screen(effects, study).look(study, base.fit, Start(study, base.fit).background, effects, None,
                                          np.random.default_rng(0)).scores  # fmt: skip
-    monkeypatch.setattr(step_module, "best_effects", lambda *_: [OFFSET, DELAY, SMOOTH])
-    _Start(study, base.fit).fit_anyway(scores, np.zeros(1))
+    monkeypatch.setattr(rough_fits, "best_effects", lambda *_: [OFFSET, DELAY, SMOOTH])
+    RoughFits(Start(study, base.fit), np.zeros(1)).anyway(scores)
     assert asked == [OFFSET, *found]
