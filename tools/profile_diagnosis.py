@@ -17,8 +17,10 @@ from forcegrasp.diagnosis import signatures
 from forcegrasp.diagnosis.diagnose_set import diagnose_set
 from forcegrasp.diagnosis.faults import odd_grasps, suspects, tolerance
 from forcegrasp.diagnosis.givens import moved_set
-from forcegrasp.diagnosis.search import exchange, merge, needless, split, step
+from forcegrasp.diagnosis.search import exchange, merge, needless, split
+from forcegrasp.diagnosis.search.finalists import Finalists
 from forcegrasp.diagnosis.search.refine import refine, refine_anyway
+from forcegrasp.diagnosis.search.rough_fits import RoughFits
 from forcegrasp.identify.base_fit import fit_base
 from forcegrasp.identify.cross_validation import heldout_residual
 from forcegrasp.identify.loading import load
@@ -33,8 +35,8 @@ PARTS = {
     signatures.Signatures.simulate.__code__: "signatures of all effects",
     signatures.best_sizes.__code__: "sizes around the best signatures",
     refine.__code__: "rough fits with one more effect",
-    step._Start.refine_on_reference_tier.__code__: "fits of the best ones to the end",
-    step._Start.refit_richer.__code__: "fits with richer effects in place of known ones",
+    Finalists.fitted.__code__: "fits of the best ones to the end",
+    RoughFits.of_richer.__code__: "fits with richer effects in place of known ones",
     needless.drop_needless.__code__: "fits without known effects",
     heldout_residual.__code__: "held-out grasps",
     odd_grasps.odd_grasps.__wrapped__.__code__: "odd grasps",

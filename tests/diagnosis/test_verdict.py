@@ -17,7 +17,7 @@ from forcegrasp.diagnosis.evidence import (
 )
 from forcegrasp.diagnosis.result import Diagnosis, Step, settle_ties
 from forcegrasp.diagnosis.search import search
-from forcegrasp.diagnosis.search.step import _Start
+from forcegrasp.diagnosis.search.start import Start
 from forcegrasp.diagnosis.signatures import Score, _single, of_best_effects, share_together
 from forcegrasp.diagnosis.verdict import conclude, explained_share
 from forcegrasp.effects import get_effect
@@ -145,7 +145,7 @@ def test_what_explains_too_little_yet_hides_nothing_that_explains_enough(made_up
     ahead = candidate(made_up, gains=np.full(4, 110.0), share=0.2)
     enough = candidate(made_up, gains=np.full(4, 100.0), share=0.6)
     less = candidate(made_up, gains=np.full(4, 50.0), share=0.6)
-    start = object.__new__(_Start)
+    start = object.__new__(Start)
     start.least_gain, start._least_errors = 0.02, 1.0
     assert sorted([ahead, less, enough], key=start.place) == [enough, less, ahead]
 
