@@ -14,7 +14,7 @@ from forcegrasp.effects.force_limit import LIMIT
 class SmoothForceLimit(Effect):
     """A motor whose force bends towards a largest one, as iron saturates and drives fold back their current.
 
-    At k = 0 it gives all that is asked up to F; with k = 0.4 nearly F tanh(f / F), with k = 1 half of F at F.
+    At k = 0 it gives all that is asked up to F; with k = 0.4 nearly F tanh(f / F).
     """
 
     name = "smooth_force_limit"
@@ -26,7 +26,7 @@ class SmoothForceLimit(Effect):
     source = "saturation of a motor's iron; the blend of two asymptotes of Churchill and Usagi (1972)"
     look_alikes = ("force_limit", "force_saturation", "back_emf")
     separates = "the finger's position: a motor that gives less stops short, a sensor that reads less does not"
-    parameters = (LIMIT, dataclasses.replace(KNEE, typical=0.4, null=0.4, trials=(0.4,)))
+    parameters = (LIMIT, dataclasses.replace(KNEE, high=0.5, typical=0.4, null=0.4, trials=(0.4,)))
     contains = (Nested("force_limit", at={"knee": 0.0}, same={"force_n": "force_n"}),)
     order = 9
 
