@@ -199,6 +199,11 @@ def _weighted(changes: np.ndarray, fit: Fit) -> np.ndarray:
     return changes * np.broadcast_to(fit.weight, fit.residual.shape).reshape(-1, 1)
 
 
+def chance_of(gain: float, null: np.ndarray) -> float:
+    """Probability that the best signature of noise gains as much; ``null``: what it gains in draws, ``(draws,)``."""
+    return (1 + int(np.sum(null >= gain))) / (1 + len(null))
+
+
 def null_gains(
     scores: list[list[Score]],
     rng: np.random.Generator,

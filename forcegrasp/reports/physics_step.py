@@ -26,7 +26,7 @@ def shorter_step(diagnosis: Diagnosis) -> float | None:
     """
     if not diagnosis.numerical or not (diagnosis.left or diagnosis.verdict is Verdict.NOT_FITTED):
         return None
-    of_half = _of_half(diagnosis)
+    of_half = _of_half(diagnosis.fit, diagnosis.target, diagnosis.numerical)
     if of_half < _TOO_LONG:
         return None
     return short_enough(step_of_scene(diagnosis.target.gripper), of_half)
@@ -51,16 +51,15 @@ def step_warning(diagnosis: Diagnosis) -> str:
     """What too long a step costs, and what to do; empty if it is short enough."""
     if shorter_step(diagnosis) is None:
         return ""
-    return _warning(step_of_scene(diagnosis.target.gripper), _of_half(diagnosis))
+    return warning_of_fit(diagnosis.fit, diagnosis.target, diagnosis.numerical)
 
 
 def warning_of_fit(fit: Fit, target: Target, numerical: Sequence[np.ndarray]) -> str:
     """The same of a fit that did not converge; empty if its steps are short enough."""
-    of_half = rms(beyond_fit(fit, numerical)[0], target)
-    return "" if of_half < _TOO_LONG else _warning(step_of_scene(target.gripper), of_half)
-
-
-def _warning(step_s: float, of_half: float) -> str:
+    of_half = _of_half(fit, target, numerical)
+    if of_half < _TOO_LONG:
+        return ""
+    step_s = step_of_scene(target.gripper)
     return (
         f"half the scene's physics step of {1e3 * step_s:g} ms changes what the model foretells by {of_half:.2g} ×"
         " noise: what is missing may hide behind that, or look like something else. With"
@@ -69,6 +68,6 @@ def _warning(step_s: float, of_half: float) -> str:
     )
 
 
-def _of_half(diagnosis: Diagnosis) -> float:
+def _of_half(fit: Fit, target: Target, numerical: Sequence[np.ndarray]) -> float:
     """By how much half the step changes what is foretold, of what no parameter makes up for, ÷ noise."""
-    return rms(beyond_fit(diagnosis.fit, diagnosis.numerical)[0], diagnosis.target)
+    return rms(beyond_fit(fit, numerical)[0], target)

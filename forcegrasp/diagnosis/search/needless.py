@@ -18,7 +18,7 @@ from forcegrasp.diagnosis.families import (
     roughly_without,
     simpler,
 )
-from forcegrasp.diagnosis.result import Step
+from forcegrasp.diagnosis.result import Step, kept_steps
 from forcegrasp.diagnosis.search.judge import LEAST_GAIN_AT_FLOOR, largest_fall
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.diagnosis.verdict import LEAST_SHARE
@@ -178,6 +178,19 @@ def drop_all_needless(
         study.progress(f"{name} is needless now")
         left = [step for step in left if name not in step.effects[:1]]
     return left, fit
+
+
+def drop_needless_of_many(study: Study, steps: Sequence[Step], fit: Fit, given: int) -> tuple[list[Step], Fit]:
+    """The same of the effects that were found at once: each was needed beside the others as they were then.
+
+    The steps lead from the first error to the last; nothing is left out where that would leave no step.
+    """
+    at_once = {s.effects[0] for s in kept_steps(steps) if s.candidates and s.candidates[0].without is not None}
+    left, less = drop_all_needless(study, steps, fit, given, at_once) if at_once else (list(steps), fit)
+    if less is fit or not kept_steps(left):
+        return list(steps), fit
+    left[0] = dataclasses.replace(left[0], error_before=steps[0].error_before)
+    return chained(left, study.error(study.heldout(less))), less
 
 
 def _without_needless(study: Study, fit: Fit, names: Sequence[str]) -> tuple[str, Fit] | None:

@@ -12,7 +12,7 @@ from forcegrasp.diagnosis.result import Candidate
 from forcegrasp.diagnosis.search.refine import best_as_given, refine, refine_anyway
 from forcegrasp.diagnosis.search.screen import MAX_GAIN_FACTOR
 from forcegrasp.diagnosis.search.start import Start
-from forcegrasp.diagnosis.signatures import Score, best_effects
+from forcegrasp.diagnosis.signatures import Score, best_effects, chance_of
 from forcegrasp.diagnosis.verdict import LEAST_SHARE
 from forcegrasp.effects import Effect
 from forcegrasp.identify.noise_floor import excess
@@ -40,7 +40,7 @@ class RoughFits:
         """Rough fits with one more effect, from where the best signatures put them."""
         candidates = []
         for one in refine(scores, self._study, self._fit, self._start.background):
-            p_family = (1 + int(np.sum(self._null >= one.score.gain))) / (1 + len(self._null))
+            p_family = chance_of(one.score.gain, self._null)
             candidates.append(self._start.judge(one.fit, p_family, one.score.signature))
         return candidates
 

@@ -25,7 +25,7 @@ from forcegrasp.diagnosis.search.left_over import (
 )
 from forcegrasp.diagnosis.search.look_beside import look_beside
 from forcegrasp.diagnosis.search.merge import merge
-from forcegrasp.diagnosis.search.needless import chained, drop_all_needless, drop_needless, simplify
+from forcegrasp.diagnosis.search.needless import chained, drop_needless, drop_needless_of_many, simplify
 from forcegrasp.diagnosis.search.screen import Screen
 from forcegrasp.diagnosis.search.several import most_gained_by_one, usual_on_few
 from forcegrasp.diagnosis.search.so_far import SoFar
@@ -238,13 +238,8 @@ def _tidy_up(so_far: SoFar, begun: Begun) -> None:
         so_far.all = study, steps, fit
         steps, fit = merge(study, steps, fit, begun.effects, begun.given)
         so_far.all = study, steps, fit
-    at_once = {s.effects[0] for s in kept_steps(steps) if s.candidates and s.candidates[0].without is not None}
-    if at_once:  # each was needed beside the others as they were then
-        fewer, less = drop_all_needless(study, steps, fit, begun.given, at_once)
-        if less is not fit and kept_steps(fewer):
-            first = dataclasses.replace(fewer[0], error_before=steps[0].error_before)
-            so_far.all = study, chained([first, *fewer[1:]], study.error(study.heldout(less))), less
-            study, steps, fit = so_far.all
+    steps, fit = drop_needless_of_many(study, steps, fit, begun.given)
+    so_far.all = study, steps, fit
     so_far.all = study, *_look_beside_all(study, steps, fit)
 
 

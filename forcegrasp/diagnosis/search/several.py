@@ -22,7 +22,7 @@ from forcegrasp.diagnosis.search.left_over import is_worth_looking
 from forcegrasp.diagnosis.search.needless import chained
 from forcegrasp.diagnosis.search.refine import NO_BETTER, fit_with, refine
 from forcegrasp.diagnosis.search.screen import MAX_GAIN_FACTOR, Screen
-from forcegrasp.diagnosis.signatures import Background, Score, direction, null_gains, of_best_effects, trials
+from forcegrasp.diagnosis.signatures import Background, Score, chance_of, direction, null_gains, of_best_effects, trials
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.diagnosis.verdict import EXPLAINED
 from forcegrasp.effects import Effect
@@ -342,7 +342,7 @@ def _steps(
     found = [step for step in steps if step.is_counted or set(step.effects[:1]) & set(_names(fit))]
     for index in np.argsort(-costs):
         change, held = changes[index], study.heldout(fits[index])
-        p_family = (1 + int(np.sum(null >= change.gain))) / (1 + len(null))
+        p_family = chance_of(change.gain, null)
         candidate = judged(study, held, fit, change.setting, p_family, change.signature)
         before_it, error = error, float(np.sqrt(max(error**2 - fall * costs[index], 0.0)))
         candidate = dataclasses.replace(candidate, error_after=error, without=fits[index])

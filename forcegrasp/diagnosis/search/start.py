@@ -8,7 +8,7 @@ from forcegrasp.diagnosis.evidence import LEAST_SHARE_OF_MANY, is_significant
 from forcegrasp.diagnosis.noise.noise_check import unexpected_noise
 from forcegrasp.diagnosis.result import Candidate
 from forcegrasp.diagnosis.search.judge import LEAST_GAIN, LEAST_GAIN_AT_FLOOR, judged
-from forcegrasp.diagnosis.signatures import Background, direction
+from forcegrasp.diagnosis.signatures import Background, chance_of, direction
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.diagnosis.verdict import LEAST_SHARE, MUCH
 from forcegrasp.identify.fit import Fit
@@ -57,11 +57,11 @@ class Start:
         """Whether an effect that explains little is worth a trial: all signatures together must promise enough."""
         return self.shows(candidate, LEAST_SHARE_OF_MANY) and share_together >= least
 
-    def judge_by_gain(self, refit: Fit, null: np.ndarray, replaces: str = "") -> Candidate:
-        """The same of a fit that did not start from a signature."""
-        p_family = (1 + int(np.sum(null >= self.fit.cost - refit.cost))) / (1 + len(null))
-        return self.judge(refit, p_family, direction(self.fit, refit), replaces)
-
     def judge(self, refit: Fit, p_family: float, signature: np.ndarray, replaces: str = "") -> Candidate:
         """What held-out grasps say of a fit with one more effect, its last one."""
         return judged(self.study, self.held, refit, refit.effects[-1], p_family, signature, replaces)
+
+    def judge_by_gain(self, refit: Fit, null: np.ndarray, replaces: str = "") -> Candidate:
+        """The same of a fit that did not start from a signature."""
+        p_family = chance_of(self.fit.cost - refit.cost, null)
+        return self.judge(refit, p_family, direction(self.fit, refit), replaces)
