@@ -5,12 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from forcegrasp.diagnosis.search.look_beside import look_beside
-from forcegrasp.diagnosis.search.refine import refine
+from forcegrasp.diagnosis.search.refine import refine, refine_anyway
 from forcegrasp.diagnosis.signatures import Background, Signatures, trials
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.effects import Effect
 from forcegrasp.errors import ConfigError
 from forcegrasp.identify import fit_set
+from forcegrasp.identify.base_fit import check_gradient, finished, rms_error
 from forcegrasp.identify.cross_validation import make_folds, rms
 from forcegrasp.identify.fit import Fit, fit_exactly
 from forcegrasp.identify.fitted_model import model_of
@@ -61,7 +62,20 @@ def add_effect(loaded: Loaded[MeasurementSet], model: Model, effect: type[Effect
         raise ConfigError(
             f"effect={effect.name}: leaves no trace in these data at any size; record grasps that show it"
         )
-    nearest = min((r.fit for r in refine(scores, study, before, background)), key=lambda f: f.cost)
-    after = look_beside(fit_exactly(target, nearest.problem, simulators, nearest.vector), target, simulators)
+    # the base fit may have made up for the effect, and stand in another valley than it does beside the effect
+    rough = [[one.fit for one in refine(scores, study, before, background)], refine_anyway([effect], study, before)]
+    starts = [min(fits, key=lambda fit: fit.cost) for fits in rough if fits]
+    after = min((_to_the_end(start, study) for start in starts), key=lambda fit: fit.cost)
     better = model_of(after, target, loaded, numerical_error(after, target))
     return Added(target, before, after, rms(held, target), rms(study.heldout(after), target), better)
+
+
+def _to_the_end(rough: Fit, study: Study) -> Fit:
+    """The fit of the model itself that a rough one leads to, brought to its end."""
+    target, simulators = study.target, study.simulators
+    fit = look_beside(fit_exactly(target, rough.problem, simulators, rough.vector), target, simulators)
+    checked = check_gradient(fit, target)
+    if checked.converged:
+        return fit
+    study.progress(f"{rms_error(fit, target):.3f} × noise, and the error still falls")
+    return finished(checked, target, simulators).fit

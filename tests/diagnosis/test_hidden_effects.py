@@ -133,6 +133,15 @@ def test_the_wrong_effect_does_not_lower_the_error():
         add_effect(lagging, right.model, get_effect("force_lag"), silent)
 
 
+def test_adds_an_effect_that_the_base_model_has_made_up_for(tmp_path):
+    record(tmp_path / "set", {}, SEED, GRASPS, contact="mujoco_firm", samples=SAMPLES)
+    firm = load(tmp_path / "set")
+    target, _, base = fit_model(firm, 0, silent)
+    added = add_effect(firm, model_of(base.fit, target, firm, []), get_effect("contact_onset"), silent)
+    assert added.error_after < 1.1  # 2.04 from the base model's place alone, which is that of other gains
+    assert added.model.effects[0].parameters["share"].value == pytest.approx(0.505, abs=0.02)
+
+
 def test_a_diagnosis_needs_grasps_to_hold_out(tmp_path):
     with pytest.raises(MeasurementError, match="too few"):
         diagnosed(recorded(tmp_path, {}, grasps=3))
