@@ -89,6 +89,11 @@ def excess(
       residual: in units of the noise, ``(G, S, C)``.
       numerical, target, tolerated: as for :func:`numerical_floor`.
     """
+    off = 2 * np.abs(numerical[0]) + np.abs(numerical[1:]).sum(axis=0) + (0.0 if tolerated is None else tolerated)
+    far = np.abs(residual) > _OUTLIER + 3 * off
+    few = far.sum() <= max(_MAX_OUTLIERS, 2e-4 * target.readings)
+    if few:  # squared, a single one of them may outweigh a thousand others
+        residual = np.where(far, np.nan, residual)
     error, floor = rms(residual, target), numerical_floor(numerical, target, tolerated=tolerated)
     if error > floor * max(_ROOM, _by_chance(residual, target)):
         return f"{error:.2f} × noise in all, {floor:.2f} is the floor"
@@ -96,11 +101,7 @@ def excess(
         error, floor = rms(residual, target, where), numerical_floor(numerical, target, where, tolerated)
         if error > floor * max(_ROOM_IN_CELL, _by_chance(residual, target, where)):
             return f"{name}: {error:.2f} × noise, {floor:.2f} is the floor"
-    off = 2 * np.abs(numerical[0]) + np.abs(numerical[1:]).sum(axis=0) + (0.0 if tolerated is None else tolerated)
-    far = np.abs(residual) > _OUTLIER + 3 * off
-    if far.sum() > max(_MAX_OUTLIERS, 2e-4 * target.readings):
-        return f"{far.sum()} readings are more than {_OUTLIER:g} σ off"
-    return ""
+    return "" if few else f"{far.sum()} readings are more than {_OUTLIER:g} σ off"
 
 
 def _by_chance(residual: np.ndarray, target: Target, where: np.ndarray | bool = True) -> float:

@@ -13,7 +13,7 @@ from forcegrasp.measure.schema import MeasurementSet
 
 # Readings that are rounded to steps of more than this share of what they scatter by agree by chance too often.
 _COARSE = 0.1
-# So few may agree by chance, as rows and as a share of them; and so many times those that agree with the last but one.
+# So few may agree by chance, as rows and as a share of them; and so many times what rounding alone makes agree.
 _LEAST, _LEAST_SHARE, _TIMES = 5, 0.005, 3
 
 
@@ -22,7 +22,8 @@ def check_repeats(measured: MeasurementSet) -> list[str]:
     warnings = []
     for name in (*measured.columns.position, *measured.columns.force):
         signals = [grasp.signals()[name] for grasp in measured.grasps]
-        repeats, by_chance = _repeats(signals)
+        repeats, returns = _repeats(signals)
+        by_chance = max(returns, _by_rounding(signals))
         count, rows = sum(int(one.sum()) for one in repeats), sum(len(one) for one in repeats)
         few = count < max(_LEAST, _LEAST_SHARE * rows, _TIMES * by_chance)
         if few or not is_noisy(signals) or _is_coarse(signals):
@@ -40,6 +41,18 @@ def _is_coarse(signals: Sequence[np.ndarray]) -> bool:
     """Whether a sensor's steps are no smaller than its noise, by the changes between its readings."""
     changes = np.abs(np.concatenate([np.diff(signal) for signal in signals]))
     return find_step(np.concatenate(signals)) > _COARSE * float(np.median(changes))
+
+
+def _by_rounding(signals: Sequence[np.ndarray]) -> float:
+    """How many readings are the one before by chance: those that nearly are, by how fine they are written.
+
+    So few that they come and go from sensor to sensor, where readings are written ten times as fine as they scatter.
+    """
+    changes = np.abs(np.concatenate([np.diff(signal) for signal in signals]))
+    near, changed = _COARSE * float(np.median(changes)), changes[changes > 0]
+    if not changed.size or not near:
+        return 0.0
+    return float(np.sum(changed <= near) * changed.min() / (2 * near))
 
 
 def _repeats(signals: Sequence[np.ndarray]) -> tuple[list[np.ndarray], int]:

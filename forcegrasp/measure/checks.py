@@ -12,6 +12,7 @@ from forcegrasp.measure.check_copies import check_copies
 from forcegrasp.measure.check_liveness import check_liveness
 from forcegrasp.measure.check_repeats import check_repeats
 from forcegrasp.measure.check_signs import PadsAt, check_signs
+from forcegrasp.measure.check_starts import check_starts
 from forcegrasp.measure.check_units import check_force_noise, check_forces, check_units
 from forcegrasp.measure.folder import show
 from forcegrasp.measure.samples import MIN_SAMPLES, check_samples, place
@@ -68,6 +69,8 @@ def check_set(
     for motor in range(len(measured.columns.position)):
         refuse_copied_command(measured, motor)
     check_signs(measured, open_m, closed_m, pads_at, half_opening_m)
+    if pads_at is not None and not measured.columns.read_effort:
+        warnings += check_starts(measured, pads_at, half_opening_m)
     if len(measured.grasps) == 1:
         warnings.append(f"{show(measured.path)}: {ALONE}")
     return [*measured.notes, *warnings, *_gaps(measured), *check_copies(measured), *check_repeats(measured)]

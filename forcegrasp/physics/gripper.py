@@ -154,11 +154,12 @@ class Gripper(ShortRepr):
     @functools.cached_property
     def is_direct(self) -> bool:
         """Whether each motor slides a finger of its own, so that positions of motors are positions of pads."""
-        return (
-            not self.is_servo
-            and all(f.motor >= 0 and self.motors[f.motor].joint == f.joint for f in self.fingers)
-            and self.unit == "m"
-        )
+        return not self.is_servo and self._moves_own_fingers and self.unit == "m"
+
+    @property
+    def _moves_own_fingers(self) -> bool:
+        """Whether fingers stand on the very joints that motors move, each on one of its own."""
+        return all(f.motor >= 0 and self.motors[f.motor].joint == f.joint for f in self.fingers)
 
     @property
     def nominal_gain(self) -> float:
@@ -195,9 +196,11 @@ class Gripper(ShortRepr):
         if self.is_direct and len(self.motors) == 2:
             return position
         left, right = self.opening.travel
-        if len(self.motors) == 2 or not math.isclose(left, right, rel_tol=0.01):
+        one_each = len(self.motors) == 2 and self._moves_own_fingers
+        if not math.isclose(left, right, rel_tol=0.01) or (len(self.motors) == 2 and not one_each):
             return None
-        return np.repeat(self.opening.opening_at(position) / 2, 2, axis=1)
+        half = self.opening.opening_at(position) / 2  # where both motors stand as this one does
+        return half if one_each else np.repeat(half, 2, axis=1)
 
     @functools.cached_property
     def pads_stay_parallel(self) -> bool:

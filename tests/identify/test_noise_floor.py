@@ -107,3 +107,12 @@ def test_a_fit_without_an_end_is_told_by_what_it_leaves(error, told):
     assert told in note
     assert "it falls" in note
     assert ("diagnose" in note) == (error > 1.5)
+
+
+@pytest.mark.parametrize(("readings", "told"), [(3, ""), (4, "in all")])
+def test_a_few_readings_that_are_far_off_are_no_excess_however_far(readings, told):
+    """A touch that is over within a row, missed: 37 σ in one reading of twelve thousand."""
+    residual = noise()
+    residual[:readings, 10, 3] = 37.0
+    assert told in excess(residual, NOTHING, make())
+    assert bool(excess(residual, NOTHING, make())) == bool(told)

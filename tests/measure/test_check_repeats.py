@@ -83,3 +83,14 @@ def test_an_encoders_steps_as_large_as_its_noise_are_not_told():
 
 def test_a_simulation_without_noise_is_not_told():
     assert told(standard_grasps()) == []
+
+
+def test_fine_steps_of_an_encoder_agree_by_chance_as_often_as_they_nearly_do():
+    """Of five decimals beside thirty times the noise one in a hundred is the one before, few the last but one."""
+    moving = []
+    for number, g in enumerate(standard_grasps()):
+        rows = len(g.force_n)
+        still = np.cumsum(np.arange(rows) % 2 * 2e-3)[:, None]  # stands for a row, moves in the next
+        position = np.round(still + 0.2 * number + 3e-4 * RNG.standard_normal(g.position_m.shape), 5)
+        moving.append(change(g, position_m=position, force_n=g.force_n + 0.013 * RNG.standard_normal(g.force_n.shape)))
+    assert check_repeats(make_set(moving)) == []

@@ -250,7 +250,7 @@ def _believed(so_far: SoFar, begun: Begun) -> Diagnosis:
     if so_far.believed is None:
         return found
     before, _, fewer = so_far.believed
-    if _convincing(before, fewer, study, fit):
+    if _convincing(before, fewer, study, found.fit):  # which may have another effect than the search ended with
         return found
     return dataclasses.replace(concluded(begun, *so_far.believed), bolder=found)
 
