@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from forcegrasp.effects.base import Effect, Parameter, State
+from forcegrasp.effects.butterworth import butterworth_step
 
 
 class ForceLag(Effect):
@@ -33,22 +34,12 @@ class ForceLag(Effect):
     def read_force(self, force: np.ndarray) -> np.ndarray:
         held = np.where(np.isnan(self.state["held"]), force, self.state["held"])
         if self.variant == "butterworth":
-            held, self.state["rate"] = self._second_order(held - force, self.state["rate"])
-            held += force
+            off, self.state["rate"] = butterworth_step(
+                held - force, self.state["rate"], self["time_constant_s"], self.dt
+            )
+            held = force + off
         else:
             weight = self.lag_weight("time_constant_s")
             held = np.where(weight == 1, force, held + weight * (force - held))
         self.state["held"] = held
         return held
-
-    def _second_order(self, off: np.ndarray, rate: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """How far a reading is off the force after a step in which the force stays, and its rate; exactly.
-
-        A mass on a spring whose damper has 1/√2 of the critical damping: it rings as fast as it decays.
-        """
-        tau = np.broadcast_to(self["time_constant_s"], off.shape)
-        filters = tau > 0
-        decay = np.sqrt(0.5) / np.where(filters, tau, 1.0)
-        left = np.where(filters, np.exp(-decay * self.dt), 0.0)
-        cosine, sine = left * np.cos(decay * self.dt), left * np.sin(decay * self.dt)
-        return cosine * off + sine * (rate / decay + off), cosine * rate - sine * (rate + 2 * decay * off)

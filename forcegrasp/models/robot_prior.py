@@ -42,7 +42,7 @@ EFFECTS = {
     "command_deadband": Prior(0.3, 1 / 3, 3, "the paper's robot: its driver sends no command below 0.3 mm"),
     "command_delay": Prior(0.6, 0.1, 0.7, "assumed: from a bus cycle to one control step of 40 ms"),
     "rate_limit": Prior(0.2, 2, 20, "assumed: slower drives would not get to the object within an episode"),
-    "actuator_lag": Prior(0.3, 0.1, 1, "assumed: position loops of 3 to 30 Hz"),
+    "actuator_lag": Prior(0.3, 0.1, 1, "assumed: position loops of 3 to 30 Hz, of first order", variants=("",)),
     "coulomb_friction": Prior(0.4, 1 / 3, 3, "found in real drives (real-data.md); sizes assumed: geared hobby servos"),
     "stiction": Prior(0.2, 1 / 3, 2, "found in a real drive (real-data.md); sizes assumed"),
     "force_limit": Prior(0.1, 2, 10, "assumed: firmware limits; tighter ones would leave the goals out of reach"),

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from scipy.signal import lfilter
+from scipy.signal import butter, cont2discrete, dlsim, lfilter, lti
 
 from forcegrasp.effects import get_effect
 from forcegrasp.effects.for_gripper import effect_of
@@ -115,6 +115,18 @@ def test_rate_limited_lag_is_a_rate_limit_or_a_lag_where_the_other_is_not_there(
     np.testing.assert_allclose(
         send(make("rate_limited_lag", np.inf, 0.05), command), send(make("actuator_lag", 0.05), command), rtol=1e-12
     )
+
+
+@pytest.mark.parametrize("tau", [0.005, 0.03])
+def test_a_drives_filter_may_be_a_butterworth_of_second_order(tau):
+    """SciPy's filter with the same corner, of a command that stays for a step."""
+    corner = lti(*butter(2, 1 / tau, analog=True)).to_ss()
+    held = cont2discrete((corner.A, corner.B, corner.C, corner.D), DT, method="zoh")
+    _, expected, _ = dlsim((*held[:4], DT), np.append(wave() - wave()[0], 0.0))
+    start = wave()[0]
+    out = send(make("actuator_lag", tau, variant="butterworth"), wave() - start)
+    assert out == pytest.approx(expected[1:, 0], abs=1e-9)
+    assert send(make("actuator_lag", 0.0, variant="butterworth"), wave()) == pytest.approx(wave(), abs=1e-12)
 
 
 def test_actuator_lag_is_an_exponential():
