@@ -100,7 +100,7 @@ class Effect:
     needs_ground: ClassVar[bool] = False  #: has no meaning where the object stands on nothing
     needs_rotors: ClassVar[bool] = False  #: has no meaning where motors have no inertia of their own, or move linkages
     needs_load_behind_rotor: ClassVar[bool] = False  #: has no meaning where rotor and load have no inertia each
-    needs_parallel_pads: ClassVar[bool] = False  #: would let objects slip out of pads that turn
+    needs_parallel_pads: ClassVar[bool] = False  #: would let objects that are free slip out of pads that turn
     instead_of: ClassVar[tuple[str, ...]] = ()  #: effects that mean nothing beside it
     servo_only: ClassVar[bool] = False  #: of drives alone; where fingers grasp, another effect has its part
     needs_position_loop: ClassVar[bool] = False  #: has no meaning where efforts are commanded

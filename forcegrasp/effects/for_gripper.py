@@ -58,8 +58,8 @@ def why_left_out(effect: type[Effect], gripper: Gripper) -> str:
         return f"needs ground that an object can rub on; that of {gripper.name} has none"
     if effect.needs_rotors and not gripper.has_rotors:
         return f"needs motors that slide fingers and have an `armature`; those of {gripper.name} do not"
-    if effect.needs_parallel_pads and not gripper.pads_stay_parallel:
-        return f"needs pads that stay parallel; those of {gripper.name} turn"
+    if effect.needs_parallel_pads and not (gripper.pads_stay_parallel or gripper.object_is_guided):
+        return f"needs pads that stay parallel, or an object on a slide; the pads of {gripper.name} turn"
     if effect.servo_only and not gripper.is_servo:
         return f"is one of servos alone; {gripper.name} has fingers"
     if effect.needs_load_behind_rotor and not gripper.has_load_behind_rotor:

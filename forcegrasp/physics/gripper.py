@@ -203,6 +203,16 @@ class Gripper(ShortRepr):
         return half if one_each else np.repeat(half, 2, axis=1)
 
     @functools.cached_property
+    def object_is_guided(self) -> bool:
+        """Whether the object slides along one axis and can't leave the pads otherwise."""
+        if self.is_servo:
+            return False
+        model = self.compile()
+        body = model.geom(self.object_geom).bodyid[0]
+        joint = model.joint(self.object_joint)
+        return bool(model.body_jntnum[body] == 1 and joint.type[0] == mujoco.mjtJoint.mjJNT_SLIDE)
+
+    @functools.cached_property
     def pads_stay_parallel(self) -> bool:
         """Whether the pads do not turn from open to closed."""
         if self.is_direct or self.is_servo:

@@ -408,6 +408,27 @@ def test_what_few_grasps_promise_is_fitted_though_one_grasp_of_all_is_far_off(fi
     assert [r.score.gain for r in refined] == [40.0, 50.0]
 
 
+@pytest.mark.parametrize("worse", [True, False])
+def test_a_rough_fit_that_ends_above_its_start_begins_anew_from_the_sizes_that_are_tried(threshold, monkeypatch, worse):
+    """A spring of 3 N at 1 mm that a signature promised, where 0.1 N is right: no slope there leads back."""
+    one = next(iter(Signatures(threshold.study).missing(trials([threshold.zone]))))
+    score, begun = Score(one, 50.0, np.ones(1)), list[EffectSetting]()
+    stuck = dataclasses.replace(threshold.fit, residual=(2.0 if worse else 0.9) * threshold.fit.residual)
+    better = dataclasses.replace(threshold.fit, residual=0.5 * threshold.fit.residual)
+
+    def from_trials(settings, *_):
+        begun.extend(settings)
+        return better
+
+    monkeypatch.setattr(refine_module, "best_sizes", lambda *_: [(score, np.nan)])
+    monkeypatch.setattr(refine_module, "fit_with", lambda *_: stuck)
+    monkeypatch.setattr(refine_module, "roughly_as", from_trials)
+    (refined,) = refine([score], threshold.study, threshold.fit, threshold.background)
+    assert refined.fit is (better if worse else stuck)
+    assert [s.kind for s in begun] == [one.kind] * len(begun)
+    assert bool(begun) is worse
+
+
 def test_signatures_are_simulated_when_asked_for_and_kept(fitted, threshold, monkeypatch):
     zone, limit = threshold.zone, get_effect("force_limit")
     signatures, of_zone, of_limit = Signatures(threshold.study), trials([zone]), trials([limit])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from forcegrasp.effects.for_gripper import effects_of
 from forcegrasp.physics import load_gripper
 
 SCENE = """<mujoco model="tongs">
@@ -54,6 +55,21 @@ parameters:
   radius_m: {nominal: 0.02, low: 0.005, high: 0.04, unit: m, scope: object, writes: []}
   offset_m: {nominal: 0.0, low: -0.01, high: 0.01, unit: m, scope: grasp, writes: []}
 """
+
+
+@pytest.mark.parametrize("joint", ["slide", "free"])
+def test_a_contact_that_does_not_rub_is_for_objects_that_turning_pads_can_not_lose(tmp_path, joint):
+    free = '<freejoint name="object"/>'
+    scene = SCENE.replace("LENGTH", "0.1").replace(
+        'qpos="0 0.5', 'qpos="0 0 0 1 0 0 0 0.5' if joint == "free" else 'qpos="0 0.5'
+    )
+    if joint == "free":
+        scene = scene.replace('<joint name="object" type="slide" axis="1 0 0"/>', free)
+    (tmp_path / "tongs.xml").write_text(scene)
+    (tmp_path / "tongs.yaml").write_text(DESCRIPTION)
+    gripper = load_gripper(str(tmp_path / "tongs.yaml"))
+    assert not gripper.pads_stay_parallel
+    assert ("hunt_crossley_contact" in effects_of(gripper)) is (joint == "slide")
 
 
 @pytest.mark.parametrize(("right_length", "alike"), [(0.1, True), (0.13, False)])

@@ -64,6 +64,10 @@ def refine(scores: Sequence[Score], study: Study, fit: Fit, background: Backgrou
     fits = side_by_side(
         [some.telling(f"{one.title}, {where}", task) for one, task in zip(settings, tasks, strict=True)]
     )
+    stalled = [i for i, one in enumerate(fits) if one.cost > part.cost]  # a size too far off for slopes to lead back
+    tasks = [partial(_from_trials, settings[i], part, some) for i in stalled]
+    for i, again in zip(stalled, side_by_side(tasks), strict=True):
+        fits[i] = min(fits[i], again, key=lambda one: one.cost)
     if some is study:
         return [Refined(score, one) for (_, score), one in zip(pairs, fits, strict=True)]
     racing = _in_the_race([part.cost - one.cost for one in fits], LOST_IF_FITTED)
@@ -75,6 +79,12 @@ def refine(scores: Sequence[Score], study: Study, fit: Fit, background: Backgrou
         task = partial(fit_with, [setting], start, study, fit)
         tasks.append(study.telling(f"{setting.title}, on all grasps", task))
     return [Refined(pairs[i][1], refitted) for i, refitted in zip(left, side_by_side(tasks), strict=True)]
+
+
+def _from_trials(setting: EffectSetting, fit: Fit, study: Study) -> Fit:
+    """A rough fit with an effect from the best of the sizes that are tried, whatever its signature promises."""
+    of_kind = [one for one in trials([setting.effect]) if one.variant == setting.variant]
+    return roughly_as(of_kind, fit, (), study)
 
 
 def refine_anyway(
