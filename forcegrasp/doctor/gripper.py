@@ -182,7 +182,8 @@ def _stiffness(plant: Plant, pressed: np.ndarray) -> Iterator[Finding]:
     stiff, unlike = pressed / deep, np.ptp(pressed / deep) > _UNLIKE * np.min(pressed / deep)
     depths = " and ".join(f"{1e3 * depth:.3g}" for depth in deep)
     told = " and ".join(f"{float(f'{newtons:.3g}'):g}" for newtons in (stiff if unlike else [stiff.mean()]))
-    damping = f"damped by {stiff.mean() * _damping_per_stiffness(plant):.3g} N·s/m"
+    per_stiffness, impedance = _damping_and_impedance(plant)
+    damping = f"damped by {stiff.mean() * per_stiffness:.3g} N·s/m, with an impedance of {impedance:.2g}"
     yield fine("stiffness", f"pads are {depths} mm in the object then: {told} N/m on each side, {damping}")
     if unlike:
         told = f"one object is {100 * (stiff.max() / stiff.min() - 1):.0f} % stiffer on one side than on the other"
@@ -202,8 +203,8 @@ def _sensors(gripper: Gripper, pressed: np.ndarray, read: np.ndarray) -> Iterato
             yield fine("sensors", told)
 
 
-def _damping_per_stiffness(plant: Plant) -> float:
-    """Damping of the contacts with the object over their stiffness, where the plant stands, s; their mean.
+def _damping_and_impedance(plant: Plant) -> tuple[float, float]:
+    """Damping of the contacts with the object over their stiffness, s, and impedance, where the plant stands; means.
 
     MuJoCo's documentation, Computation, "Constraint model": a reference acceleration of −b v − k d r.
     """
@@ -213,7 +214,7 @@ def _damping_per_stiffness(plant: Plant) -> float:
     pads, things = set(plant.pad_geoms.tolist()), set(plant.object_geoms.tolist())
     touching = [c.efc_address for c in data.contact if {*c.geom} & pads and {*c.geom} & things and c.efc_address >= 0]
     stiffness, damping, impedance, _ = data.efc_KBIP[touching].T
-    return float(np.mean(damping / (stiffness * impedance)))
+    return float(np.mean(damping / (stiffness * impedance))), float(np.mean(impedance))
 
 
 def _as_it_stands(plant: Plant) -> mujoco.MjData:

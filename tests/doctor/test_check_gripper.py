@@ -114,6 +114,7 @@ def test_a_contact_of_one_impedance_is_as_stiff_as_its_solref_says(changed):
         )
         (line,) = (line for line in said(path)["fine"] if "N/m on each side" in line)
         found.append(float(line.split(" N/m")[0].split()[-1]))
+        assert line.endswith("with an impedance of 0.5")
         damping = float(line.split(" N·s/m")[0].split()[-1])
         assert damping / found[-1] == pytest.approx(60 / stiffness, rel=0.01)
     assert found[1] / found[0] == pytest.approx(5.0, rel=0.02)
