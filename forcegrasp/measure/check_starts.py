@@ -15,11 +15,10 @@ _NOISE, _LARGE, _NEAR = 8.0, 0.1, 0.02
 
 
 def check_starts(measured: MeasurementSet, pads_at: PadsAt, half_opening_m: float) -> list[str]:
-    """Returns a warning if grasps begin pressed, which the model's do not: its fingers start at rest, and the object
-    where it is said to be.
+    """Returns a warning if grasps begin pressed: the model's fingers start at rest, and the object stands free.
 
     Args:
-      measured: grasps of a gripper that feels with its fingers.
+      measured: grasps of a gripper that feels with its fingers, one of them at least.
       pads_at: from positions of the motors to where the pads stand; None where that is not known.
       half_opening_m: half of what fits between the pads.
     """

@@ -69,7 +69,7 @@ def check_set(
     for motor in range(len(measured.columns.position)):
         refuse_copied_command(measured, motor)
     check_signs(measured, open_m, closed_m, pads_at, half_opening_m)
-    if pads_at is not None and not measured.columns.read_effort:
+    if pads_at is not None and measured.columns.force and not measured.columns.read_effort:
         warnings += check_starts(measured, pads_at, half_opening_m)
     if len(measured.grasps) == 1:
         warnings.append(f"{show(measured.path)}: {ALONE}")

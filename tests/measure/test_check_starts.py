@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 from measured_rig import OPEN_M, change, make_set, standard_grasps
@@ -34,6 +36,15 @@ def test_grasps_that_begin_pressed_are_told_once_with_where_and_how_much(late, w
 def test_a_zero_that_is_off_in_free_air_is_not_told():
     assert told(standard_grasps()) == []
     assert told([change(g, force_n=g.force_n + np.array([1.5, 0.0])) for g in standard_grasps()]) == []
+
+
+def test_one_sensor_is_enough_and_none_tells_nothing():
+    late = [without_start(g) if i < 3 else g for i, g in enumerate(standard_grasps())]
+    for channels in (1, 0):
+        columns = dataclasses.replace(late[0].columns, force=late[0].columns.force[:channels])
+        grasps = [change(g, columns=columns, force_n=g.force_n[:, :channels]) for g in late]
+        lines = check_set(make_set(grasps), OPEN_M, pads_at=np.asarray)
+        assert len([line for line in lines if "begins with" in line]) == channels
 
 
 def test_fingers_that_wait_close_to_an_object_are_not_told():
