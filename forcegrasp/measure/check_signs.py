@@ -49,7 +49,8 @@ def check_signs(
         _check_effort(measured, closed_m, reach)
     for channel in range(0 if measured.columns.read_effort else len(measured.columns.force)):
         _check_presses(measured, channel, closed_m, reach)
-    if pads_at is None or measured.columns.read_effort:  # which is of no finger, and felt in free air
+    if pads_at is None or not measured.columns.force or measured.columns.read_effort:
+        # an effort is of no finger, and felt in free air
         return
     placed = [pads_at(grasp.position_m) for grasp in measured.grasps]
     pads = [places for places in placed if places is not None]
