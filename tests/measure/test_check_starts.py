@@ -48,12 +48,15 @@ def test_one_sensor_is_enough_and_none_tells_nothing():
 
 
 def test_fingers_that_wait_close_to_an_object_are_not_told():
-    """Their command stands at the surface; they press nothing yet."""
-    grasps = []
-    for g in standard_grasps():
+    """They stand where they will touch next, and press nothing yet."""
+    rows, noise = 15, 0.013 * np.random.default_rng(0).standard_normal((15, 2))
+    grasps = standard_grasps()
+    for index, g in enumerate(grasps):
+        late = without_start(g, 1.4)
         assert g.radius_m is not None
-        assert g.offset_m is not None
-        near = g.position_m.min(axis=1) < g.radius_m + abs(g.offset_m) + 5e-4
-        first = g.time_s[near.argmax()] - 0.2
-        grasps.append(change(without_start(g, first)))
+        assert g.object_m is not None
+        waiting = np.full((rows, 2), g.radius_m + 3e-4)
+        before = {"command_m": waiting, "position_m": waiting, "force_n": noise, "object_m": g.object_m[:rows]}
+        both = {name: np.concatenate([rest, getattr(late, name)]) for name, rest in before.items()}
+        grasps[index] = change(late, time_s=np.arange(len(both["force_n"])) * 0.04, **both)
     assert told(grasps) == []
