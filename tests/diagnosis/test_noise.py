@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from forcegrasp.diagnosis.noise.noise_check import Noise, is_uneven_noise, unexpected_noise
-from forcegrasp.diagnosis.search.left_over import left_by_many, left_over
+from forcegrasp.diagnosis.search.left_over import has_tails_alone, is_worth_looking, left_by_many, left_over
 from forcegrasp.diagnosis.signatures import Score, null_gains
 from forcegrasp.effects import get_effect
 from forcegrasp.effects.setting import EffectSetting
@@ -391,3 +391,21 @@ def test_only_what_a_fit_of_all_grasps_leaves_can_be_more_noise(fitted, told):
     study = SimpleNamespace(target=make(), numerical=NOTHING, heldout=lambda _: held)
     left, noise = left_over(study, fit)
     assert (left, noise and noise.stronger) == ("", told)
+
+
+@pytest.mark.parametrize(("times", "alone"), [(0.99, True), (1.03, False)])
+def test_heavy_tails_of_noise_as_large_as_said_are_no_reason_to_look_for_an_effect(times, alone):
+    """An effect takes a hundredth of it, which may as well be of its tails."""
+    tails = np.random.default_rng(0).standard_t(4, (MANY, S, 4))
+    held = times * tails / np.sqrt(np.mean(tails**2, axis=(0, 1)))
+    fit = SimpleNamespace(residual=held, predicted=np.tile(GRASPS[:1], (MANY, 1, 1)))
+    error = float(np.sqrt(np.mean(held**2)))
+    study = SimpleNamespace(
+        target=make(MANY), numerical=(0 * held,) * 2, heldout=lambda _: held.copy(), error=lambda _: error
+    )
+    left, noise = left_over(study, fit)
+    assert not left
+    assert noise is not None
+    assert noise.has_tails_alone
+    assert has_tails_alone(study, fit, noise) is alone
+    assert is_worth_looking(study, fit) is not alone

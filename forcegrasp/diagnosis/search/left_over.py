@@ -9,7 +9,7 @@ from forcegrasp.diagnosis.study import Study
 from forcegrasp.diagnosis.verdict import MUCH, explained_share
 from forcegrasp.identify.cross_validation import rms_of_grasps
 from forcegrasp.identify.fit import Fit
-from forcegrasp.identify.noise_floor import excess
+from forcegrasp.identify.noise_floor import excess, numerical_floor
 
 # Of so many grasps one alone says nothing of the gripper: where fingers push an object is a matter of chance.
 _MANY = 12
@@ -18,6 +18,8 @@ AS_GOOD_AS_NOTHING = 1.1
 # If that is also less than this share of what was beyond the floor, effects that were found are nearly right, and what
 # takes the rest makes up for their forms: behind a lag, in another engine's contacts, objects were ten times too light.
 _LITTLE = 0.1
+# Held-out readings that scatter by so many times the floor at most are no larger than noise was said to be.
+_NO_LARGER = 1.02
 # What effects leave of the mean square beyond the floor is of their forms if it is no more than this share.
 _OF_FORMS = 0.02
 
@@ -52,7 +54,16 @@ def left_by_many(study: Study, fit: Fit) -> tuple[str, Noise | None, str]:
 def is_worth_looking(study: Study, fit: Fit) -> bool:
     """Whether a model leaves more than noise, or what seems to be stronger noise: only that none is found tells."""
     left, noise = left_over(study, fit)
-    return bool(left) or (noise is not None and noise.stronger)
+    return bool(left) or (noise is not None and noise.stronger and not has_tails_alone(study, fit, noise))
+
+
+def has_tails_alone(study: Study, fit: Fit, noise: Noise | None) -> bool:
+    """Whether all that is odd are heavy tails of noise that is no larger than it was said to be.
+
+    What an effect gains there is too little to be worth a name, and may be of those tails.
+    """
+    least = max(1.0, numerical_floor(study.numerical, study.target))
+    return noise is not None and noise.has_tails_alone and study.error(study.heldout(fit)) <= _NO_LARGER * least
 
 
 def leaves_little(study: Study, fit: Fit, error_before: float, floor: float) -> bool:

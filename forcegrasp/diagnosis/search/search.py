@@ -18,6 +18,7 @@ from forcegrasp.diagnosis.search.conclusion import Begun, concluded
 from forcegrasp.diagnosis.search.exchange import exchange
 from forcegrasp.diagnosis.search.left_over import (
     AS_GOOD_AS_NOTHING,
+    has_tails_alone,
     is_worth_looking,
     leaves_forms,
     leaves_little,
@@ -104,7 +105,8 @@ def diagnose(
         steps.append(Step((rounding.effect.name,), (), (), error_before, study.error(study.heldout(first))))
     so_far = SoFar((study, steps, first))
     try:
-        if start is None or is_worth_looking(study, first):
+        tails_alone = has_tails_alone(study, first, left_over(study, first)[1])
+        if (start is None and not tails_alone) or is_worth_looking(study, first):
             better = _add_effects(so_far, begun, rng, stop_when)
             if better is not None:
                 progress(f"without it the model fits as well from there: {rms_error(better, target):.2f} × noise")
