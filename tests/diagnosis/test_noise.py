@@ -409,3 +409,9 @@ def test_heavy_tails_of_noise_as_large_as_said_are_no_reason_to_look_for_an_effe
     assert noise.has_tails_alone
     assert has_tails_alone(study, fit, noise) is alone
     assert is_worth_looking(study, fit) is not alone
+
+
+def test_noise_of_another_size_is_no_matter_of_tails():
+    study = SimpleNamespace(target=make(), numerical=NOTHING, heldout=lambda _: normal(0), error=lambda _: 1.0)
+    for tails in (True, False):
+        assert has_tails_alone(study, None, SimpleNamespace(has_tails_alone=tails)) is tails
