@@ -69,7 +69,12 @@ def direction(before: Fit, after: Fit) -> np.ndarray:
 
 def trials(effects: Sequence[type[Effect]]) -> list[EffectSetting]:
     """Every trial of every variant of these effects."""
-    return [EffectSetting(e, variant, values) for e in effects for variant in e.variants for values in e.trials()]
+    return [one for effect in effects for variant in effect.variants for one in trials_of(effect, variant)]
+
+
+def trials_of(effect: type[Effect], variant: str) -> list[EffectSetting]:
+    """The sizes of one variant of an effect that are tried."""
+    return [EffectSetting(effect, variant, values) for values in effect.trials()]
 
 
 class Signatures:

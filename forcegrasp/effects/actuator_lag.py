@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from forcegrasp.effects.base import Effect, Parameter, State
-from forcegrasp.effects.butterworth import butterworth_step
+from forcegrasp.effects.low_pass import ORDERS, low_pass
 
 
 class ActuatorLag(Effect):
@@ -23,21 +23,12 @@ class ActuatorLag(Effect):
     look_alikes = ("command_delay", "rate_limited_lag", "rate_limit")
     separates = "fast steps: a lagged response has no corner"
     parameters = (Parameter("time_constant_s", "time constant τ", "s", 0.0, 0.5, 0.05, trials=(0.01, 0.04, 0.12)),)
-    variants = ("", "butterworth")
-    known_beforehand = variants
+    variants = known_beforehand = ORDERS
 
     def init(self, which: np.ndarray) -> State:
         held = self.resting_command[which]
         return {"held": held, "rate": np.zeros_like(held)}
 
     def command(self, command: np.ndarray, fresh: np.ndarray) -> np.ndarray:
-        held = self.state["held"]
-        if self.variant == "butterworth":
-            tau, rate = self["time_constant_s"], self.state["rate"]
-            off, self.state["rate"] = butterworth_step(held - command, rate, tau, self.dt)
-            held = command + off
-        else:
-            weight = self.lag_weight("time_constant_s")
-            held = np.where(weight == 1, command, held + weight * (command - held))
-        self.state["held"] = held
+        self.state["held"] = held = low_pass(self, command, self.state["held"])
         return held

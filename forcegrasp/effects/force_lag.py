@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from forcegrasp.effects.base import Effect, Parameter, State
-from forcegrasp.effects.butterworth import butterworth_step
+from forcegrasp.effects.low_pass import ORDERS, low_pass
 
 
 class ForceLag(Effect):
@@ -23,7 +23,7 @@ class ForceLag(Effect):
     look_alikes = ("force_delay", "viscoelastic_contact")
     separates = "fast steps and first contact: a lagged force has no corner"
     parameters = (Parameter("time_constant_s", "time constant τ", "s", 0.0, 1.0, 0.08, trials=(0.01, 0.03, 0.1, 0.3)),)
-    variants = ("", "butterworth")
+    variants = ORDERS
     order = 3
     least_channels = 1
 
@@ -33,13 +33,5 @@ class ForceLag(Effect):
 
     def read_force(self, force: np.ndarray) -> np.ndarray:
         held = np.where(np.isnan(self.state["held"]), force, self.state["held"])
-        if self.variant == "butterworth":
-            off, self.state["rate"] = butterworth_step(
-                held - force, self.state["rate"], self["time_constant_s"], self.dt
-            )
-            held = force + off
-        else:
-            weight = self.lag_weight("time_constant_s")
-            held = np.where(weight == 1, force, held + weight * (force - held))
-        self.state["held"] = held
+        self.state["held"] = held = low_pass(self, force, held)
         return held

@@ -5,6 +5,7 @@ from __future__ import annotations
 from types import SimpleNamespace
 
 import numpy as np
+from scipy.signal import butter, cont2discrete, dlsim, lti
 
 from forcegrasp.effects import Effect, get_effect
 
@@ -18,6 +19,14 @@ TOUCH_M = 0.025  # where a pad meets the nominal object
 
 def make(name: str, *values: float, variant: str = "") -> Effect:
     return get_effect(name)(np.array([values]), DT, variant)
+
+
+def butterworth(signal: np.ndarray, tau: float) -> np.ndarray:
+    """SciPy's filter of second order with the corner 1/(2πτ), of a signal that stays for a step; at rest at first."""
+    corner = lti(*butter(2, 1 / tau, analog=True)).to_ss()
+    held = cont2discrete((corner.A, corner.B, corner.C, corner.D), DT, method="zoh")
+    _, out, _ = dlsim((*held[:4], DT), np.append(signal - signal[0], 0.0))
+    return signal[0] + out[1:, 0]
 
 
 def read(effect: Effect, left: np.ndarray, right: np.ndarray | None = None) -> np.ndarray:

@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from forcegrasp.diagnosis.families import is_richer, roughly_as
-from forcegrasp.diagnosis.signatures import Background, Score, best_sizes, trials
+from forcegrasp.diagnosis.signatures import Background, Score, best_sizes, trials, trials_of
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.effects import Effect
 from forcegrasp.effects.setting import EffectSetting
@@ -65,7 +65,7 @@ def refine(scores: Sequence[Score], study: Study, fit: Fit, background: Backgrou
         [some.telling(f"{one.title}, {where}", task) for one, task in zip(settings, tasks, strict=True)]
     )
     stalled = [i for i, one in enumerate(fits) if one.cost > part.cost]  # a size too far off for slopes to lead back
-    tasks = [partial(_from_trials, settings[i], part, some) for i in stalled]
+    tasks = [partial(roughly_as, trials_of(*settings[i].kind), part, (), some) for i in stalled]
     for i, again in zip(stalled, side_by_side(tasks), strict=True):
         fits[i] = min(fits[i], again, key=lambda one: one.cost)
     if some is study:
@@ -79,12 +79,6 @@ def refine(scores: Sequence[Score], study: Study, fit: Fit, background: Backgrou
         task = partial(fit_with, [setting], start, study, fit)
         tasks.append(study.telling(f"{setting.title}, on all grasps", task))
     return [Refined(pairs[i][1], refitted) for i, refitted in zip(left, side_by_side(tasks), strict=True)]
-
-
-def _from_trials(setting: EffectSetting, fit: Fit, study: Study) -> Fit:
-    """A rough fit with an effect from the best of the sizes that are tried, whatever its signature promises."""
-    of_kind = [one for one in trials([setting.effect]) if one.variant == setting.variant]
-    return roughly_as(of_kind, fit, (), study)
 
 
 def refine_anyway(

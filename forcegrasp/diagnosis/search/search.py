@@ -105,8 +105,11 @@ def diagnose(
         steps.append(Step((rounding.effect.name,), (), (), error_before, study.error(study.heldout(first))))
     so_far = SoFar((study, steps, first))
     try:
-        tails_alone = has_tails_alone(study, first, left_over(study, first)[1])
-        if (start is None and not tails_alone) or is_worth_looking(study, first):
+        if start is None:
+            worth_looking = not has_tails_alone(study, first, left_over(study, first)[1])
+        else:
+            worth_looking = is_worth_looking(study, first)
+        if worth_looking:
             better = _add_effects(so_far, begun, rng, stop_when)
             if better is not None:
                 progress(f"without it the model fits as well from there: {rms_error(better, target):.2f} × noise")

@@ -22,7 +22,15 @@ from forcegrasp.diagnosis.search.left_over import is_worth_looking
 from forcegrasp.diagnosis.search.needless import chained
 from forcegrasp.diagnosis.search.refine import NO_BETTER, fit_with, refine
 from forcegrasp.diagnosis.search.screen import MAX_GAIN_FACTOR, Screen
-from forcegrasp.diagnosis.signatures import Background, Score, chance_of, direction, null_gains, of_best_effects, trials
+from forcegrasp.diagnosis.signatures import (
+    Background,
+    Score,
+    chance_of,
+    direction,
+    null_gains,
+    of_best_effects,
+    trials_of,
+)
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.diagnosis.verdict import EXPLAINED
 from forcegrasp.effects import Effect
@@ -117,17 +125,12 @@ def share_of_alike(
     some, part = study.on_few(fit)
     best = [score.setting.effect for score in _chosen(study, fit, screen, effects)[:1]]
     alike = [*best, *(other for own in best for other in look_alikes_of(own, effects, of_any_family=True))]
-    kinds = [kind for effect in alike for kind in _by_variant(effect)]
+    kinds = [trials_of(effect, variant) for effect in alike for variant in effect.variants]
     fits = side_by_side([partial(roughly_as, kind, part, (), some, at_the_end=False) for kind in kinds])
     beyond, shares = max(some.target.beyond_noise(part.residual), 1e-9), dict[type[Effect], float]()
     for (first, *_), one in zip(kinds, fits, strict=True):
         shares[first.effect] = max((part.cost - one.cost) / beyond, shares.get(first.effect, 0.0))
     return shares
-
-
-def _by_variant(effect: type[Effect]) -> list[list[EffectSetting]]:
-    """The sizes of an effect that are tried, of each of its variants."""
-    return [[one for one in trials([effect]) if one.variant == variant] for variant in effect.variants]
 
 
 def share_of_all(study: Study, fit: Fit, further: Fit) -> float:
@@ -239,7 +242,7 @@ def _in_best_variants(study: Study, fit: Fit, before: Fit) -> Fit:
     for name in [name for name in _names(fit) if name not in _names(before)]:
         some, part = study.on_few(fit)
         own = fit.effect(name)
-        kinds = [kind for kind in _by_variant(own.effect) if kind[0].variant != own.variant]
+        kinds = [trials_of(own.effect, variant) for variant in own.effect.variants if variant != own.variant]
         fits = side_by_side([partial(roughly_as, kind, part, name, some, at_the_end=False) for kind in kinds])
         best = min(fits, key=lambda one: one.cost, default=part)
         if best.cost < NO_BETTER * part.cost:

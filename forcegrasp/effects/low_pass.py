@@ -1,8 +1,29 @@
-"""A low-pass filter of second order, in steps over which what goes in stays as it is."""
+"""Low-pass filters of first and second order, in steps over which what goes in stays as it is."""
 
 from __future__ import annotations
 
 import numpy as np
+
+from forcegrasp.effects.base import Effect
+
+#: Of first order, or of second.
+ORDERS = ("", "butterworth")
+
+
+def low_pass(effect: Effect, value: np.ndarray, held: np.ndarray) -> np.ndarray:
+    """What comes out of an effect's filter after a step; its ``rate`` is the effect's state.
+
+    Args:
+      effect: with a ``time_constant_s``, and one of :data:`ORDERS` as its variant.
+      value: what goes in, ``(rows, width)``.
+      held: what came out before, of the same shape.
+    """
+    if effect.variant == "butterworth":
+        rate = effect.state["rate"]
+        off, effect.state["rate"] = butterworth_step(held - value, rate, effect["time_constant_s"], effect.dt)
+        return value + off
+    weight = effect.lag_weight("time_constant_s")
+    return np.where(weight == 1, value, held + weight * (value - held))
 
 
 def butterworth_step(off: np.ndarray, rate: np.ndarray, tau: np.ndarray, dt: float) -> tuple[np.ndarray, np.ndarray]:
