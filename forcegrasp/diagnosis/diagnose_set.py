@@ -13,6 +13,7 @@ from forcegrasp.diagnosis.cut_short import REASONS, cut_short
 from forcegrasp.diagnosis.evidence import LEAST_SHARE_TOGETHER
 from forcegrasp.diagnosis.faults.suspects import Fault, besides, leaves_nothing, suspects, uneven_stamps
 from forcegrasp.diagnosis.givens.doubt import leaves_less, more_likely, with_fault, with_fault_beside
+from forcegrasp.diagnosis.givens.fitted_givens import told_as_moved, with_fitted_givens
 from forcegrasp.diagnosis.givens.give_back import without_move
 from forcegrasp.diagnosis.givens.givens_besides import Fitted, with_givens_put_right
 from forcegrasp.diagnosis.givens.late_rows import may_be_late_rows
@@ -24,7 +25,7 @@ from forcegrasp.diagnosis.givens.moved_set import (
     within_tolerance_after_all,
 )
 from forcegrasp.diagnosis.law.law import find_law
-from forcegrasp.diagnosis.result import Diagnosis, Step
+from forcegrasp.diagnosis.result import Diagnosis, Step, kept_steps
 from forcegrasp.diagnosis.search.search import diagnose
 from forcegrasp.diagnosis.search.stop_when import AT_ITS_END, StopWhen, always, never
 from forcegrasp.diagnosis.verdict import EXPLAINED_FAR, MUCH, explained_share
@@ -156,6 +157,14 @@ class _Ways:
 
     def search_and_move(self, loaded: Loaded[MeasurementSet], fitted: Fitted) -> tuple[Diagnosis, Found | None]:
         """The diagnosis of a set; and that with moves within its tolerance, or without some grasps, if it wants any."""
+        if (with_givens := with_fitted_givens(loaded, fitted, self.progress)) is not None:
+            found, further = self._search_and_move(*with_givens)
+            last, simulators = further or (found, with_givens[1][1])
+            if (told := told_as_moved(last, loaded, fitted)) is not None:
+                return found, (told, simulators)
+        return self._search_and_move(loaded, fitted)
+
+    def _search_and_move(self, loaded: Loaded[MeasurementSet], fitted: Fitted) -> tuple[Diagnosis, Found | None]:
         moves, leave_out = None if loaded.gripper.is_servo else MovesFirst(loaded), LeaveOutFirst()
 
         def something_else_first(target: Target, fit: Fit) -> bool:
@@ -176,7 +185,7 @@ class _Ways:
                     return dataclasses.replace(found, stopped=rest[0].stopped), None
                 further = rest if is_answer(rest[0]) else None
             if further is None and (leave_out.names or (moves is not None and moves.asked)):  # it was neither
-                again = self.search(*fitted)
+                again = self.search(*fitted, start=(found.fit, kept_steps(found.steps)))
                 if again.stopped:
                     return dataclasses.replace(found, stopped=again.stopped), None
                 found, further = again, self.moved(again, loaded, briefly=True)

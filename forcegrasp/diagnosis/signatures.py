@@ -15,6 +15,7 @@ from forcegrasp.effects import Effect
 from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.identify.fit import Fit
 from forcegrasp.identify.predict import Case, predict
+from forcegrasp.identify.priors import with_rows
 from forcegrasp.short_repr import ShortRepr
 
 # A signature stands for all smaller sizes, and for sizes up to this much larger than the one it was simulated with.
@@ -44,20 +45,21 @@ class Background:
 
     def __init__(self, fit: Fit, numerical: Sequence[np.ndarray], without: Sequence[int] = ()) -> None:
         slopes = np.delete(fit.slopes, without, axis=1)
-        columns = [slopes, *((fit.weight * n).reshape(-1, 1) for n in numerical)]
+        columns = [slopes, *(fit.weighted(n)[:, None] for n in numerical)]
         matrix = np.concatenate(columns, axis=1)
         norms = np.linalg.norm(matrix, axis=0)
         left, singular, _ = np.linalg.svd(matrix[:, norms > 0] / norms[norms > 0], full_matrices=False)
         self._basis = left[:, singular > 1e-8 * singular[0]]
 
     def remove(self, vectors: np.ndarray) -> np.ndarray:
-        """Takes the directions out of vectors, ``(N,)`` or ``(N, m)``."""
+        """Takes the directions out of vectors, with rows for priors, ``(N + priors, ...)``."""
+        vectors = with_rows(vectors, len(self._basis))
         return vectors - self._basis @ (self._basis.T @ vectors)
 
     def and_also(self, signature: np.ndarray) -> Background:
         """The same with one more direction, that of a signature that has nothing of the others, ``(N,)``."""
         more = copy.copy(self)
-        more._basis = np.column_stack([self._basis, signature])
+        more._basis = np.column_stack([self._basis, with_rows(signature, len(self._basis))])
         return more
 
 
@@ -103,7 +105,6 @@ class Signatures:
         Returns:
           For each effect and variant all its trials' scores, best first; effects that leave no trace are missing.
         """
-        residual = (fit.weight * fit.residual).ravel()
         if not tried:
             return []
         change = _weighted(np.stack([self._changes[trial] for trial in tried], axis=1), fit)
@@ -111,9 +112,9 @@ class Signatures:
         found: dict[tuple[type[Effect], str], list[Score]] = {}
         for kind, columns in _kinds(tried).items():
             if _is_linear(kind[0]):
-                options = [_joint(clean[:, columns], residual, [tried[c] for c in columns])]
+                options = [_joint(clean[:, columns], fit.left, [tried[c] for c in columns], fit.residual.size)]
             else:
-                options = [_single(clean[:, c], change[:, c], residual, tried[c]) for c in columns]
+                options = [_single(clean[:, c], change[:, c], fit.left, tried[c]) for c in columns]
             scores = [option for option in options if option is not None]
             if scores:
                 found[kind] = sorted(scores, key=lambda s: -s.gain)
@@ -177,8 +178,8 @@ def _gains(tried: Sequence[EffectSetting], study: Study, fit: Fit, background: B
     """By how much each of these effects lowers the sum of squares, as it is."""
     if not tried:
         return []
-    residual = (fit.weight * fit.residual).reshape(-1, 1)
-    left = background.remove(residual - _weighted(_changes(tried, study, fit), fit))
+    residual = fit.left[:, None]
+    left = background.remove(residual - with_rows(_weighted(_changes(tried, study, fit), fit), len(residual)))
     return (np.sum(background.remove(residual) ** 2) - np.sum(left**2, axis=0)).tolist()
 
 
@@ -270,10 +271,10 @@ def _single(clean: np.ndarray, change: np.ndarray, residual: np.ndarray, one: Ef
     gain = 2 * factor * size * along - (factor * size) ** 2
     if not first.logarithmic:  # a threshold that starts at infinity does not scale
         values = np.array([np.clip(values[0] * factor, first.low, first.high), *values[1:]])
-    return Score(dataclasses.replace(one, values=values), gain, unit, (one,))
+    return Score(dataclasses.replace(one, values=values), gain, unit[: len(change)], (one,))
 
 
-def _joint(clean: np.ndarray, residual: np.ndarray, trials: Sequence[EffectSetting]) -> Score | None:
+def _joint(clean: np.ndarray, residual: np.ndarray, trials: Sequence[EffectSetting], readings: int) -> Score | None:
     """Score of several trials of an effect, added up; None where one leaves no trace."""
     if np.linalg.norm(clean, axis=0).min() < 1e-2:
         return None
@@ -281,4 +282,4 @@ def _joint(clean: np.ndarray, residual: np.ndarray, trials: Sequence[EffectSetti
     fitted = clean @ factors
     size = np.linalg.norm(fitted)
     values = np.sum([factor * one.values for factor, one in zip(factors, trials, strict=True)], axis=0)
-    return Score(dataclasses.replace(trials[0], values=values), float(size**2), fitted / size, tuple(trials))
+    return Score(dataclasses.replace(trials[0], values=values), float(size**2), fitted[:readings] / size, tuple(trials))

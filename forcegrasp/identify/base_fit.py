@@ -109,10 +109,17 @@ def fit_base(
         spread = ", ".join(f"{error:.2f}" for error in errors)
         reason = f"the starts end in different places (errors of {spread} × noise)"
         return BaseFit(first, errors, False, reason, starts_agree=False)
-    checked = check_gradient(first, target, errors)
+    return ended(first, target, simulators, errors, hasty)
+
+
+def ended(
+    fit: Fit, target: Target, simulators: Simulators, errors: tuple[float, ...] = (), hasty: bool = False
+) -> BaseFit:
+    """A fit with whether it converged, brought to its end if it had not; in haste only where little is left."""
+    checked = check_gradient(fit, target, errors)
     if checked.converged:
         return checked
-    if hasty and rms_error(first, target) > _MUCH:
+    if hasty and rms_error(fit, target) > _MUCH:
         return dataclasses.replace(checked, unfinished=True)
     return finished(checked, target, simulators)
 
@@ -217,7 +224,7 @@ class Subset:
 
     def fit(self, start: np.ndarray) -> End:
         vector, residual = descend_roughly(self.target, self.problem, self._simulators, start, self._correction)
-        cost = float(np.sum((self.target.weight * residual) ** 2))
+        cost = float(np.sum((self.target.weight * residual) ** 2)) + self.problem.priors.cost(vector)
         return End(vector, cost, rms(residual, self.target))
 
     def enlarge(self, part: np.ndarray) -> np.ndarray:

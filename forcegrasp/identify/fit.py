@@ -12,6 +12,7 @@ from scipy.optimize import least_squares
 from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.identify.local_slopes import LocalSlopes
 from forcegrasp.identify.predict import predict
+from forcegrasp.identify.priors import with_rows
 from forcegrasp.identify.problem import Problem
 from forcegrasp.identify.progress import Progress, silent
 from forcegrasp.identify.simulators import STEP, Simulators
@@ -49,8 +50,17 @@ class Fit(ShortRepr):
 
     @property
     def cost(self) -> float:
-        """Weighted sum of squared residuals, in units of the noise."""
-        return float(np.sum((self.weight * self.residual) ** 2))
+        """Weighted sum of squared residuals, in units of the noise, and of what its priors are missed by."""
+        return float(np.sum((self.weight * self.residual) ** 2)) + self.problem.priors.cost(self.vector)
+
+    @property
+    def left(self) -> np.ndarray:
+        """Weighted residuals, and by how many standard deviations priors are missed, ``(N + priors,)``."""
+        return np.r_[(self.weight * self.residual).ravel(), self.problem.priors.missed(self.vector)]
+
+    def weighted(self, change: np.ndarray) -> np.ndarray:
+        """A change of the signals ÷ noise, ``(G, S, C)``, as it counts, with zeros for priors, ``(N + priors,)``."""
+        return with_rows((self.weight * change).ravel(), change.size + len(self.problem.priors))
 
     @property
     def values(self) -> np.ndarray:
@@ -68,8 +78,8 @@ class Fit(ShortRepr):
 
     @property
     def slopes(self) -> np.ndarray:
-        """The weighted Jacobian, ``(N, p)``."""
-        return (self.weight[..., None] * self.jacobian).reshape(-1, len(self.problem))
+        """The weighted Jacobian, and that of the priors, ``(N + priors, p)``."""
+        return self.problem.priors.below((self.weight[..., None] * self.jacobian).reshape(-1, len(self.problem)))
 
     def subset(self, keep: np.ndarray) -> Fit:
         """What it says of the grasps of these indices, without the parameters that none of them follows."""
@@ -243,13 +253,15 @@ def _may_fall(local: LocalSlopes, vector: np.ndarray, shift: np.ndarray | float,
 
 
 def _left(local: LocalSlopes, vector: np.ndarray, shift: np.ndarray | float) -> np.ndarray:
-    """Residuals ÷ noise as they count, of predictions shifted by so much, ``(N,)``."""
-    return (local.target.weight * local.target.residual(local.value(vector) + shift)).ravel()
+    """Residuals ÷ noise as they count, of predictions shifted by so much, and the priors', ``(N + priors,)``."""
+    left = (local.target.weight * local.target.residual(local.value(vector) + shift)).ravel()
+    return np.r_[left, local.problem.priors.missed(vector)]
 
 
 def _slopes(local: LocalSlopes, vector: np.ndarray, anew: bool = False) -> np.ndarray:
-    """Slopes of the predictions ÷ noise as they count, ``(N, p)``."""
-    return (local.target.weight[..., None] * local.slopes(vector, anew=anew)).reshape(-1, len(vector))
+    """Slopes of the predictions ÷ noise as they count, and of the priors, ``(N + priors, p)``."""
+    slopes = (local.target.weight[..., None] * local.slopes(vector, anew=anew)).reshape(-1, len(vector))
+    return local.problem.priors.below(slopes)
 
 
 def _descend_once(
@@ -310,7 +322,7 @@ def _finish(
     correction = np.broadcast_to(correction, predicted.shape)
     fit = Fit(problem, vector, predicted, residual, jacobian, correction, 0.0, total, weight)
     flat = fit.slopes
-    slope = flat.T @ (weight * residual).ravel() / np.maximum(np.linalg.norm(flat, axis=0), 1e-12)
+    slope = flat.T @ fit.left / np.maximum(np.linalg.norm(flat, axis=0), 1e-12)
     blocked = ~free | ((vector <= problem.low + 1e-6) & (slope < 0)) | ((vector >= problem.high - 1e-6) & (slope > 0))
     steepest = float(np.abs(slope[~blocked]).max(initial=0))
     return dataclasses.replace(fit, gradient=steepest)

@@ -10,6 +10,7 @@ import numpy as np
 
 from forcegrasp.identify.fit import Fit
 from forcegrasp.identify.predict import Case, predict
+from forcegrasp.identify.priors import with_rows
 from forcegrasp.identify.simulators import cheap_tier
 from forcegrasp.identify.target import Target
 from forcegrasp.measure.schema import MeasurementSet
@@ -46,8 +47,8 @@ class Given:
 def givens_of(measured: MeasurementSet, target: Target) -> tuple[Given, ...]:
     """All that a set gives and has a tolerance."""
     grasps = target.grasps
-    objects = dict.fromkeys(g.object for g in grasps if g.radius_m is not None)
-    placed = [g.name for g in grasps if g.offset_m is not None]
+    objects = dict.fromkeys(g.object for g in grasps if g.radius_m is not None and not g.fitted_m[0])
+    placed = [g.name for g in grasps if g.offset_m is not None and not g.fitted_m[1]]
     timing = {PERIOD: measured.period_std_share, SKEW: measured.delay_std_s}
     timing |= {FORCE_SKEW: measured.delay_std_s} if "force" in target.axis.kinds else {}
 
@@ -104,7 +105,7 @@ def errors_by_givens(fit: Fit, target: Target, measured: MeasurementSet) -> list
         return []
     slopes = given_slopes(target, fit, givens)
     weight = np.broadcast_to(fit.weight, fit.residual.shape).reshape(-1, 1)
-    cross = fit.slopes.T @ (weight * slopes)
+    cross = fit.slopes.T @ with_rows(weight * slopes, len(fit.slopes))
     known = (weight * slopes).T @ (weight * slopes) - cross.T @ fit.covariance() @ cross  # by what no parameter follows
     root = np.linalg.cholesky(np.eye(len(givens)) + (known + known.T) / 2)
     return list(np.linalg.solve(root, slopes.T).reshape(len(givens), *fit.residual.shape))

@@ -19,7 +19,8 @@ def guess(target: Target, problem: Problem) -> np.ndarray:
     vector = problem.start()
     for place, entry in enumerate(problem.entries):
         estimate = {"radius_m": radii, "offset_m": offsets}.get(entry.parameter)
-        if entry.effect is None and estimate is not None and np.isfinite(estimate[entry.members]).any():
+        fitted_anywhere = entry.effect is None and not entry.precision
+        if fitted_anywhere and estimate is not None and np.isfinite(estimate[entry.members]).any():
             vector[place] = entry.coordinate(float(np.nanmedian(estimate[entry.members])))
     return vector
 

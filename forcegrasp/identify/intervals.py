@@ -52,8 +52,9 @@ def chance_errors(fit: Fit) -> np.ndarray:
     slopes = np.einsum("gskp,gsk->gp", fit.jacobian, fit.weight**2 * fit.residual, optimize=True)
     count, p = slopes.shape
     freedom = count / max(1, count - min(p, count - 1))
-    by_grasp = inverse @ (slopes.T @ slopes * min(freedom, 4.0)) @ inverse
-    with_memory = inverse @ _covariance_of_slope(fit) @ inverse
+    priors = fit.problem.priors.information
+    by_grasp = inverse @ (slopes.T @ slopes * min(freedom, 4.0) + priors) @ inverse
+    with_memory = inverse @ (_covariance_of_slope(fit) + priors) @ inverse
     return np.sqrt(np.maximum.reduce([np.diag(inverse), np.diag(by_grasp), np.diag(with_memory), np.zeros(p)]))
 
 
@@ -78,7 +79,7 @@ def _covariance_of_slope(fit: Fit) -> np.ndarray:
 def numerical_shifts(fit: Fit, numerical: Sequence[np.ndarray]) -> np.ndarray:
     """By how much each numerical error of the model would move the coordinates, ``(errors, p)``."""
     inverse = fit.covariance()
-    shifts = [inverse @ (fit.slopes.T @ (fit.weight * one).ravel()) for one in numerical]
+    shifts = [inverse @ (fit.slopes.T @ fit.weighted(one)) for one in numerical]
     return np.array(shifts).reshape(len(shifts), len(fit.vector))
 
 

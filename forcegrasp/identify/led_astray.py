@@ -48,7 +48,7 @@ def _once(fit: Fit, target: Target, simulators: Simulators) -> Fit:
     alone = fit_exactly(target.subset(others), part.problem, of_others, part.vector, part.jacobian)
     start = _own_anew(fit, left_out, alone, target, simulators)
     residual = target.residual(predict(simulators.exact, [fit.problem.case(start)])[0])
-    if np.sum((fit.weight * residual) ** 2) >= fit.cost:
+    if np.sum((fit.weight * residual) ** 2) + fit.problem.priors.cost(start) >= fit.cost:
         return fit
     again = fit_exactly(target, fit.problem, simulators, start, fit.jacobian)
     return min([fit, again], key=lambda one: one.cost)

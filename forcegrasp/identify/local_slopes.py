@@ -9,7 +9,8 @@ from forcegrasp.identify.problem import Problem
 from forcegrasp.identify.target import Target
 from forcegrasp.replay.replay import Replay
 
-# Slopes are measured anew after so many steps; in between they follow the values (Broyden 1965), if they are few.
+# Slopes are measured anew after so many steps; in between they follow the values (Broyden 1965), if they are few: of
+# all grasps, or else of each one, by what it depends on.
 _SLOPES_LAST, _FEW = 3, 30
 
 
@@ -64,14 +65,21 @@ class LocalSlopes:
         value = self.value(x)
         if self._slope is not None and np.array_equal(self._slope[0], x) and not (anew and self._age):
             return self._slope[2]
-        if self._slope is None or anew or self._age >= _SLOPES_LAST or len(x) > _FEW:
+        if (
+            self._slope is None
+            or anew
+            or self._age >= _SLOPES_LAST
+            or self.problem.concerned.sum(axis=1).max(initial=0) > _FEW
+        ):
             self._age, slopes = 0, self._measured(x, value, self._known)
         else:
             self._age += 1
             before, signals, slopes = self._slope
             step = x - before
             surprise = self.target.change(value, signals) - slopes @ step
-            slopes = slopes + surprise[..., None] * (step / (step @ step))
+            own = np.where(self.problem.concerned, step, 0.0) if len(x) > _FEW else np.tile(step, (len(value), 1))
+            own /= np.maximum(np.sum(own**2, axis=1, keepdims=True), 1e-300)
+            slopes = slopes + surprise[..., None] * own[:, None, None]
         self._slope = (x.copy(), value, slopes)
         return slopes
 

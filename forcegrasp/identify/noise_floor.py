@@ -45,7 +45,7 @@ def beyond_fit(fit: Fit, numerical: Sequence[np.ndarray]) -> tuple[np.ndarray, .
     """What of the numerical errors no fitted parameter makes up for, each ``(G, S, C)``."""
     left = []
     for one in numerical:
-        shift = np.linalg.lstsq(fit.slopes, (fit.weight * one).ravel(), rcond=None)[0]
+        shift = np.linalg.lstsq(fit.slopes, fit.weighted(one), rcond=None)[0]
         left.append(one - fit.jacobian @ shift)
     return tuple(left)
 

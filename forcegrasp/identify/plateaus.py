@@ -49,7 +49,8 @@ def _half_width(fit: Fit, target: Target, replay: Replay, index: int) -> float:
     vectors = np.tile(fit.vector, (sizes.size, 1))
     vectors[:, index] = [entry.coordinate(one) for one in sizes.ravel()]
     signals = predict(replay, [fit.problem.case(one) for one in vectors]) + fit.correction
-    costs = np.array([np.sum((fit.weight * target.residual(one)) ** 2) for one in signals])
+    of_priors = fit.problem.priors.cost(fit.vector)
+    costs = np.array([np.sum((fit.weight * target.residual(one)) ** 2) + of_priors for one in signals])
     worse = (costs > fit.cost + _AS_GOOD).reshape(sizes.shape)
     first = np.where(worse.any(axis=1), worse.argmax(axis=1), len(_SHARES) - 1)
     ends = vectors[:, index].reshape(sizes.shape)[np.arange(len(sides)), first]

@@ -10,9 +10,11 @@ import numpy as np
 
 from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.identify.predict import Case
+from forcegrasp.identify.priors import Priors
 from forcegrasp.measure.schema import MeasuredGrasp
 from forcegrasp.measure.servo_set import settings_of
 from forcegrasp.physics.gripper import FORCE_SKEW, MASS, SKEW, Gripper
+from forcegrasp.physics.gripper_parts import BaseParameter
 from forcegrasp.short_repr import ShortRepr
 
 # A setting that is not known is at most so many times what other recordings have, or the inverse.
@@ -35,6 +37,7 @@ class Entry(ShortRepr):
     scale: float  #: a change of this size is worth noticing, in its own unit; 1 for logarithms
     null: float = float("nan")  #: where an effect's parameter does nothing; base parameters have no such value
     jumps: bool = False  #: whether what it does stays as it is, jumps, and stays again: no slope tells where to
+    std: float = float("inf")  #: how far it is from its start, standard deviation of the prior, in its own unit
 
     def coordinate(self, value: float) -> float:
         """The fit's own coordinate of a value; differences of 1 are large."""
@@ -48,12 +51,18 @@ class Entry(ShortRepr):
             coordinate = np.exp(np.clip(coordinate, np.log(self.low), np.log(self.high)))
         return float(np.clip(coordinate * self.scale, self.low, self.high))
 
+    @property
+    def precision(self) -> float:
+        """One over the prior's standard deviation in coordinates; 0 without a prior."""
+        return (self.start if self.logarithmic else self.scale) / self.std
+
 
 class Problem:
     """Base parameters of a gripper on given grasps, and chosen effects.
 
     Per-object parameters have one entry for each object; a radius or an offset has one only where the set does not
-    give it, and so has a setting of a servo's recording (NaN there).
+    give it, and so has a setting of a servo's recording (NaN there). One that is given, but to be fitted within its
+    tolerance, has one with a Gaussian prior.
 
     Args:
       gripper: the model under test.
@@ -87,9 +96,22 @@ class Problem:
         masses = np.array([np.nan if g.mass_kg is None else g.mass_kg for g in grasps])
         if np.isfinite(masses).any():
             self._given[MASS] = masses
+        stds = np.array([g.fitted_m for g in grasps]).reshape(-1, 2).T
+        #: what is given and fitted all the same: values and standard deviations, ``(G,)`` each
+        self._expected = {
+            name: (self._given[name], std)
+            for name, std in zip(("radius_m", "offset_m"), stds, strict=True)
+            if std.any()
+        }
+        self._given |= {name: np.where(std > 0, np.nan, given) for name, (given, std) in self._expected.items()}
         self.entries = [*self._base_entries(), *self._setting_entries(), *self._effect_entries()]
         self.low = np.array([e.coordinate(e.low) for e in self.entries])
         self.high = np.array([e.coordinate(e.high) for e in self.entries])
+        #: Which grasps each entry concerns, ``(G, entries)``.
+        self.concerned = (
+            np.array([e.members for e in self.entries], bool).reshape(len(self.entries), len(self.grasps)).T
+        )
+        self.priors = Priors(self.start(), np.array([e.precision for e in self.entries]))
 
     def __len__(self) -> int:
         return len(self.entries)
@@ -115,9 +137,18 @@ class Problem:
             scale = 1.0 if parameter.logarithmic else (abs(parameter.nominal) or (parameter.high - parameter.low) / 10)
             for name, members in groups.items():
                 if members.any():
-                    bounds = (parameter.nominal, parameter.low, parameter.high, parameter.unit)
-                    entries.append(Entry(name, parameter.name, None, members, *bounds, parameter.logarithmic, scale))
+                    start, std = self._expected_of(parameter, members)
+                    kind = (parameter.low, parameter.high, parameter.unit, parameter.logarithmic, scale)
+                    entries.append(Entry(name, parameter.name, None, members, start, *kind, std=std))
         return entries
+
+    def _expected_of(self, parameter: BaseParameter, members: np.ndarray) -> tuple[float, float]:
+        """Where a parameter starts in these grasps, and its prior's standard deviation; infinite without a prior."""
+        if parameter.name in self._expected:
+            given, std = (float(values[members][0]) for values in self._expected[parameter.name])
+            if np.isfinite(given) and std > 0:
+                return given, std
+        return parameter.nominal, np.inf
 
     def _setting_entries(self) -> list[Entry]:
         """What was set for some of a servo's recordings, and is not known: not far beyond what others have."""

@@ -111,6 +111,8 @@ class MeasuredGrasp(ShortRepr):
     #: How much later than ``time_s`` positions and forces were read; not in any file, but found within a tolerance.
     late_s: tuple[float, float] = field(default=(0.0, 0.0), compare=False)
     mass_kg: float | None = None  #: of the object; the scene's if not given
+    #: Standard deviations of radius and offset, metres, where they are to be fitted within them; 0 takes them as given.
+    fitted_m: tuple[float, float] = field(default=(0.0, 0.0), compare=False)
 
     def summary(self) -> str:
         return f"{cut(self.name)} on {cut(self.object)}, {counted(len(self.time_s), 'sample')}"

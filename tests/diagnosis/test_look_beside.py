@@ -11,6 +11,7 @@ from forcegrasp.diagnosis.result import Step
 from forcegrasp.diagnosis.search import look_beside as module
 from forcegrasp.diagnosis.search import search
 from forcegrasp.diagnosis.search.look_beside import look_beside
+from forcegrasp.identify.priors import Priors
 
 TRUE, READINGS = 8.0, 50
 
@@ -28,6 +29,7 @@ def _fit(size: float, kind: str = "follows_motion") -> SimpleNamespace:
                 SimpleNamespace(low=0.0, high=10.0, coordinate=lambda value: value, jumps=kinds["in_steps"]),
             ],
             case=lambda vector: vector,
+            priors=Priors.none(2),
         ),
         vector=np.array([0.0, size]),
         values=np.array([0.0, size]),

@@ -94,12 +94,15 @@ def test_of_two_that_look_alike_no_promise_is_asked(late, monkeypatch):
     assert merge(study, steps, fit, CATALOGUE, 0) == (steps, fit)
 
 
-@pytest.mark.parametrize(("left", "enough"), [("", True), ("in all", False)])
-def test_one_that_leaves_nothing_does_for_two_however_much_better_these_are(late, monkeypatch, left, enough):
+@pytest.mark.parametrize(("left", "share", "enough"), [("", 0.9, True), ("in all", 0.9, False), ("in all", 0.1, True)])
+def test_one_does_for_two_that_are_surely_better_if_it_leaves_nothing_or_they_hardly_less(
+    late, monkeypatch, left, share, enough
+):
     """Two delays make up for a fraction of a physics step, too, by which one reading is older than another."""
     study, _, fit = late
     monkeypatch.setattr(f"{MERGE}.is_beyond_chance", lambda *_: True)
     monkeypatch.setattr(f"{MERGE}.excess", lambda *_: left)
+    monkeypatch.setattr(Study, "explained", lambda *_: share)
     delay = effect_of("command_delay", light_gripper())
     assert (_roughly_as_good(study, fit, LATE, delay) is not None) == enough
 

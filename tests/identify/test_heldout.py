@@ -19,6 +19,7 @@ from forcegrasp.identify.cross_validation import (
     step_of,
 )
 from forcegrasp.identify.fit import Fit
+from forcegrasp.identify.priors import Priors
 from forcegrasp.identify.target import Target
 from tests.identify.targets import G, S, grasp, make
 
@@ -37,7 +38,13 @@ def linear_fit(target: Target, jacobian: np.ndarray, measured: np.ndarray) -> Fi
     ]
     predicted = jacobian @ theta
     residual = np.where(target.mask[..., None], measured - predicted, 0)
-    problem = _Counted(count=p, low=np.full(p, -np.inf), high=np.full(p, np.inf))
+    problem = _Counted(
+        count=p,
+        low=np.full(p, -np.inf),
+        high=np.full(p, np.inf),
+        priors=Priors.none(p),
+        concerned=np.ones((len(measured), p), bool),
+    )
     return Fit(problem, theta, predicted, residual, jacobian, 0 * predicted, 0.0, 1, target.weight)
 
 
@@ -76,6 +83,26 @@ def test_a_parameter_of_the_heldout_grasp_alone_stays_where_it_is():
     without = fit.jacobian[..., :2]
     step = np.linalg.lstsq(without[1:].reshape(-1, 2), fit.residual[1:].ravel(), rcond=None)[0]
     assert held[0] == pytest.approx(fit.residual[0] - without[0] @ step, abs=1e-4)
+
+
+@pytest.mark.parametrize("said", [0.0, 1e3])
+def test_what_no_other_grasp_tells_is_fitted_to_the_heldout_one_beside_the_others_step(said, monkeypatch):
+    """Such as where its object was, with what was said of it: where it is anyway makes no other grasp's step wrong."""
+    monkeypatch.setattr(cross_validation, "_simulate", lambda *_: None)
+    rng, target = np.random.default_rng(0), make()
+    jacobian = 100 * (1 + rng.standard_normal((G, S, 4, 3)))  # with a mean: the first two move the third
+    jacobian[1:, ..., 2] = 0
+    jacobian[0, ..., :2] *= 30  # and without it nothing else would be where it is
+    fit = linear_fit(target, jacobian, rng.standard_normal((G, S, 4)) + rng.standard_normal((G, 1, 1)))
+    fit.problem.concerned[1:, 2] = False
+    fit.problem.priors = Priors(np.array([0.0, 0.0, fit.vector[2] + 2.0]), np.array([0.0, 0.0, said]))
+    held = heldout_residual(fit, target, [np.array([0])])
+    shared, own = jacobian[..., :2], jacobian[0, ..., 2].ravel()
+    step = np.linalg.lstsq(shared[1:].reshape(-1, 2), fit.residual[1:].ravel(), rcond=None)[0]
+    left = (fit.residual[0] - shared[0] @ step).ravel()
+    size = (own @ left + 2.0 * said**2) / (own @ own + said**2)
+    assert held[0].ravel() == pytest.approx(left - own * size, abs=1e-4 * np.abs(left).max())
+    assert np.abs(own * size).max() > 1
 
 
 def test_a_straight_step_that_leaves_far_more_than_the_fit_is_simulated(monkeypatch):

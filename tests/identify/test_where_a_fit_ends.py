@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from forcegrasp.identify import fit
+from forcegrasp.identify.priors import Priors
 from forcegrasp.identify.simulators import STEP
 
 TRUE = np.array([0.3, -0.2])
@@ -17,7 +18,7 @@ TRUE = np.array([0.3, -0.2])
 class Box:
     """Two coordinates between bounds."""
 
-    low, high = np.full(2, -1.0), np.full(2, 1.0)
+    low, high, priors = np.full(2, -1.0), np.full(2, 1.0), Priors.none(2)
 
     def __len__(self) -> int:
         return 2

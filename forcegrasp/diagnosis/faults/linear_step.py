@@ -21,5 +21,5 @@ def linear_step(target: Target, fit: Fit, background: Background, per_unit: np.n
     """
     columns = np.where(target.mask[..., None, None], per_unit / target.sigma[:, None], 0.0)
     clean = background.remove((fit.weight[..., None] * columns).reshape(-1, columns.shape[-1]))
-    sizes = np.linalg.lstsq(clean, (fit.weight * fit.residual).ravel(), rcond=None)[0]
+    sizes = np.linalg.lstsq(clean, fit.left, rcond=None)[0]
     return sizes, left_beyond_noise(fit.residual - columns @ sizes, background, target)

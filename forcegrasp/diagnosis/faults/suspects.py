@@ -187,7 +187,7 @@ def suspects(loaded: Loaded[MeasurementSet], target: Target, fit: Fit) -> list[F
     elif most is not None:
         found.append(most)
     elif moved is not None and moved.is_within:
-        found.append(_moved(loaded, moved))
+        found.append(moved_as_fault(loaded, moved))
     return found
 
 
@@ -253,10 +253,11 @@ def within_tolerance(
       start: moves from which the fit started already.
     """
     moved = move_given(loaded.measured, target, fit, worth, start)
-    return None if moved is None else _moved(loaded, moved)
+    return None if moved is None else moved_as_fault(loaded, moved)
 
 
-def _moved(loaded: Loaded[MeasurementSet], moved: Moved) -> Fault:
+def moved_as_fault(loaded: Loaded[MeasurementSet], moved: Moved) -> Fault:
+    """A set whose givens were moved within their tolerance, which is no fault."""
     name, right = f"{'_and_'.join(moved.groups)}_tolerance", _changed(loaded, lambda _, g: moved.put(g))
     return Fault(name, moved.words(), moved.check, right, moved)
 

@@ -23,6 +23,7 @@ from forcegrasp.diagnosis.search.exchange import are_alike
 from forcegrasp.diagnosis.search.needless import SURELY, chained, is_enough
 from forcegrasp.diagnosis.signatures import Background, Signatures, trials
 from forcegrasp.diagnosis.study import Study
+from forcegrasp.diagnosis.verdict import LEAST_SHARE
 from forcegrasp.effects import Effect
 from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.identify.fit import Fit, fit_once
@@ -121,7 +122,9 @@ def _roughly_as_good(study: Study, fit: Fit, pair: Collection[str], effect: type
     """The effect as a rough fit has it, unless that leaves something, and says clearly that the others are needed."""
     less = roughly_as(trials([effect]), fit, pair, study, at_the_end=False)
     leaves_more = excess(less.residual, study.numerical, study.target)
-    if leaves_more and is_beyond_chance(study.gains(less.residual, fit.residual), SURELY * LEAST_RISE):
+    asks_for_more = study.explained(less.residual, fit.residual) >= LEAST_SHARE
+    surely = is_beyond_chance(study.gains(less.residual, fit.residual), SURELY * LEAST_RISE)
+    if leaves_more and asks_for_more and surely:
         return None
     without = roughly_without(pair, fit, study, at_the_end=False)
     gain, most = (float(np.nansum(study.gains(without.residual, one.residual))) for one in (less, fit))

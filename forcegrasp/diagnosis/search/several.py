@@ -267,8 +267,7 @@ def _without_each(names: Sequence[str], study: Study, fit: Fit) -> list[Fit]:
         )  # fmt: skip
         at_first = still(start)
         lengths = np.maximum(np.linalg.norm(at_first.slopes, axis=0), 1e-9)
-        left = (at_first.weight * at_first.residual).ravel()
-        step = np.linalg.lstsq(at_first.slopes / lengths, left, rcond=_FLAT)[0] / lengths
+        step = np.linalg.lstsq(at_first.slopes / lengths, at_first.left, rcond=_FLAT)[0] / lengths
         return min([at_first, still(at_first.vector + step)], key=lambda less: less.cost)
 
     return side_by_side([partial(one, name) for name in names])
@@ -300,7 +299,7 @@ def _costs_of_absence(study: Study, fit: Fit) -> list[float]:
     for index, done in enumerate(done_by_each(study, fit)):
         places = [i for i, entry in enumerate(fit.problem.entries) if entry.effect == index]
         background = Background(fit, study.numerical, without=places)
-        left = [background.remove((fit.weight * one).ravel()) for one in (fit.residual, fit.residual + done)]
+        left = [background.remove(fit.left + one) for one in (0.0, fit.weighted(done))]
         costs.append(float(left[1] @ left[1] - left[0] @ left[0]))
     return costs
 

@@ -25,6 +25,6 @@ def better_without(name: str, found: Fit, fit: Fit, study: Study) -> Fit | None:
     """
     problem, start, slopes = problem_without(name, found)
     residual = study.target.residual(predict(study.simulators.exact, [problem.case(start)])[0])
-    if np.sum((found.weight * residual) ** 2) > NO_BETTER * fit.cost:
+    if np.sum((found.weight * residual) ** 2) + problem.priors.cost(start) > NO_BETTER * fit.cost:
         return None
     return fit_exactly(study.target, problem, study.simulators, start, slopes)

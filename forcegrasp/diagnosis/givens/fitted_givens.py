@@ -1,0 +1,116 @@
+"""Radii and places that a set gives, fitted within their tolerance beside all effects, from before the search on."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from forcegrasp.diagnosis.faults.odd_grasps import coordinates_by_name
+from forcegrasp.diagnosis.faults.suspects import besides, leaves_nothing, moved_as_fault
+from forcegrasp.diagnosis.faults.tolerance import Moved
+from forcegrasp.diagnosis.givens.givens_besides import Fitted
+from forcegrasp.diagnosis.result import Diagnosis
+from forcegrasp.identify.base_fit import ended
+from forcegrasp.identify.cross_validation import heldout_residual, make_folds, rms
+from forcegrasp.identify.fit import Fit, fit_once
+from forcegrasp.identify.givens import Given
+from forcegrasp.identify.loading import Loaded
+from forcegrasp.identify.problem import Problem
+from forcegrasp.identify.progress import Progress
+from forcegrasp.identify.simulators import Simulators
+from forcegrasp.measure import MeasurementSet
+
+# They are fitted, and told as moved, if that takes so many squares for each of them off what is left (Akaike 1974).
+_SQUARES = 2.0
+# It shows before any effect is found if it takes this share off what the base model leaves beyond the noise.
+_AT_ONCE = 0.05
+
+
+def with_fitted_givens(
+    loaded: Loaded[MeasurementSet], said: Fitted, progress: Progress
+) -> tuple[Loaded[MeasurementSet], Fitted] | None:
+    """The set with radii and places to be fitted, and its base model; None if they explain little, or are wrong.
+
+    Where they are a little off in many grasps, what is left of each hides small effects, and others that are not there
+    take their part: fitted beside all else, they take it themselves.
+
+    Args:
+      loaded: the set as it is.
+      said: the same, fitted.
+      progress: told what is going on.
+    """
+    target, _, base = said
+    if loaded.gripper.is_servo or leaves_nothing(base.fit, target) or not base.starts_agree:
+        return None
+    measured = loaded.measured
+    fitted_m = (measured.radius_std_m, measured.offset_std_m)
+    grasps = tuple(dataclasses.replace(grasp, fitted_m=fitted_m) for grasp in measured.grasps)
+    problem = Problem(loaded.gripper, grasps)
+    if not len(problem.priors):
+        return None
+    progress("fitting radii and places within their tolerance")
+    target, simulators = dataclasses.replace(target, grasps=grasps), Simulators(problem)
+    fit = fit_once(target, problem, simulators, coordinates_by_name(problem, (base.fit.problem, base.fit.vector)))
+    if base.fit.cost - fit.cost < _SQUARES * len(problem.priors) or not _moved(fit).is_within:
+        return None
+    loaded = dataclasses.replace(loaded, measured=dataclasses.replace(measured, grasps=grasps))
+    return loaded, (target, simulators, ended(fit, target, simulators, base.errors, hasty=True))
+
+
+def told_as_moved(found: Diagnosis, loaded: Loaded[MeasurementSet], said: Fitted) -> Diagnosis | None:
+    """The diagnosis of a set whose radii and places were fitted, with where they were put, if that explains something.
+
+    None if one was put beyond its tolerance: then it is the set that may be wrong. Effects stand beside the base model
+    of the set as it is, which users go on with.
+
+    Args:
+      found: the diagnosis.
+      loaded: the set as it is.
+      said: the same, fitted.
+    """
+    target, _, base = said
+    moved, shows_at_once = _moved(found.fit), _shows_at_once(said, found.base.fit)
+    if not moved.is_within:
+        return None
+    error_moved = found.error_before if found.error_moved is None else found.error_moved
+    if found.verdict.names_effects:
+        found = dataclasses.replace(found, base=base)
+    if not _make_a_difference(found.fit):
+        return found
+    if found.fault is not None and found.fault.moved is not None:
+        timing = found.fault.moved
+        moved = Moved((*timing.numbers, *moved.numbers), np.r_[timing.deviations, moved.deviations])
+    fault = moved_as_fault(loaded, moved)
+    if found.fault is not None and found.fault.moved is None:
+        fault = besides(found.fault, fault)
+    before = rms(heldout_residual(base.fit, target, make_folds(target.grasps)), target)
+    return dataclasses.replace(
+        found, fault=fault, error_before=before if shows_at_once else found.error_before, error_moved=error_moved
+    )
+
+
+def _make_a_difference(fit: Fit) -> bool:
+    """Whether much more would be left with radii and places as they are given, the others making up for it."""
+    given = np.flatnonzero(fit.problem.priors.precision)
+    off = fit.vector[given] - fit.problem.priors.expected[given]
+    known = np.linalg.inv(fit.covariance()[np.ix_(given, given)])
+    return bool(off @ known @ off > _SQUARES * len(given))
+
+
+def _shows_at_once(said: Fitted, fitted: Fit) -> bool:
+    """Whether what was moved takes something off what the base model leaves, before any effect is found."""
+    target, _, base = said
+    return base.fit.cost - fitted.cost > _AT_ONCE * target.beyond_noise(base.fit.residual)
+
+
+def _moved(fit: Fit) -> Moved:
+    """Where a fit puts what is given and fitted all the same."""
+    numbers, deviations = list[Given](), list[float]()
+    for entry, value in zip(fit.problem.entries, fit.values.tolist(), strict=True):
+        if entry.precision:
+            grasp = fit.problem.grasps[int(np.flatnonzero(entry.members)[0])]
+            owner = grasp.object if entry.parameter == "radius_m" else grasp.name
+            numbers.append(Given(entry.parameter, owner, entry.std, entry.members))
+            deviations.append((value - entry.start) / entry.std)
+    return Moved(tuple(numbers), np.array(deviations))

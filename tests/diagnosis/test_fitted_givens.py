@@ -1,0 +1,127 @@
+"""Radii and places are fitted within their tolerance beside the effects, where they are a little off."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from forcegrasp.diagnosis.diagnose_set import _Ways, diagnose_set
+from forcegrasp.diagnosis.givens import fitted_givens
+from forcegrasp.diagnosis.givens.fitted_givens import told_as_moved, with_fitted_givens
+from forcegrasp.identify.fit_set import fit_model
+from forcegrasp.identify.loading import Loaded
+from forcegrasp.identify.progress import silent
+from forcegrasp.identify.verdict import Verdict
+from forcegrasp.measure import MeasurementSet
+from tests.light_set import light_set
+
+RULER_M, BY_HAND_M = 3e-4, 4e-4
+
+
+def said_otherwise(loaded: Loaded[MeasurementSet], radii_m: float, places_m: float) -> Loaded[MeasurementSet]:
+    """A set whose radii and places are off by so much, standard deviations, and which says so of the radii."""
+    rng, measured = np.random.default_rng(5), loaded.measured
+    off = {name: radii_m * rng.standard_normal() for name in dict.fromkeys(g.object for g in measured.grasps)}
+    grasps = tuple(
+        dataclasses.replace(
+            g, radius_m=g.radius_m + off[g.object], offset_m=g.offset_m + places_m * rng.standard_normal()
+        )
+        for g in measured.grasps
+    )
+    return dataclasses.replace(loaded, measured=dataclasses.replace(measured, grasps=grasps, radius_std_m=RULER_M))
+
+
+@pytest.fixture(scope="module")
+def truly():
+    return light_set("force_lag time_constant_s=0.08", grasps=9, samples=54)
+
+
+@pytest.fixture(scope="module")
+def off(truly):
+    return said_otherwise(truly, RULER_M, BY_HAND_M)
+
+
+@pytest.fixture(scope="module")
+def said(off):
+    return fit_model(off, 0, silent, hasty=True)
+
+
+@pytest.fixture(scope="module")
+def fitted(off, said):
+    return with_fitted_givens(off, said, silent)
+
+
+def test_they_leave_less_than_as_they_are_said(off, said, fitted):
+    loaded, (target, _, base) = fitted
+    assert base.fit.cost < said[2].fit.cost - 100
+    priors = base.fit.problem.priors
+    assert len(priors) == len(off.measured.grasps) + len(target.objects)
+    assert priors.cost(base.fit.vector) < 3 * len(priors)
+    assert all(grasp.fitted_m == (RULER_M, off.measured.offset_std_m) for grasp in loaded.measured.grasps)
+
+
+def test_they_stay_as_said_where_nothing_is_left():
+    loaded = light_set(grasps=6, samples=40)
+    assert with_fitted_givens(loaded, fit_model(loaded, 0, silent), silent) is None
+
+
+def test_they_stay_as_said_where_that_would_take_more_than_their_tolerance(truly):
+    wrong = said_otherwise(truly, 8 * RULER_M, BY_HAND_M)
+    assert with_fitted_givens(wrong, fit_model(wrong, 0, silent, hasty=True), silent) is None
+
+
+def test_they_stay_as_said_if_that_does_as_well(off, said, monkeypatch):
+    monkeypatch.setattr(fitted_givens, "_SQUARES", 1e6)
+    assert with_fitted_givens(off, said, silent) is None
+
+
+@pytest.fixture(scope="module")
+def found(fitted):
+    """Where no effect is known."""
+    _, given = fitted
+    return _Ways(None, [], 0, silent).search(*given)
+
+
+def test_where_they_were_put_is_told(off, said, found):
+    told = told_as_moved(found, off, said)
+    assert told is not None
+    assert told.fault is not None
+    assert told.fault.name == "object_tolerance"
+    assert "radius of" in told.fault.words
+    assert told.fault.moved is not None
+    of_fit = {e.name: v - e.start for e, v in zip(found.fit.problem.entries, found.fit.values, strict=True)}
+    name = off.measured.grasps[0].object
+    assert told.fault.moved.moves[f"radius_m of {name}"] == pytest.approx(of_fit[f"radius_m of {name}"])
+    assert told.error_before > told.error_moved == found.error_before
+
+
+def test_what_makes_no_difference_is_not_told(off, said, found, monkeypatch):
+    monkeypatch.setattr(fitted_givens, "_SQUARES", 1e6)
+    assert told_as_moved(found, off, said) is found
+
+
+def test_that_they_show_only_beside_what_is_missing_is_told_as_that(off, said, found, monkeypatch):
+    monkeypatch.setattr(fitted_givens, "_AT_ONCE", 1.0)
+    told = told_as_moved(found, off, said)
+    assert told is not None
+    assert told.error_before == told.error_moved == found.error_before
+
+
+def test_what_is_put_beyond_its_tolerance_is_another_matter(off, said, found):
+    priors = found.fit.problem.priors
+    far = found.fit.vector + 9 * np.where(priors.precision > 0, 1 / np.maximum(priors.precision, 1e-9), 0.0)
+    beyond = dataclasses.replace(found, fit=dataclasses.replace(found.fit, vector=far))
+    assert told_as_moved(beyond, off, said) is None
+
+
+@pytest.mark.long
+def test_an_effect_is_found_though_every_grasp_is_a_little_off(off):
+    found, _ = diagnose_set(off, None, [], 0, silent)
+    assert found.verdict is Verdict.EFFECT
+    assert found.effects == ("force_lag",)
+    assert not found.left
+    assert found.fault is not None
+    assert found.fault.moved is not None
+    assert "object" in found.fault.moved.groups
