@@ -83,7 +83,9 @@ def heldout_residual(fit: Fit, target: Target, folds: Sequence[np.ndarray]) -> n
     until the other folds' error falls. What was asked of a fit before is known.
 
     What no other grasp tells, such as where its object was, is a grasp's own, and fitted to it beside the others' step.
-    What is a servo's recording's own stays as it is: a clock that is off makes up for much that motions should show.
+    Where a fit ended short of what its slopes promise, all grasps ask for a step, too, and a fold's is what the others
+    ask for besides. What is a servo's recording's own stays as it is: a clock that is off makes up for much that
+    motions should show.
     """
     for of, known_folds, held in _KNOWN.setdefault(fit, []):
         if of is target and len(known_folds) == len(folds) and all(map(np.array_equal, known_folds, folds)):
@@ -100,6 +102,9 @@ def _heldout_residual(fit: Fit, target: Target, folds: Sequence[np.ndarray]) -> 
     doubtful: list[tuple[np.ndarray, np.ndarray]] = []
     far = np.sum(residual**2) > _FAR**2 * target.readings
     counts = (_COUNTS if target.gripper.is_servo else np.inf) if far else _COUNTS_NEAR
+    of_all = (
+        np.zeros(len(fit.vector)) if target.gripper.is_servo else step_of(fit, inner.sum(axis=0), slope.sum(axis=0))
+    )
     for fold in folds:
         rest = np.setdiff1d(np.arange(len(target.grasps)), fold)
         if len(rest) == 0:
@@ -107,7 +112,8 @@ def _heldout_residual(fit: Fit, target: Target, folds: Sequence[np.ndarray]) -> 
         step = step_of(fit, inner[rest].sum(axis=0), slope[rest].sum(axis=0))
         if not target.gripper.is_servo:
             own = np.flatnonzero(~fit.problem.concerned[rest].any(axis=0))
-            step = _with_own(fit, step, own, inner[fold].sum(axis=0), slope[fold].sum(axis=0))
+            step = _with_own(fit, step, own, inner[fold].sum(axis=0), slope[fold].sum(axis=0)) - of_all
+            step = np.clip(fit.vector + step, fit.problem.low, fit.problem.high) - fit.vector
         change, squares = jacobian[fold] @ step, np.sum(residual[fold] ** 2)
         held[fold] = residual[fold] - change
         left = np.sum(held[fold] ** 2)

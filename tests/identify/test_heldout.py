@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from types import SimpleNamespace
 
 import numpy as np
@@ -95,14 +96,25 @@ def test_what_no_other_grasp_tells_is_fitted_to_the_heldout_one_beside_the_other
     jacobian[0, ..., :2] *= 30  # and without it nothing else would be where it is
     fit = linear_fit(target, jacobian, rng.standard_normal((G, S, 4)) + rng.standard_normal((G, 1, 1)))
     fit.problem.concerned[1:, 2] = False
-    fit.problem.priors = Priors(np.array([0.0, 0.0, fit.vector[2] + 2.0]), np.array([0.0, 0.0, said]))
+    fit.problem.priors = Priors(fit.vector.copy(), np.array([0.0, 0.0, said]))
     held = heldout_residual(fit, target, [np.array([0])])
     shared, own = jacobian[..., :2], jacobian[0, ..., 2].ravel()
     step = np.linalg.lstsq(shared[1:].reshape(-1, 2), fit.residual[1:].ravel(), rcond=None)[0]
     left = (fit.residual[0] - shared[0] @ step).ravel()
-    size = (own @ left + 2.0 * said**2) / (own @ own + said**2)
+    size = own @ left / (own @ own + said**2)
     assert held[0].ravel() == pytest.approx(left - own * size, abs=1e-4 * np.abs(left).max())
     assert np.abs(own * size).max() > 1
+
+
+def test_a_fit_that_ended_short_is_no_better_on_heldout_grasps_than_where_it_ended():
+    """All grasps ask for the same step then, and no fold's is told from it."""
+    rng, target = np.random.default_rng(0), make()
+    jacobian = 100 * rng.standard_normal((G, S, 4, 3))
+    fit = linear_fit(target, jacobian, rng.standard_normal((G, S, 4)))
+    short = dataclasses.replace(fit, residual=fit.residual + jacobian @ [0.002, -0.001, 0.003])
+    folds = make_folds(target.grasps)
+    off = heldout_residual(short, target, folds) - short.residual
+    assert off == pytest.approx(heldout_residual(fit, target, folds) - fit.residual, abs=1e-3)
 
 
 def test_a_straight_step_that_leaves_far_more_than_the_fit_is_simulated(monkeypatch):
