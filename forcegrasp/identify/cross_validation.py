@@ -27,7 +27,7 @@ _HEAVY = 6.0
 _FAR, _COUNTS, _COUNTS_NEAR, _SHARES = 3.0, 0.02, 0.05, (1.0, 0.5, 0.25, 0.1)
 # So is one that leaves less than this share of a fold's squares: what was not fitted to is not fitted so much better.
 # And one that leaves so many times as much: where others hardly fix what a fold shows, a straight step goes anywhere.
-_TOO_GOOD, _TOO_BAD = 0.25, 10.0
+_TOO_GOOD, _TOO_BAD = 0.25, 1.5
 # A step by which a fold leaves so many times the squares of the fit is held against shorter ones.
 _FAR_WORSE = 4.0
 # What fits leave of held-out grasps, with target and folds: a search, its doubts and its report ask for the same.

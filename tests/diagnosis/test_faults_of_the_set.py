@@ -89,7 +89,8 @@ def test_an_error_of_all_radii_within_their_tolerance_is_no_fault(sound, refitte
         """Alone, and besides an effect."""
         setting = EffectSetting(get_effect("object_size"), "", np.array([move_m]))
         problem = Problem(loaded.gripper, target.grasps, [setting])
-        fit = dataclasses.replace(base.fit, problem=problem, vector=problem.start())
+        jacobian = np.pad(base.fit.jacobian, [(0, 0)] * 3 + [(0, 1)])  # no slope tells of the size
+        fit = dataclasses.replace(base.fit, problem=problem, vector=problem.start(), jacobian=jacobian)
         data = Diagnosis(Verdict.DATA, ("object_size",), (size,), base, fit, target, (), 1.2, 1.0, left=left)
         both = dataclasses.replace(data, verdict=Verdict.EFFECT, effects=("backlash", "object_size"), steps=(one, size))
         return data, both

@@ -7,6 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
+from forcegrasp.diagnosis import diagnose_set as diagnose_set_module
 from forcegrasp.diagnosis.diagnose_set import _Ways, diagnose_set
 from forcegrasp.diagnosis.givens import fitted_givens
 from forcegrasp.diagnosis.givens.fitted_givens import told_as_moved, with_fitted_givens
@@ -125,3 +126,19 @@ def test_an_effect_is_found_though_every_grasp_is_a_little_off(off):
     assert found.fault is not None
     assert found.fault.moved is not None
     assert "object" in found.fault.moved.groups
+
+
+@pytest.mark.parametrize("within", [True, False])
+def test_a_set_is_searched_as_it_is_where_nothing_fits_within_its_tolerance(
+    off, said, fitted, found, within, monkeypatch
+):
+    asked = []
+    monkeypatch.setattr(diagnose_set_module, "with_fitted_givens", lambda *_: fitted)
+    monkeypatch.setattr(diagnose_set_module, "told_as_moved", lambda *_: found if within else None)
+    monkeypatch.setattr(_Ways, "_search_and_move", lambda _, loaded, __: asked.append(loaded) or (found, None))
+    first, further = _Ways(None, [], 0, silent).search_and_move(off, said)
+    assert first is found
+    assert asked == ([fitted[0]] if within else [fitted[0], off])
+    assert (further is not None) == within
+    if further is not None:
+        assert further == (found, fitted[1][1])
