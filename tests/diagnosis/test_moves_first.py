@@ -9,9 +9,13 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
+from forcegrasp.diagnosis import diagnose_set
+from forcegrasp.diagnosis.diagnose_set import _Ways
 from forcegrasp.diagnosis.givens import moved_set
 from forcegrasp.diagnosis.givens.moved_set import MovesFirst
+from forcegrasp.diagnosis.result import kept_steps
 from forcegrasp.diagnosis.search.refine import fit_with
+from forcegrasp.diagnosis.search.stop_when import never
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.effects.for_gripper import effect_of
 from forcegrasp.effects.setting import EffectSetting
@@ -49,3 +53,14 @@ def test_moves_that_leave_much_do_not_come_first(monkeypatch, left, first):
     moves = MovesFirst(light_set())
     assert moves.before_more(cast(Any, None), cast(Any, None)) is first
     assert not moves.beyond
+
+
+def test_a_search_that_ended_for_a_move_that_was_none_goes_on_where_it_stood(made_up, monkeypatch):
+    found, begun = made_up.diagnosis("effect"), []
+    first = SimpleNamespace(asked=True, beyond=False, before_more=never, explain=never)
+    monkeypatch.setattr(diagnose_set, "MovesFirst", lambda _: first)
+    monkeypatch.setattr(_Ways, "moved", lambda *_, **__: None)
+    monkeypatch.setattr(_Ways, "search", lambda *_, start=None, stop_when=None: begun.append(start) or found)
+    loaded = SimpleNamespace(gripper=found.target.gripper)
+    assert _Ways(None, [], 0, silent)._search_and_move(loaded, (found.target, None, found.base)) == (found, None)
+    assert begun == [None, (found.fit, kept_steps(found.steps))]
