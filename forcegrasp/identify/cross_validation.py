@@ -20,6 +20,8 @@ FOLDS = 6
 # What one unit of a coordinate costs in a fold's step, in squared residuals: a parameter that the other grasps don't
 # fix stays where it is.
 _RIDGE = 1.0
+# Damping of steps, the least that keeps a step that all grasps ask for so short, in coordinates.
+_DAMPINGS, _SHORT = (0.0, 1e-3, 1e-2, 0.1, 1.0, 10.0), 0.1
 # Residuals beyond this many σ count linearly: one bad grasp must not decide.
 _HEAVY = 6.0
 # A step that changes more than this share of a fold's squares is simulated, in these lengths: of a servo whose fit is
@@ -27,7 +29,7 @@ _HEAVY = 6.0
 _FAR, _COUNTS, _COUNTS_NEAR, _SHARES = 3.0, 0.02, 0.05, (1.0, 0.5, 0.25, 0.1)
 # So is one that leaves less than this share of a fold's squares: what was not fitted to is not fitted so much better.
 # And one that leaves so many times as much: where others hardly fix what a fold shows, a straight step goes anywhere.
-_TOO_GOOD, _TOO_BAD = 0.25, 1.5
+_TOO_GOOD, _TOO_BAD = 0.25, 10.0
 # A step by which a fold leaves so many times the squares of the fit is held against shorter ones.
 _FAR_WORSE = 4.0
 # What fits leave of held-out grasps, with target and folds: a search, its doubts and its report ask for the same.
@@ -83,9 +85,9 @@ def heldout_residual(fit: Fit, target: Target, folds: Sequence[np.ndarray]) -> n
     until the other folds' error falls. What was asked of a fit before is known.
 
     What no other grasp tells, such as where its object was, is a grasp's own, and fitted to it beside the others' step.
-    Where a fit ended short of what its slopes promise, all grasps ask for a step, too, and a fold's is what the others
-    ask for besides. What is a servo's recording's own stays as it is: a clock that is off makes up for much that
-    motions should show.
+    Where a fit ended short of what its slopes promise, all grasps ask for a step, too: a fold's is what the others ask
+    for besides, and damped until the step of all is small. What is a servo's recording's own stays as it is: a clock
+    that is off makes up for much that motions should show.
     """
     for of, known_folds, held in _KNOWN.setdefault(fit, []):
         if of is target and len(known_folds) == len(folds) and all(map(np.array_equal, known_folds, folds)):
@@ -102,14 +104,12 @@ def _heldout_residual(fit: Fit, target: Target, folds: Sequence[np.ndarray]) -> 
     doubtful: list[tuple[np.ndarray, np.ndarray]] = []
     far = np.sum(residual**2) > _FAR**2 * target.readings
     counts = (_COUNTS if target.gripper.is_servo else np.inf) if far else _COUNTS_NEAR
-    of_all = (
-        np.zeros(len(fit.vector)) if target.gripper.is_servo else step_of(fit, inner.sum(axis=0), slope.sum(axis=0))
-    )
+    of_all, damping = (np.zeros(len(fit.vector)), 0.0) if target.gripper.is_servo else _of_all(fit, inner, slope)
     for fold in folds:
         rest = np.setdiff1d(np.arange(len(target.grasps)), fold)
         if len(rest) == 0:
             continue
-        step = step_of(fit, inner[rest].sum(axis=0), slope[rest].sum(axis=0))
+        step = step_of(fit, inner[rest].sum(axis=0), slope[rest].sum(axis=0), damping)
         if not target.gripper.is_servo:
             own = np.flatnonzero(~fit.problem.concerned[rest].any(axis=0))
             step = _with_own(fit, step, own, inner[fold].sum(axis=0), slope[fold].sum(axis=0)) - of_all
@@ -131,15 +131,29 @@ def normal_equations(fit: Fit) -> tuple[np.ndarray, np.ndarray]:
     return inner, np.einsum("gskp,gsk->gp", weighted, off, optimize=True)
 
 
-def step_of(fit: Fit, inner: np.ndarray, slope: np.ndarray) -> np.ndarray:
+def _of_all(fit: Fit, inner: np.ndarray, slope: np.ndarray) -> tuple[np.ndarray, float]:
+    """The step that all grasps ask for, ``(p,)``, and the damping that keeps it small.
+
+    Where slopes promise something far away, and no step there held it, those of a fold lead nowhere either.
+    """
+    step, damping = np.zeros(len(fit.vector)), 0.0
+    for damping in _DAMPINGS:
+        step = step_of(fit, inner.sum(axis=0), slope.sum(axis=0), damping)
+        if np.abs(step).max(initial=0.0) < _SHORT:
+            break
+    return step, damping
+
+
+def step_of(fit: Fit, inner: np.ndarray, slope: np.ndarray, damping: float = 0.0) -> np.ndarray:
     """The linear step from a fit, ``(p,)``, that some grasps ask for, within the bounds.
 
     Args:
       fit: of all grasps.
       inner, slope: sums of theirs, from :func:`normal_equations`.
+      damping: in shares of the diagonal (Levenberg 1944, Marquardt 1963).
     """
     priors = fit.problem.priors
-    inner = inner + priors.information + _RIDGE * np.eye(len(slope))
+    inner = inner + damping * np.diag(np.diag(inner)) + priors.information + _RIDGE * np.eye(len(slope))
     step = np.linalg.lstsq(inner, slope + priors.pull(fit.vector), rcond=None)[0]
     return np.clip(fit.vector + step, fit.problem.low, fit.problem.high) - fit.vector
 

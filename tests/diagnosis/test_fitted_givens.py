@@ -117,6 +117,23 @@ def test_what_is_put_beyond_its_tolerance_is_another_matter(off, said, found):
     assert told_as_moved(beyond, off, said) is None
 
 
+@pytest.mark.parametrize(("left", "far", "told"), [("", True, True), ("much", True, False), ("", False, False)])
+def test_radii_that_are_put_beyond_it_one_by_one_are_wrong_where_nothing_is_left(off, said, found, left, far, told):
+    """Places that are put too far may be anything, and so may what leaves something."""
+    priors, entries = found.fit.problem.priors, found.fit.problem.entries
+    moves = {name: 5.0 * (-1) ** place for place, name in enumerate(found.target.objects)}
+    by = [moves.get(entry.name.removeprefix("radius_m of "), 0.0 if far else 9.0) for entry in entries]
+    vector = np.where(priors.precision > 0, priors.expected + by / np.maximum(priors.precision, 1e-9), found.fit.vector)
+    fit = dataclasses.replace(found.fit, vector=vector)
+    beyond = dataclasses.replace(found, fit=fit, left=left, verdict=Verdict.EXPLAINED)
+    wrong = told_as_moved(beyond, off, said)
+    assert (wrong is not None) == told
+    if wrong is not None:
+        assert wrong.fault is not None
+        assert (wrong.verdict, wrong.effects, wrong.fault.name) == (Verdict.DATA, ("object_radius",), "object_radius")
+        assert wrong.fault.words.count("the set says") == len(moves)
+
+
 @pytest.mark.long
 def test_an_effect_is_found_though_every_grasp_is_a_little_off(off):
     found, _ = diagnose_set(off, None, [], 0, silent)

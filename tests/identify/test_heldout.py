@@ -117,6 +117,20 @@ def test_a_fit_that_ended_short_is_no_better_on_heldout_grasps_than_where_it_end
     assert off == pytest.approx(heldout_residual(fit, target, folds) - fit.residual, abs=1e-3)
 
 
+def test_slopes_that_promise_something_far_away_where_no_step_held_it_lead_no_fold_there(monkeypatch):
+    monkeypatch.setattr(cross_validation, "_simulate", lambda *_: None)
+    rng, target = np.random.default_rng(0), make()
+    jacobian = 100 * rng.standard_normal((G, S, 4, 2)) * rng.uniform(0.5, 2, (G, 1, 1, 1))
+    short = linear_fit(target, jacobian, 300 * rng.standard_normal((G, S, 4)))
+    asked = 2.0 * jacobian @ rng.standard_normal((2, 1)) * np.where(np.arange(G) == 3, 3.0, 1.0)[:, None, None, None]
+    short = dataclasses.replace(short, residual=short.residual + asked[..., 0])
+    held = heldout_residual(short, target, make_folds(target.grasps))
+    assert rms(held, target) == pytest.approx(rms(short.residual, target), rel=0.05)
+    monkeypatch.setattr(cross_validation, "_DAMPINGS", (0.0,))
+    undamped = heldout_residual(dataclasses.replace(short), target, make_folds(target.grasps))
+    assert np.abs(undamped - short.residual).max() > 3 * np.abs(held - short.residual).max()
+
+
 def test_a_straight_step_that_leaves_far_more_than_the_fit_is_simulated(monkeypatch):
     """A parameter that one grasp shows well and the others hardly goes anywhere without it."""
     rng, target, asked = np.random.default_rng(0), make(), []

@@ -180,7 +180,7 @@ def suspects(loaded: Loaded[MeasurementSet], target: Target, fit: Fit) -> list[F
         found.append(Fault("swapped_positions", words, check, _changed(loaded, lambda _, g: with_positions_swapped(g))))
     # rows that do not keep step with commands make a clock seem off: that must not hide the rest
     moved = wanted_moves(measured, target, fit) if all(one.name == "time_scale" for one in found) else None
-    most = None if moved is None or moved.is_within else _most_radii(loaded, moved)
+    most = None if moved is None or moved.is_within else most_radii(loaded, moved)
     if wrong := doubtful_radii(target, fit, measured.radius_std_m):
         wider = most if most is not None and set(most.fitted) > {f"radius_m of {name}" for name in wrong} else None
         found.append(dataclasses.replace(_wrong_radii(loaded, wrong, moved), wider=wider))
@@ -229,7 +229,7 @@ def _wrong_radii(loaded: Loaded[MeasurementSet], wrong: dict[str, float], moved:
     return Fault("object_radius", words, check, right, fitted=fitted, moves=moves, worth=LEAST_SHARE)
 
 
-def _most_radii(loaded: Loaded[MeasurementSet], moved: Moved) -> Fault | None:
+def most_radii(loaded: Loaded[MeasurementSet], moved: Moved) -> Fault | None:
     """Radii that are beyond their tolerance, some more and some less."""
     measured, apart = loaded.measured, moved.radii_apart()
     said = {g.object: g.radius_m for g in measured.grasps if g.object in apart and g.radius_m is not None}

@@ -7,8 +7,9 @@ import dataclasses
 import numpy as np
 
 from forcegrasp.diagnosis.faults.odd_grasps import coordinates_by_name
-from forcegrasp.diagnosis.faults.suspects import besides, leaves_nothing, moved_as_fault
+from forcegrasp.diagnosis.faults.suspects import besides, leaves_nothing, most_radii, moved_as_fault
 from forcegrasp.diagnosis.faults.tolerance import Moved
+from forcegrasp.diagnosis.givens.doubt import with_fault
 from forcegrasp.diagnosis.givens.givens_besides import Fitted
 from forcegrasp.diagnosis.result import Diagnosis
 from forcegrasp.identify.base_fit import ended
@@ -61,8 +62,9 @@ def with_fitted_givens(
 def told_as_moved(found: Diagnosis, loaded: Loaded[MeasurementSet], said: Fitted) -> Diagnosis | None:
     """The diagnosis of a set whose radii and places were fitted, with where they were put, if that explains something.
 
-    None if one was put beyond its tolerance: then it is the set that may be wrong. Effects stand beside the base model
-    of the set as it is, which users go on with.
+    Radii that are beyond their tolerance, some more and some less, are wrong where that leaves nothing; None if that is
+    not so, and something is beyond its tolerance. Effects stand beside the base model of the set as it is, which users
+    go on with.
 
     Args:
       found: the diagnosis.
@@ -72,7 +74,10 @@ def told_as_moved(found: Diagnosis, loaded: Loaded[MeasurementSet], said: Fitted
     target, _, base = said
     moved, shows_at_once = _moved(found.fit), _shows_at_once(said, found.base.fit)
     if not moved.is_within:
-        return None
+        wrong = most_radii(loaded, moved)
+        if wrong is None or found.left or found.fault is not None or not _places(moved).is_within:
+            return None
+        return with_fault(found, wrong.told_by(found.fit), (target, base.fit))
     error_moved = found.error_before if found.error_moved is None else found.error_moved
     if found.verdict.names_effects:
         found = dataclasses.replace(found, base=base)
@@ -88,6 +93,12 @@ def told_as_moved(found: Diagnosis, loaded: Loaded[MeasurementSet], said: Fitted
     return dataclasses.replace(
         found, fault=fault, error_before=before if shows_at_once else found.error_before, error_moved=error_moved
     )
+
+
+def _places(moved: Moved) -> Moved:
+    """The same without radii."""
+    where = [index for index, number in enumerate(moved.numbers) if number.kind != "radius_m"]
+    return Moved(tuple(moved.numbers[index] for index in where), moved.deviations[where])
 
 
 def _make_a_difference(fit: Fit) -> bool:
