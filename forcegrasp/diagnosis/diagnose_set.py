@@ -159,9 +159,9 @@ class _Ways:
         """The diagnosis of a set; and that with moves within its tolerance, or without some grasps, if it wants any."""
         if (with_givens := with_fitted_givens(loaded, fitted, self.progress)) is not None:
             found, further = self._search_and_move(*with_givens)
-            last, simulators = further or (found, with_givens[1][1])
+            last = found if further is None else further[0]
             if (told := told_as_moved(last, loaded, fitted)) is not None:
-                return found, (told, simulators)
+                return found, (told, Simulators(told.fit.problem))
         return self._search_and_move(loaded, fitted)
 
     def _search_and_move(self, loaded: Loaded[MeasurementSet], fitted: Fitted) -> tuple[Diagnosis, Found | None]:

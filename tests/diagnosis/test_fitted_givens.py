@@ -11,8 +11,11 @@ from forcegrasp.diagnosis import diagnose_set as diagnose_set_module
 from forcegrasp.diagnosis.diagnose_set import _Ways, diagnose_set
 from forcegrasp.diagnosis.givens import fitted_givens
 from forcegrasp.diagnosis.givens.fitted_givens import told_as_moved, with_fitted_givens
+from forcegrasp.effects.for_gripper import effect_of
+from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.identify.fit_set import fit_model
 from forcegrasp.identify.loading import Loaded
+from forcegrasp.identify.problem import Problem
 from forcegrasp.identify.progress import silent
 from forcegrasp.identify.verdict import Verdict
 from forcegrasp.measure import MeasurementSet
@@ -74,7 +77,7 @@ def test_they_stay_as_said_where_that_would_take_more_than_their_tolerance(truly
 
 
 def test_they_stay_as_said_if_that_does_as_well(off, said, monkeypatch):
-    monkeypatch.setattr(fitted_givens, "_SQUARES", 1e6)
+    monkeypatch.setattr(fitted_givens, "_CHANCE", 0.0)
     assert with_fitted_givens(off, said, silent) is None
 
 
@@ -98,9 +101,35 @@ def test_where_they_were_put_is_told(off, said, found):
     assert told.error_before > told.error_moved == found.error_before
 
 
-def test_what_makes_no_difference_is_not_told(off, said, found, monkeypatch):
-    monkeypatch.setattr(fitted_givens, "_SQUARES", 1e6)
-    assert told_as_moved(found, off, said) is found
+def test_what_makes_no_difference_is_taken_as_it_is_given(off, said, found, monkeypatch):
+    """Alone, and beside an effect, which is fitted to the set as it is."""
+    monkeypatch.setattr(fitted_givens, "_CHANCE", 0.0)
+    alone = told_as_moved(found, off, said)
+    assert alone is not None
+    assert alone.fault is None
+    assert alone.fit is alone.base.fit
+    assert alone.fit.cost < 1.001 * said[2].fit.cost
+    assert not any(alone.target.grasps[0].fitted_m)
+    lag = EffectSetting.typical(effect_of("force_lag", off.gripper))
+    problem = Problem(off.gripper, found.target.grasps, [lag])
+    vector = np.r_[found.fit.vector, problem.start()[len(found.fit.vector) :]]
+    jacobian = np.pad(found.fit.jacobian, [(0, 0)] * 3 + [(0, 1)])
+    fit = dataclasses.replace(found.fit, problem=problem, vector=vector, jacobian=jacobian)
+    beside = told_as_moved(dataclasses.replace(found, fit=fit, verdict=Verdict.EFFECT), off, said)
+    assert beside is not None
+    assert not len(beside.fit.problem.priors)
+    assert beside.fit.effect("force_lag").values[0] == pytest.approx(0.08, rel=0.2)
+    assert beside.error_after < alone.error_after
+
+
+def test_without_grasps_that_were_left_out_the_base_model_is_of_the_others(off, said, found):
+    rest = np.arange(1, len(found.target.grasps))
+    few = dataclasses.replace(found, target=found.target.subset(rest), fit=found.fit.subset(rest))
+    few = dataclasses.replace(few, base=dataclasses.replace(found.base, fit=few.fit), verdict=Verdict.EFFECT)
+    told = told_as_moved(few, off, said)
+    assert told is not None
+    assert told.base is few.base
+    assert told.error_before == told.error_moved == few.error_before
 
 
 def test_that_they_show_only_beside_what_is_missing_is_told_as_that(off, said, found, monkeypatch):
@@ -158,4 +187,5 @@ def test_a_set_is_searched_as_it_is_where_nothing_fits_within_its_tolerance(
     assert asked == ([fitted[0]] if within else [fitted[0], off])
     assert (further is not None) == within
     if further is not None:
-        assert further == (found, fitted[1][1])
+        assert further[0] is found
+        assert further[1].exact.grasps == found.fit.problem.grasps

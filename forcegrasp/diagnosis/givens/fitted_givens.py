@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 
 import numpy as np
+from scipy.stats import chi2
 
 from forcegrasp.diagnosis.faults.odd_grasps import coordinates_by_name
 from forcegrasp.diagnosis.faults.suspects import besides, leaves_nothing, most_radii, moved_as_fault
@@ -14,7 +15,7 @@ from forcegrasp.diagnosis.givens.givens_besides import Fitted
 from forcegrasp.diagnosis.result import Diagnosis
 from forcegrasp.identify.base_fit import ended
 from forcegrasp.identify.cross_validation import heldout_residual, make_folds, rms
-from forcegrasp.identify.fit import Fit, fit_once
+from forcegrasp.identify.fit import Fit, fit_exactly, fit_once
 from forcegrasp.identify.givens import Given
 from forcegrasp.identify.loading import Loaded
 from forcegrasp.identify.problem import Problem
@@ -22,8 +23,8 @@ from forcegrasp.identify.progress import Progress
 from forcegrasp.identify.simulators import Simulators
 from forcegrasp.measure import MeasurementSet
 
-# They are fitted, and told as moved, if that takes so many squares for each of them off what is left (Akaike 1974).
-_SQUARES = 2.0
+# They are fitted, and told as moved, if chance alone would hardly ever take as much off what is left.
+_CHANCE = 1e-4
 # It shows before any effect is found if it takes this share off what the base model leaves beyond the noise.
 _AT_ONCE = 0.05
 
@@ -53,18 +54,18 @@ def with_fitted_givens(
     progress("fitting radii and places within their tolerance")
     target, simulators = dataclasses.replace(target, grasps=grasps), Simulators(problem)
     fit = fit_once(target, problem, simulators, coordinates_by_name(problem, (base.fit.problem, base.fit.vector)))
-    if base.fit.cost - fit.cost < _SQUARES * len(problem.priors) or not _moved(fit).is_within:
+    if _may_be_chance(base.fit.cost - fit.cost, len(problem.priors)) or not _moved(fit).is_within:
         return None
     loaded = dataclasses.replace(loaded, measured=dataclasses.replace(measured, grasps=grasps))
     return loaded, (target, simulators, ended(fit, target, simulators, base.errors, hasty=True))
 
 
 def told_as_moved(found: Diagnosis, loaded: Loaded[MeasurementSet], said: Fitted) -> Diagnosis | None:
-    """The diagnosis of a set whose radii and places were fitted, with where they were put, if that explains something.
+    """The diagnosis of a set whose radii and places were fitted, with where they were put, or with them as given.
 
-    Radii that are beyond their tolerance, some more and some less, are wrong where that leaves nothing; None if that is
-    not so, and something is beyond its tolerance. Effects stand beside the base model of the set as it is, which users
-    go on with.
+    As given where nothing asks for another place: then nothing else need be less certain for it. Radii that are beyond
+    their tolerance, some more and some less, are wrong where that leaves nothing; None if that is not so, and something
+    is beyond its tolerance. Effects stand beside the base model of the set as it is, which users go on with.
 
     Args:
       found: the diagnosis.
@@ -72,17 +73,18 @@ def told_as_moved(found: Diagnosis, loaded: Loaded[MeasurementSet], said: Fitted
       said: the same, fitted.
     """
     target, _, base = said
-    moved, shows_at_once = _moved(found.fit), _shows_at_once(said, found.base.fit)
+    moved, all_of_them = _moved(found.fit), len(found.target.grasps) == len(target.grasps)
     if not moved.is_within:
         wrong = most_radii(loaded, moved)
         if wrong is None or found.left or found.fault is not None or not _places(moved).is_within:
             return None
         return with_fault(found, wrong.told_by(found.fit), (target, base.fit))
     error_moved = found.error_before if found.error_moved is None else found.error_moved
-    if found.verdict.names_effects:
+    shows_at_once = all_of_them and _shows_at_once(said, found.base.fit)
+    if found.verdict.names_effects and all_of_them:
         found = dataclasses.replace(found, base=base)
     if not _make_a_difference(found.fit):
-        return found
+        return _as_given(found)
     if found.fault is not None and found.fault.moved is not None:
         timing = found.fault.moved
         moved = Moved((*timing.numbers, *moved.numbers), np.r_[timing.deviations, moved.deviations])
@@ -106,7 +108,24 @@ def _make_a_difference(fit: Fit) -> bool:
     given = np.flatnonzero(fit.problem.priors.precision)
     off = fit.vector[given] - fit.problem.priors.expected[given]
     known = np.linalg.inv(fit.covariance()[np.ix_(given, given)])
-    return bool(off @ known @ off > _SQUARES * len(given))
+    return not _may_be_chance(float(off @ known @ off), len(given))
+
+
+def _may_be_chance(squares: float, numbers: int) -> bool:
+    """Whether so many numbers that are as given take so much off what is left by chance (Wilks 1938)."""
+    return bool(squares < chi2.isf(_CHANCE, numbers))
+
+
+def _as_given(found: Diagnosis) -> Diagnosis:
+    """The diagnosis with its model fitted to radii and places as they are given."""
+    grasps = tuple(dataclasses.replace(grasp, fitted_m=(0.0, 0.0)) for grasp in found.target.grasps)
+    target = dataclasses.replace(found.target, grasps=grasps)
+    problem = Problem(found.fit.problem.gripper, grasps, found.fit.effects)
+    start = coordinates_by_name(problem, (found.fit.problem, found.fit.vector))
+    fit = fit_exactly(target, problem, Simulators(problem), start)
+    base = found.base if found.base.fit is not found.fit else dataclasses.replace(found.base, fit=fit)
+    error = rms(heldout_residual(fit, target, make_folds(grasps)), target)
+    return dataclasses.replace(found, fit=fit, base=base, target=target, error_after=error)
 
 
 def _shows_at_once(said: Fitted, fitted: Fit) -> bool:
