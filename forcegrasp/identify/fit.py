@@ -56,7 +56,7 @@ class Fit(ShortRepr):
     @property
     def left(self) -> np.ndarray:
         """Weighted residuals, and by how many standard deviations priors are missed, ``(N + priors,)``."""
-        return np.r_[(self.weight * self.residual).ravel(), self.problem.priors.missed(self.vector)]
+        return self.problem.priors.beside(self.weight * self.residual, self.vector)
 
     def weighted(self, change: np.ndarray) -> np.ndarray:
         """A change of the signals ÷ noise, ``(G, S, C)``, as it counts, with zeros for priors, ``(N + priors,)``."""
@@ -254,8 +254,8 @@ def _may_fall(local: LocalSlopes, vector: np.ndarray, shift: np.ndarray | float,
 
 def _left(local: LocalSlopes, vector: np.ndarray, shift: np.ndarray | float) -> np.ndarray:
     """Residuals ÷ noise as they count, of predictions shifted by so much, and the priors', ``(N + priors,)``."""
-    left = (local.target.weight * local.target.residual(local.value(vector) + shift)).ravel()
-    return np.r_[left, local.problem.priors.missed(vector)]
+    residual = local.target.residual(local.value(vector) + shift)
+    return local.problem.priors.beside(local.target.weight * residual, vector)
 
 
 def _slopes(local: LocalSlopes, vector: np.ndarray, anew: bool = False) -> np.ndarray:

@@ -65,12 +65,8 @@ class LocalSlopes:
         value = self.value(x)
         if self._slope is not None and np.array_equal(self._slope[0], x) and not (anew and self._age):
             return self._slope[2]
-        if (
-            self._slope is None
-            or anew
-            or self._age >= _SLOPES_LAST
-            or self.problem.concerned.sum(axis=1).max(initial=0) > _FEW
-        ):
+        many = self.problem.concerned.sum(axis=1).max(initial=0) > _FEW
+        if self._slope is None or anew or self._age >= _SLOPES_LAST or many:
             self._age, slopes = 0, self._measured(x, value, self._known)
         else:
             self._age += 1

@@ -31,6 +31,10 @@ class Priors(ShortRepr):
         """By how many standard deviations each is missed, ``(priors,)``: a residual."""
         return ((self.expected - vector) * self.precision)[self.precision > 0]
 
+    def beside(self, residual: np.ndarray, vector: np.ndarray) -> np.ndarray:
+        """Residuals of N readings as they count, of any shape, with those of the priors below, ``(N + priors,)``."""
+        return np.r_[residual.ravel(), self.missed(vector)]
+
     def cost(self, vector: np.ndarray) -> float:
         """Sum of the squares of that."""
         return float(np.sum(self.missed(vector) ** 2))

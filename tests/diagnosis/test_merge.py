@@ -26,6 +26,7 @@ from tests.light_set import light_gripper, light_set
 
 LATE = ("readout_skew", "force_delay")
 MERGE = "forcegrasp.diagnosis.search.merge"
+NEEDLESS = "forcegrasp.diagnosis.search.needless"
 CATALOGUE = list(effects_of(light_gripper()).values())
 
 
@@ -100,8 +101,8 @@ def test_one_does_for_two_that_are_surely_better_if_it_leaves_nothing_or_they_ha
 ):
     """Two delays make up for a fraction of a physics step, too, by which one reading is older than another."""
     study, _, fit = late
-    monkeypatch.setattr(f"{MERGE}.is_beyond_chance", lambda *_: True)
-    monkeypatch.setattr(f"{MERGE}.excess", lambda *_: left)
+    monkeypatch.setattr(f"{NEEDLESS}.is_beyond_chance", lambda *_: True)
+    monkeypatch.setattr(f"{NEEDLESS}.excess", lambda *_: left)
     monkeypatch.setattr(Study, "explained", lambda *_: share)
     delay = effect_of("command_delay", light_gripper())
     assert (_roughly_as_good(study, fit, LATE, delay) is not None) == enough

@@ -8,13 +8,13 @@ import numpy as np
 from scipy.stats import chi2
 
 from forcegrasp.diagnosis.faults.odd_grasps import coordinates_by_name
-from forcegrasp.diagnosis.faults.suspects import besides, leaves_nothing, most_radii, moved_as_fault
+from forcegrasp.diagnosis.faults.suspects import leaves_nothing, most_radii, moved_as_fault
 from forcegrasp.diagnosis.faults.tolerance import Moved
 from forcegrasp.diagnosis.givens.doubt import with_fault
 from forcegrasp.diagnosis.givens.givens_besides import Fitted
 from forcegrasp.diagnosis.result import Diagnosis
 from forcegrasp.identify.base_fit import ended
-from forcegrasp.identify.cross_validation import heldout_residual, make_folds, rms
+from forcegrasp.identify.cross_validation import rms
 from forcegrasp.identify.fit import Fit, fit_exactly, fit_once
 from forcegrasp.identify.givens import Given
 from forcegrasp.identify.loading import Loaded
@@ -79,22 +79,17 @@ def told_as_moved(found: Diagnosis, loaded: Loaded[MeasurementSet], said: Fitted
         if wrong is None or found.left or found.fault is not None or not _places(moved).is_within:
             return None
         return with_fault(found, wrong.told_by(found.fit), (target, base.fit))
-    error_moved = found.error_before if found.error_moved is None else found.error_moved
     shows_at_once = all_of_them and _shows_at_once(said, found.base.fit)
     if found.verdict.names_effects and all_of_them:
         found = dataclasses.replace(found, base=base)
     if not _make_a_difference(found.fit):
         return _as_given(found)
-    if found.fault is not None and found.fault.moved is not None:
-        timing = found.fault.moved
+    if found.fault is not None and (timing := found.fault.moved) is not None:
         moved = Moved((*timing.numbers, *moved.numbers), np.r_[timing.deviations, moved.deviations])
     fault = moved_as_fault(loaded, moved)
-    if found.fault is not None and found.fault.moved is None:
-        fault = besides(found.fault, fault)
-    before = rms(heldout_residual(base.fit, target, make_folds(target.grasps)), target)
-    return dataclasses.replace(
-        found, fault=fault, error_before=before if shows_at_once else found.error_before, error_moved=error_moved
-    )
+    if shows_at_once:
+        return with_fault(found, fault, (target, base.fit))
+    return dataclasses.replace(found, fault=fault, error_moved=found.error_of_base)
 
 
 def _places(moved: Moved) -> Moved:
@@ -124,8 +119,8 @@ def _as_given(found: Diagnosis) -> Diagnosis:
     start = coordinates_by_name(problem, (found.fit.problem, found.fit.vector))
     fit = fit_exactly(target, problem, Simulators(problem), start)
     base = found.base if found.base.fit is not found.fit else dataclasses.replace(found.base, fit=fit)
-    error = rms(heldout_residual(fit, target, make_folds(grasps)), target)
-    return dataclasses.replace(found, fit=fit, base=base, target=target, error_after=error)
+    found = dataclasses.replace(found, fit=fit, base=base, target=target)
+    return dataclasses.replace(found, error_after=rms(found.heldout(), target))
 
 
 def _shows_at_once(said: Fitted, fitted: Fit) -> bool:

@@ -9,7 +9,7 @@ from itertools import combinations
 
 import numpy as np
 
-from forcegrasp.diagnosis.evidence import LEAST_RISE, is_beyond_chance, nearly_as_much
+from forcegrasp.diagnosis.evidence import LEAST_RISE, nearly_as_much
 from forcegrasp.diagnosis.families import (
     may_join,
     problem_without,
@@ -20,14 +20,12 @@ from forcegrasp.diagnosis.families import (
 )
 from forcegrasp.diagnosis.result import Step, kept_steps
 from forcegrasp.diagnosis.search.exchange import are_alike
-from forcegrasp.diagnosis.search.needless import SURELY, chained, is_enough
+from forcegrasp.diagnosis.search.needless import SURELY, asks_for_more, chained, is_enough
 from forcegrasp.diagnosis.signatures import Background, Signatures, trials
 from forcegrasp.diagnosis.study import Study
-from forcegrasp.diagnosis.verdict import LEAST_SHARE
 from forcegrasp.effects import Effect
 from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.identify.fit import Fit, fit_once
-from forcegrasp.identify.noise_floor import excess
 from forcegrasp.identify.side_by_side import side_by_side
 
 # Signatures are straight: an effect that does for two promises at least this share of what they explain.
@@ -121,10 +119,7 @@ def promising(
 def _roughly_as_good(study: Study, fit: Fit, pair: Collection[str], effect: type[Effect]) -> EffectSetting | None:
     """The effect as a rough fit has it, unless that leaves something, and says clearly that the others are needed."""
     less = roughly_as(trials([effect]), fit, pair, study, at_the_end=False)
-    leaves_more = excess(less.residual, study.numerical, study.target)
-    asks_for_more = study.explained(less.residual, fit.residual) >= LEAST_SHARE
-    surely = is_beyond_chance(study.gains(less.residual, fit.residual), SURELY * LEAST_RISE)
-    if leaves_more and asks_for_more and surely:
+    if asks_for_more(study, less.residual, fit.residual, SURELY * LEAST_RISE):
         return None
     without = roughly_without(pair, fit, study, at_the_end=False)
     gain, most = (float(np.nansum(study.gains(without.residual, one.residual))) for one in (less, fit))

@@ -131,12 +131,22 @@ def is_enough(study: Study, without: np.ndarray, of_simple: np.ndarray, of_riche
       of_simple, of_richer: those that they leave.
     """
     gain, most = (float(np.nansum(study.gains(without, held))) for held in (of_simple, of_richer))
-    asks_for_more = (
+    return nearly_as_much(gain, most) and not asks_for_more(study, of_simple, of_richer, LEAST_RISE)
+
+
+def asks_for_more(study: Study, of_simple: np.ndarray, of_richer: np.ndarray, least: float) -> bool:
+    """Whether the search would ask for what a richer model has besides: the simple one leaves something, and more.
+
+    Args:
+      study: the measurements.
+      of_simple, of_richer: residuals that they leave.
+      least: of the rise of the log-likelihood.
+    """
+    return (
         bool(excess(of_simple, study.numerical, study.target))
-        and is_beyond_chance(study.gains(of_simple, of_richer), LEAST_RISE)
+        and is_beyond_chance(study.gains(of_simple, of_richer), least)
         and study.explained(of_simple, of_richer) >= LEAST_SHARE
     )
-    return nearly_as_much(gain, most) and not asks_for_more
 
 
 def chained(steps: Sequence[Step], error: float) -> list[Step]:

@@ -67,8 +67,8 @@ def costs_without(index: int, signals: np.ndarray, fit: Fit, target: Target) -> 
       fit: whose slopes count.
       target: the measurements.
     """
-    of_priors = fit.problem.priors.missed(fit.vector)
-    left = np.stack([np.r_[(fit.weight * target.residual(one)).ravel(), of_priors] for one in signals], axis=1)
+    priors = fit.problem.priors
+    left = np.stack([priors.beside(fit.weight * target.residual(one), fit.vector) for one in signals], axis=1)
     return np.sum(Background(fit, (), without=[index]).remove(left) ** 2, axis=0)
 
 
