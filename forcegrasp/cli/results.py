@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import shutil
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -14,8 +15,8 @@ from forcegrasp.errors import ConfigError, writing
 if TYPE_CHECKING:
     from rich.table import Table
 
-# Wider than any table.
-_WIDEST = 10_000
+# Wider than any table; and how wide one is that goes to a file or a pipe.
+_WIDEST, _IN_A_FILE = 10_000, 120
 
 
 def default_out(verb: str, out: str) -> Path:
@@ -59,7 +60,7 @@ def print_table(table: Table) -> None:
     from rich.console import Console
     from rich.measure import Measurement
 
-    console = Console(highlight=False)
+    console = Console(highlight=False, width=shutil.get_terminal_size((_IN_A_FILE, 0)).columns)
     texts = [[str(column.header), *map(str, column.cells)] for column in table.columns]
     widths = [max(map(cell_len, column)) for column in texts]
     least = [max(map(cell_len, " ".join(column).split()), default=0) for column in texts]

@@ -145,7 +145,9 @@ def roughly_as(
     at_the_end: bool = True,
     begin: np.ndarray | None = None,
 ) -> Fit:
-    """The same by the cheap model, from the best of several sizes.
+    """The same by the cheap model, from the best of several sizes; each variant is fitted, and the best one returned.
+
+    What a variant leaves where nothing else is fitted yet says little of it.
 
     Args:
       settings: the effect at these sizes.
@@ -153,10 +155,16 @@ def roughly_as(
       at_the_end: whether slopes are measured where the fit ends, too: not needed if only what it leaves counts.
       begin: coordinates of the fit to begin at, in place of where it stands, ``(p,)``.
     """
-    problem, start, slopes = _best_start(settings, fit, without, study, begin)
-    return fit_once(
-        study.target, problem, study.simulators, start, fit.correction, rounds=0, slopes=slopes, at_the_end=at_the_end
-    )
+
+    def of_kind(settings: Sequence[EffectSetting]) -> Fit:
+        problem, start, slopes = _best_start(settings, fit, without, study, begin)
+        return fit_once(
+            study.target, problem, study.simulators, start, fit.correction, rounds=0, slopes=slopes,
+            at_the_end=at_the_end,
+        )  # fmt: skip
+
+    kinds = dict.fromkeys(one.kind for one in settings)
+    return min((of_kind([one for one in settings if one.kind == kind]) for kind in kinds), key=lambda one: one.cost)
 
 
 def refit_as_richer(container: type[Effect], fit: Fit, without: str, study: Study) -> Fit:

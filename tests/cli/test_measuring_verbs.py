@@ -324,3 +324,11 @@ def test_no_name_is_cut_off_in_a_table(width, capsys, monkeypatch):
         assert word in printed
     if width >= 80:
         assert max(map(len, printed.splitlines())) <= width
+
+
+def test_a_table_that_goes_to_a_file_has_a_page_to_itself(capsys, monkeypatch):
+    monkeypatch.delenv("COLUMNS", raising=False)
+    table = Table("parameters", box=box.SIMPLE_HEAD)
+    table.add_row("word " * 22)
+    print_table(table)
+    assert 100 < max(map(len, capsys.readouterr().out.splitlines())) <= 120

@@ -241,3 +241,22 @@ def test_what_means_nothing_in_a_model_is_not_tried(known, gave_way, tried):
     problem = SimpleNamespace(effects=[EffectSetting.typical(get_effect(name)) for name in known])
     fit, steps = SimpleNamespace(problem=problem), [SimpleNamespace(replaces=gave_way)]
     assert {e.name for e in left_to_try([get_effect(name) for name in names], fit, steps)} == tried
+
+
+def test_the_variant_that_leaves_least_is_chosen_once_each_is_fitted(monkeypatch):
+    """What one leaves before the others have made way for it says little."""
+    bias = get_effect("encoder_bias")
+    tried = [EffectSetting(bias, variant, np.array([size, 0.0])) for variant in bias.variants for size in (1e-4, 2e-4)]
+    unfitted = {("reading", 1e-4): 9.0, ("reading", 2e-4): 8.0, ("loop", 1e-4): 5.0, ("loop", 2e-4): 6.0}
+    fitted = {"reading": 1.0, "loop": 4.0}
+
+    def best_start(settings, *_):
+        return min(settings, key=lambda one: unfitted[one.variant, one.values[0]]), None, None
+
+    monkeypatch.setattr(families, "_best_start", best_start)
+    monkeypatch.setattr(
+        families, "fit_once", lambda _, one, *__, **___: SimpleNamespace(one=one, cost=fitted[one.variant])
+    )
+    study = SimpleNamespace(target=None, simulators=None)
+    best = families.roughly_as(tried, SimpleNamespace(correction=None), (), study)
+    assert (best.one.variant, best.one.values[0]) == ("reading", 2e-4)
