@@ -157,14 +157,17 @@ class _Ways:
 
     def search_and_move(self, loaded: Loaded[MeasurementSet], fitted: Fitted) -> tuple[Diagnosis, Found | None]:
         """The diagnosis of a set; and that with moves within its tolerance, or without some grasps, if it wants any."""
-        if (with_givens := with_fitted_givens(loaded, fitted, self.progress)) is not None:
-            found, further = self._search_and_move(*with_givens)
-            last = found if further is None else further[0]
-            if (told := told_as_moved(last, loaded, fitted)) is not None:
-                return found, (told, Simulators(told.fit.problem))
-        return self._search_and_move(loaded, fitted)
+        return self.search_with_givens(loaded, fitted) or self.search_as_it_is(loaded, fitted)
 
-    def _search_and_move(self, loaded: Loaded[MeasurementSet], fitted: Fitted) -> tuple[Diagnosis, Found | None]:
+    def search_with_givens(self, loaded: Loaded[MeasurementSet], fitted: Fitted) -> tuple[Diagnosis, Found] | None:
+        """The same with radii and places fitted beside all effects; None if they explain little, or are wrong."""
+        if (with_givens := with_fitted_givens(loaded, fitted, self.progress)) is None:
+            return None
+        found, further = self.search_as_it_is(*with_givens)
+        told = told_as_moved(found if further is None else further[0], loaded, fitted)
+        return None if told is None else (found, (told, Simulators(told.fit.problem)))
+
+    def search_as_it_is(self, loaded: Loaded[MeasurementSet], fitted: Fitted) -> tuple[Diagnosis, Found | None]:
         moves, leave_out = None if loaded.gripper.is_servo else MovesFirst(loaded), LeaveOutFirst()
 
         def something_else_first(target: Target, fit: Fit) -> bool:
@@ -243,6 +246,12 @@ class _Ways:
         return (fault, right) if less else None
 
 
+def _is_no_surprise(found: Diagnosis) -> bool:
+    """Whether no effect need be held against moves of radii and places that alone explain a set."""
+    moved = None if found.fault is None else found.fault.moved
+    return found.verdict is not Verdict.EXPLAINED or moved is None or moved.is_no_surprise
+
+
 def _is_convincing(moved: Diagnosis) -> bool:
     """Whether effects that were too little before the set was moved leave nothing with it, or explain most."""
     explained = explained_share(moved.error_before, moved.error_after, noise=moved.floor)
@@ -251,7 +260,13 @@ def _is_convincing(moved: Diagnosis) -> bool:
 
 def _put_right_or_as_said(ways: _Ways, loaded: Loaded[MeasurementSet], said: Fitted) -> Found:
     """The diagnosis with the first fault put right that makes the set likelier; of the set as it is if none does."""
+    search = ways.search_and_move
     for suspect in suspects(loaded, said[0], said[2].fit):
+        if suspect.moved is not None and suspect.moved.groups == ("object",):
+            # beside effects they go where these leave them; put where the base model wants them they are in their way
+            both, search = ways.search_with_givens(loaded, said), ways.search_as_it_is
+            if both is not None and _is_no_surprise(both[1][0]):
+                return both[1]
         if (better := ways.put_right(suspect, said)) is None:
             continue
         fault, right = better
@@ -275,7 +290,7 @@ def _put_right_or_as_said(ways: _Ways, loaded: Loaded[MeasurementSet], said: Fit
             as_it_is = ways.search(*said, stop_when=StopWhen(given, most=most))
             likely = dataclasses.replace(more_likely(likely, as_it_is), stopped=as_it_is.stopped)
         return likely, right[1] if likely.target.grasps is right[0].grasps else said[1]
-    found, further = ways.search_and_move(loaded, said)
+    found, further = search(loaded, said)
     if further is None and (further := ways.put_right_besides(found, loaded)) is None:
         return within_tolerance_after_all(found, loaded), said[1]
     return further

@@ -104,7 +104,8 @@ def fault_words(diagnosis: Diagnosis) -> str:
         return ""
     named = _named(diagnosis.fault)
     if is_only_moved(diagnosis) and diagnosis.fault.moved is not None:
-        moved = f"What the set gives was moved within its tolerance: {diagnosis.fault.words}"
+        how = "within its tolerance" if diagnosis.fault.moved.is_within else "by more than its tolerance"
+        moved = f"What the set gives was moved {how}: {diagnosis.fault.words}"
         if smaller := diagnosis.fault.moved.smaller_m:
             moved += f" (objects are {1e3 * smaller:.2g} mm smaller on average so, as backlash would have them look)"
         if diagnosis.error_moved is None:

@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 from forcegrasp.diagnosis import diagnose_set as diagnose_set_module
-from forcegrasp.diagnosis.diagnose_set import _Ways, diagnose_set
+from forcegrasp.diagnosis.diagnose_set import _put_right_or_as_said, _Ways, diagnose_set
+from forcegrasp.diagnosis.faults.suspects import Fault, moved_as_fault
+from forcegrasp.diagnosis.faults.tolerance import all_radii
 from forcegrasp.diagnosis.givens import fitted_givens
 from forcegrasp.diagnosis.givens.fitted_givens import told_as_moved, with_fitted_givens
 from forcegrasp.effects.for_gripper import effect_of
@@ -19,6 +21,7 @@ from forcegrasp.identify.problem import Problem
 from forcegrasp.identify.progress import silent
 from forcegrasp.identify.verdict import Verdict
 from forcegrasp.measure import MeasurementSet
+from forcegrasp.reports.diagnosis_words import fault_words
 from tests.light_set import light_set
 
 RULER_M, BY_HAND_M = 3e-4, 4e-4
@@ -163,6 +166,26 @@ def test_radii_that_are_put_beyond_it_one_by_one_are_wrong_where_nothing_is_left
         assert wrong.fault.words.count("the set says") == len(moves)
 
 
+@pytest.mark.parametrize(
+    ("kind", "explained", "told"), [("offset_m", 0.9, True), ("offset_m", 0.5, False), ("radius_m", 0.9, False)]
+)
+def test_places_that_make_up_for_what_differs_from_grasp_to_grasp_are_told_as_moved_too_far(
+    off, said, found, kind, explained, told
+):
+    fit, priors = found.fit, found.fit.problem.priors
+    one = next(index for index, entry in enumerate(fit.problem.entries) if entry.parameter == kind)
+    vector = np.where(priors.precision > 0, priors.expected, fit.vector)
+    vector[one] += 9 / priors.precision[one]
+    after = np.sqrt((1 - explained) * (found.error_of_base**2 - found.floor**2) + found.floor**2)
+    beyond = dataclasses.replace(
+        found, fit=dataclasses.replace(fit, vector=vector), verdict=Verdict.EFFECT, error_after=after
+    )
+    moved = told_as_moved(beyond, off, said)
+    assert (moved is not None) == told
+    if moved is not None:
+        assert fault_words(moved).startswith("What the set gives was moved by more than its tolerance: place in grasp")
+
+
 @pytest.mark.long
 def test_an_effect_is_found_though_every_grasp_is_a_little_off(off):
     found, _ = diagnose_set(off, None, [], 0, silent)
@@ -181,7 +204,7 @@ def test_a_set_is_searched_as_it_is_where_nothing_fits_within_its_tolerance(
     asked = []
     monkeypatch.setattr(diagnose_set_module, "with_fitted_givens", lambda *_: fitted)
     monkeypatch.setattr(diagnose_set_module, "told_as_moved", lambda *_: found if within else None)
-    monkeypatch.setattr(_Ways, "_search_and_move", lambda _, loaded, __: asked.append(loaded) or (found, None))
+    monkeypatch.setattr(_Ways, "search_as_it_is", lambda _, loaded, __: asked.append(loaded) or (found, None))
     first, further = _Ways(None, [], 0, silent).search_and_move(off, said)
     assert first is found
     assert asked == ([fitted[0]] if within else [fitted[0], off])
@@ -189,3 +212,33 @@ def test_a_set_is_searched_as_it_is_where_nothing_fits_within_its_tolerance(
     if further is not None:
         assert further[0] is found
         assert further[1].exact.grasps == found.fit.problem.grasps
+
+
+def within(loaded, said, by_stds: float) -> Fault:
+    """All radii moved by so many standard deviations."""
+    moved = all_radii(loaded.measured, said[0], by_stds * RULER_M)
+    assert moved is not None
+    return moved_as_fault(loaded, moved)
+
+
+@pytest.mark.parametrize(
+    ("verdict", "by_stds", "settled"),
+    [
+        (Verdict.EFFECT, 1.9, True),
+        (Verdict.EXPLAINED, 0.1, True),
+        (Verdict.EXPLAINED, 1.9, False),  # an effect may do as well as so large a move
+    ],
+)
+def test_what_seems_moved_is_fitted_beside_effects_before_it_is_put_there(
+    off, said, found, verdict, by_stds, settled, monkeypatch
+):
+    """Radii that stay where the base model wants them leave no room for the effect that they made up for."""
+    put = []
+    suspect, told = within(off, said, 1.0), within(off, said, by_stds)
+    both = found, (dataclasses.replace(found, verdict=verdict, fault=told), said[1])
+    monkeypatch.setattr(diagnose_set_module, "suspects", lambda *_: [suspect])
+    monkeypatch.setattr(_Ways, "search_with_givens", lambda *_: both)
+    monkeypatch.setattr(_Ways, "put_right", lambda _, fault, __: put.append(fault))
+    monkeypatch.setattr(_Ways, "search_as_it_is", lambda *_: both)
+    assert _put_right_or_as_said(_Ways(None, [], 0, silent), off, said) is both[1]
+    assert put == ([] if settled else [suspect])

@@ -62,5 +62,5 @@ def test_a_search_that_ended_for_a_move_that_was_none_goes_on_where_it_stood(mad
     monkeypatch.setattr(_Ways, "moved", lambda *_, **__: None)
     monkeypatch.setattr(_Ways, "search", lambda *_, start=None, stop_when=None: begun.append(start) or found)
     loaded = SimpleNamespace(gripper=found.target.gripper)
-    assert _Ways(None, [], 0, silent)._search_and_move(loaded, (found.target, None, found.base)) == (found, None)
+    assert _Ways(None, [], 0, silent).search_as_it_is(loaded, (found.target, None, found.base)) == (found, None)
     assert begun == [None, (found.fit, kept_steps(found.steps))]

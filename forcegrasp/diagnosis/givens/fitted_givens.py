@@ -7,12 +7,14 @@ import dataclasses
 import numpy as np
 from scipy.stats import chi2
 
+from forcegrasp.diagnosis.evidence import LEAST_SHARE_TOGETHER
 from forcegrasp.diagnosis.faults.odd_grasps import coordinates_by_name
 from forcegrasp.diagnosis.faults.suspects import leaves_nothing, most_radii, moved_as_fault
 from forcegrasp.diagnosis.faults.tolerance import Moved
 from forcegrasp.diagnosis.givens.doubt import with_fault
 from forcegrasp.diagnosis.givens.givens_besides import Fitted
 from forcegrasp.diagnosis.result import Diagnosis
+from forcegrasp.diagnosis.verdict import explained_share
 from forcegrasp.identify.base_fit import ended
 from forcegrasp.identify.cross_validation import rms
 from forcegrasp.identify.fit import Fit, fit_exactly, fit_once
@@ -65,7 +67,8 @@ def told_as_moved(found: Diagnosis, loaded: Loaded[MeasurementSet], said: Fitted
 
     As given where nothing asks for another place: then nothing else need be less certain for it. Radii that are beyond
     their tolerance, some more and some less, are wrong where that leaves nothing; None if that is not so, and something
-    is beyond its tolerance. Effects stand beside the base model of the set as it is, which users go on with.
+    is beyond its tolerance, unless effects explain most and places alone are. Effects stand beside the base model of
+    the set as it is, which users go on with.
 
     Args:
       found: the diagnosis.
@@ -74,9 +77,9 @@ def told_as_moved(found: Diagnosis, loaded: Loaded[MeasurementSet], said: Fitted
     """
     target, _, base = said
     moved, all_of_them = _moved(found.fit), len(found.target.grasps) == len(target.grasps)
-    if not moved.is_within:
+    if not moved.is_within and not _explains_most_but_places(found, moved):
         wrong = most_radii(loaded, moved)
-        if wrong is None or found.left or found.fault is not None or not _places(moved).is_within:
+        if wrong is None or found.left or found.fault is not None or not _of(moved, "offset_m").is_within:
             return None
         return with_fault(found, wrong.told_by(found.fit), (target, base.fit))
     shows_at_once = all_of_them and _shows_at_once(said, found.base.fit)
@@ -92,9 +95,18 @@ def told_as_moved(found: Diagnosis, loaded: Loaded[MeasurementSet], said: Fitted
     return dataclasses.replace(found, fault=fault, error_moved=found.error_of_base)
 
 
-def _places(moved: Moved) -> Moved:
-    """The same without radii."""
-    where = [index for index, number in enumerate(moved.numbers) if number.kind != "radius_m"]
+def _explains_most_but_places(found: Diagnosis, moved: Moved) -> bool:
+    """Whether effects explain most, and only places are beyond their tolerance: with what differs from grasp to grasp.
+
+    Each grasp has a place of its own, which makes up for whatever else differs, such as a delay that is not steady.
+    """
+    explained = explained_share(found.error_of_base, found.error_after, noise=found.floor)
+    return found.verdict.names_effects and explained >= LEAST_SHARE_TOGETHER and _of(moved, "radius_m").is_within
+
+
+def _of(moved: Moved, kind: str) -> Moved:
+    """Only what was moved of radii, or of places."""
+    where = [index for index, number in enumerate(moved.numbers) if number.kind == kind]
     return Moved(tuple(moved.numbers[index] for index in where), moved.deviations[where])
 
 
