@@ -23,6 +23,8 @@ from forcegrasp.replay.replay import Replay
 
 #: What is further off than so many standard deviations is no tolerance, if it is one number alone.
 MOST = 3.0
+#: Standard deviation of radii that a ruler measured, metres.
+RULER_M = 3e-4
 # What is nearer than so many is not told.
 _TOLD = 1.0
 # Radii whose mean is so many of its standard deviations below 0 may all be too large, or pads may stand further out.

@@ -10,7 +10,7 @@ from scipy.stats import chi2
 from forcegrasp.diagnosis.evidence import LEAST_SHARE_TOGETHER
 from forcegrasp.diagnosis.faults.odd_grasps import coordinates_by_name
 from forcegrasp.diagnosis.faults.suspects import leaves_nothing, most_radii, moved_as_fault
-from forcegrasp.diagnosis.faults.tolerance import Moved
+from forcegrasp.diagnosis.faults.tolerance import RULER_M, Moved
 from forcegrasp.diagnosis.givens.doubt import with_fault
 from forcegrasp.diagnosis.givens.givens_besides import Fitted
 from forcegrasp.diagnosis.result import Diagnosis
@@ -37,7 +37,8 @@ def with_fitted_givens(
     """The set with radii and places to be fitted, and its base model; None if they explain little, or are wrong.
 
     Where they are a little off in many grasps, what is left of each hides small effects, and others that are not there
-    take their part: fitted beside all else, they take it themselves.
+    take their part: fitted beside all else, they take it themselves. Radii that are off by more than the set says, some
+    more and some less, are fitted as if a ruler had measured them: it may not have said that one did.
 
     Args:
       loaded: the set as it is.
@@ -47,19 +48,33 @@ def with_fitted_givens(
     target, _, base = said
     if loaded.gripper.is_servo or leaves_nothing(base.fit, target) or not base.starts_agree:
         return None
-    measured = loaded.measured
-    fitted_m = (measured.radius_std_m, measured.offset_std_m)
-    grasps = tuple(dataclasses.replace(grasp, fitted_m=fitted_m) for grasp in measured.grasps)
-    problem = Problem(loaded.gripper, grasps)
-    if not len(problem.priors):
-        return None
     progress("fitting radii and places within their tolerance")
-    target, simulators = dataclasses.replace(target, grasps=grasps), Simulators(problem)
-    fit = fit_once(target, problem, simulators, coordinates_by_name(problem, (base.fit.problem, base.fit.vector)))
-    if _may_be_chance(base.fit.cost - fit.cost, len(problem.priors)) or not _moved(fit).is_within:
+    measured, std_m = loaded.measured, loaded.measured.radius_std_m
+    fit = _with_priors(measured, said, std_m)
+    if fit is not None and std_m < RULER_M and _moved(fit, std_m).radii_apart():
+        progress("fitting radii as if a ruler had measured them")
+        fit, std_m = _with_priors(measured, said, RULER_M), RULER_M
+        if fit is not None and _moved(fit, std_m).smaller_m:  # it may be an effect
+            return None
+    if fit is None or not _moved(fit, std_m).is_within:
         return None
+    grasps = fit.problem.grasps
+    target, simulators = dataclasses.replace(target, grasps=grasps), Simulators(fit.problem)
     loaded = dataclasses.replace(loaded, measured=dataclasses.replace(measured, grasps=grasps))
     return loaded, (target, simulators, ended(fit, target, simulators, base.errors, hasty=True))
+
+
+def _with_priors(measured: MeasurementSet, said: Fitted, radius_std_m: float) -> Fit | None:
+    """The base model with radii, given with this standard deviation, and places; None if they explain little."""
+    target, _, base = said
+    fitted_m = (radius_std_m, measured.offset_std_m)
+    grasps = tuple(dataclasses.replace(grasp, fitted_m=fitted_m) for grasp in measured.grasps)
+    problem = Problem(target.gripper, grasps)
+    if not len(problem.priors):
+        return None
+    start = coordinates_by_name(problem, (base.fit.problem, base.fit.vector))
+    fit = fit_once(dataclasses.replace(target, grasps=grasps), problem, Simulators(problem), start)
+    return None if _may_be_chance(base.fit.cost - fit.cost, len(problem.priors)) else fit
 
 
 def told_as_moved(found: Diagnosis, loaded: Loaded[MeasurementSet], said: Fitted) -> Diagnosis | None:
@@ -67,8 +82,9 @@ def told_as_moved(found: Diagnosis, loaded: Loaded[MeasurementSet], said: Fitted
 
     As given where nothing asks for another place: then nothing else need be less certain for it. Radii that are beyond
     their tolerance, some more and some less, are wrong where that leaves nothing; None if that is not so, and something
-    is beyond its tolerance, unless effects explain most and places alone are. Effects stand beside the base model of
-    the set as it is, which users go on with.
+    is beyond its tolerance. Where effects explain most of what was left, something may be left, and places may be
+    beyond it: each grasp has one of its own, which makes up for whatever else differs, such as a delay that is not
+    steady. Effects stand beside the base model of the set as it is, which users go on with.
 
     Args:
       found: the diagnosis.
@@ -76,10 +92,13 @@ def told_as_moved(found: Diagnosis, loaded: Loaded[MeasurementSet], said: Fitted
       said: the same, fitted.
     """
     target, _, base = said
-    moved, all_of_them = _moved(found.fit), len(found.target.grasps) == len(target.grasps)
-    if not moved.is_within and not _explains_most_but_places(found, moved):
+    moved = _moved(found.fit, loaded.measured.radius_std_m)
+    all_of_them = len(found.target.grasps) == len(target.grasps)
+    most = found.verdict.names_effects and _explained(found) >= LEAST_SHARE_TOGETHER
+    radii, places = (_of(moved, kind).is_within for kind in ("radius_m", "offset_m"))
+    if not radii or not (places or most):
         wrong = most_radii(loaded, moved)
-        if wrong is None or found.left or found.fault is not None or not _of(moved, "offset_m").is_within:
+        if wrong is None or (found.left and not most) or found.fault is not None or not places:
             return None
         return with_fault(found, wrong.told_by(found.fit), (target, base.fit))
     shows_at_once = all_of_them and _shows_at_once(said, found.base.fit)
@@ -95,13 +114,9 @@ def told_as_moved(found: Diagnosis, loaded: Loaded[MeasurementSet], said: Fitted
     return dataclasses.replace(found, fault=fault, error_moved=found.error_of_base)
 
 
-def _explains_most_but_places(found: Diagnosis, moved: Moved) -> bool:
-    """Whether effects explain most, and only places are beyond their tolerance: with what differs from grasp to grasp.
-
-    Each grasp has a place of its own, which makes up for whatever else differs, such as a delay that is not steady.
-    """
-    explained = explained_share(found.error_of_base, found.error_after, noise=found.floor)
-    return found.verdict.names_effects and explained >= LEAST_SHARE_TOGETHER and _of(moved, "radius_m").is_within
+def _explained(found: Diagnosis) -> float:
+    """Share of what the base model leaves beyond the noise that effects explain."""
+    return explained_share(found.error_of_base, found.error_after, noise=found.floor)
 
 
 def _of(moved: Moved, kind: str) -> Moved:
@@ -141,13 +156,14 @@ def _shows_at_once(said: Fitted, fitted: Fit) -> bool:
     return base.fit.cost - fitted.cost > _AT_ONCE * target.beyond_noise(base.fit.residual)
 
 
-def _moved(fit: Fit) -> Moved:
-    """Where a fit puts what is given and fitted all the same."""
+def _moved(fit: Fit, radius_std_m: float) -> Moved:
+    """Where a fit puts what is given and fitted all the same, if radii are given with this standard deviation."""
     numbers, deviations = list[Given](), list[float]()
     for entry, value in zip(fit.problem.entries, fit.values.tolist(), strict=True):
         if entry.precision:
             grasp = fit.problem.grasps[int(np.flatnonzero(entry.members)[0])]
             owner = grasp.object if entry.parameter == "radius_m" else grasp.name
-            numbers.append(Given(entry.parameter, owner, entry.std, entry.members))
-            deviations.append((value - entry.start) / entry.std)
+            std = radius_std_m if entry.parameter == "radius_m" else entry.std
+            numbers.append(Given(entry.parameter, owner, std, entry.members))
+            deviations.append((value - entry.start) / std)
     return Moved(tuple(numbers), np.array(deviations))

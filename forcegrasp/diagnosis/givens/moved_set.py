@@ -12,7 +12,7 @@ from scipy.stats import chi2
 from forcegrasp.diagnosis.evidence import LEAST_LEAD, LEAST_SHARE_OF_MANY, is_beyond_chance, rivals_in
 from forcegrasp.diagnosis.families import refit_without, roughly_as, roughly_without
 from forcegrasp.diagnosis.faults.suspects import Fault, besides, within_tolerance
-from forcegrasp.diagnosis.faults.tolerance import MOST, WORTH, Moved, all_radii, first_move, time_of_reading
+from forcegrasp.diagnosis.faults.tolerance import MOST, RULER_M, WORTH, Moved, all_radii, first_move, time_of_reading
 from forcegrasp.diagnosis.few import with_few
 from forcegrasp.diagnosis.givens.lost_motion import with_lost_motion
 from forcegrasp.diagnosis.result import Candidate, Diagnosis, Step, kept_steps
@@ -42,8 +42,6 @@ SearchOn = Callable[[Target, Simulators, BaseFit, Fit, Sequence[Step]], Diagnosi
 # Where a move within the tolerance would take off this share of what a model leaves, it comes before unlikely effects:
 # they are then looked for in what it leaves.
 _COMES_FIRST = 0.25
-# Standard deviation of radii that a ruler measured, metres.
-_RULER_M = 3e-4
 # Squares that one more number costs, as a move's price has it.
 _OF_SIZE = 2.0
 
@@ -73,8 +71,8 @@ class MovesFirst:
         """
         measured = self.loaded.measured
         first = self.explain(target, fit)
-        if not first and measured.radius_std_m < _RULER_M:
-            moved = _most_explained(dataclasses.replace(measured, radius_std_m=_RULER_M), target, fit)
+        if not first and measured.radius_std_m < RULER_M:
+            moved = _most_explained(dataclasses.replace(measured, radius_std_m=RULER_M), target, fit)
             # if all are off alike it may be an effect
             first = self.beyond = moved is not None and moved.radii_differ_by_m > MOST * measured.radius_std_m
         self.asked |= first
