@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from forcegrasp.diagnosis.evidence import LEAST_SHARE_TOGETHER
 from forcegrasp.diagnosis.result import Step
 from forcegrasp.diagnosis.search.conclusion import Begun
 from forcegrasp.diagnosis.search.left_over import leaves_little, left_over
@@ -22,7 +23,7 @@ from forcegrasp.diagnosis.search.several import (
 from forcegrasp.diagnosis.search.so_far import SoFar
 from forcegrasp.diagnosis.search.stop_when import Asked
 from forcegrasp.diagnosis.study import Study
-from forcegrasp.diagnosis.verdict import EXPLAINED_FAR, explained_share
+from forcegrasp.diagnosis.verdict import EXPLAINED, EXPLAINED_FAR, explained_share
 from forcegrasp.effects import Effect
 from forcegrasp.identify.fit import Fit
 
@@ -80,10 +81,12 @@ class AtOnce:
         if self.alone:
             return False
         begun, before = self.begun, study.error(study.heldout(fit))
+        # where no effect alone explains half, those that are found one by one need explain no more than that, either
+        least = EXPLAINED_FAR if one >= EXPLAINED else LEAST_SHARE_TOGETHER
 
         def enough(further: Fit) -> bool:
             after = study.error(study.heldout(further))
-            return explained_share(before, after, noise=begun.floor) >= EXPLAINED_FAR
+            return explained_share(before, after, noise=begun.floor) >= least
 
         def keep(found: list[Step], further: Fit) -> bool:
             if enough(further):

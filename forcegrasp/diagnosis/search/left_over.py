@@ -51,6 +51,11 @@ def left_by_many(study: Study, fit: Fit) -> tuple[str, Noise | None, str]:
     return left, None, ""
 
 
+def leaves_more_than_noise(study: Study, fit: Fit) -> bool:
+    """Whether a model leaves what no noise does, however strong."""
+    return bool(left_over(study, fit)[0])
+
+
 def is_worth_looking(study: Study, fit: Fit) -> bool:
     """Whether a model leaves more than noise, or what seems to be stronger noise: only that none is found tells."""
     left, noise = left_over(study, fit)

@@ -22,6 +22,7 @@ from forcegrasp.diagnosis.search.left_over import (
     is_worth_looking,
     leaves_forms,
     leaves_little,
+    leaves_more_than_noise,
     left_over,
 )
 from forcegrasp.diagnosis.search.look_beside import look_beside
@@ -175,6 +176,8 @@ def _add_effects(so_far: SoFar, begun: Begun, rng: np.random.Generator, stop_whe
             step = look_further(study, fit, screen, untried, rng, before=step.candidates)
             step = _of_another(step, study) if forms else step
         much = much and not leaves_forms(study, fit, begun.error, begun.floor)
+        # of what seems to be stronger noise, beside what was found, signatures say enough
+        much = much and (fit is begun.fit or leaves_more_than_noise(study, fit))
         if much and not step.effects:
             far = FAR if study.target.gripper.is_servo else _FAR_OF_CONTACTS
             worth_it = untried and not tried_anyway and step.error_before < far
