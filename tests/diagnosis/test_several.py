@@ -246,6 +246,25 @@ def test_otherwise_they_are_looked_for_one_by_one(small, monkeypatch, why_not):
     assert diagnosis.preferred == ()
 
 
+@pytest.mark.parametrize(
+    ("one", "together", "taken"), [(0.4, 0.8, True), (0.6, 0.8, False), (0.4, 0.7, False), (0.6, 0.95, True)]
+)
+def test_they_need_explain_no_more_than_one_by_one_where_none_alone_explains_half(
+    small, monkeypatch, one, together, taken
+):
+    study, base = small
+    further = fit_with([setting("force_bias")], base.fit.vector, study, base.fit)
+    of_all = {"add_up": True, "share_of_one": one, "share_of_alike": {}, "share_of_all": 1.0, "leaves_little": False}
+    for name, said in of_all.items():
+        monkeypatch.setattr(at_once, name, lambda *_, said=said: said)
+    monkeypatch.setattr(at_once, "explained_share", lambda *_, **__: together)
+    monkeypatch.setattr(at_once, "add_several", lambda *_, **__: ([], further))
+    begun, so_far = SimpleNamespace(effects=CATALOGUE, given=0, floor=1.0, error=2.0), SimpleNamespace(all=None)
+    several_at_once = at_once.AtOnce(so_far, begun, np.random.default_rng(0), lambda *_: False)
+    assert several_at_once.that_add_up(study, [], base.fit, None, CATALOGUE) == taken
+    assert (so_far.all[2] is further) == taken
+
+
 @pytest.mark.parametrize(("share", "tried_together"), [(1.0, False), (0.9, True), (0.5, True)])
 def test_one_that_looks_like_the_best_of_them_is_tried_if_it_does_as_well_alone(
     small, monkeypatch, share, tried_together
