@@ -52,8 +52,8 @@ def left_by_many(study: Study, fit: Fit) -> tuple[str, Noise | None, str]:
 
 
 def leaves_more_than_noise(study: Study, fit: Fit) -> bool:
-    """Whether a model leaves what no noise does, however strong."""
-    return bool(left_over(study, fit)[0])
+    """Whether a model leaves what no noise does, however strong, in more than a single grasp."""
+    return bool(left_by_many(study, fit)[0])
 
 
 def is_worth_looking(study: Study, fit: Fit) -> bool:
