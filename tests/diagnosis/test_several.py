@@ -258,11 +258,18 @@ def test_they_need_explain_no_more_than_one_by_one_where_none_alone_explains_hal
     for name, said in of_all.items():
         monkeypatch.setattr(at_once, name, lambda *_, said=said: said)
     monkeypatch.setattr(at_once, "explained_share", lambda *_, **__: together)
-    monkeypatch.setattr(at_once, "add_several", lambda *_, **__: ([], further))
+    ended = []
+
+    def one_round(study, fit, steps, effects, given, rng, keep, straight):
+        ended.append(keep([], further))
+        return [], further
+
+    monkeypatch.setattr(at_once, "add_several", one_round)
     begun, so_far = SimpleNamespace(effects=CATALOGUE, given=0, floor=1.0, error=2.0), SimpleNamespace(all=None)
     several_at_once = at_once.AtOnce(so_far, begun, np.random.default_rng(0), lambda *_: False)
     assert several_at_once.that_add_up(study, [], base.fit, None, CATALOGUE) == taken
     assert (so_far.all[2] is further) == taken
+    assert ended == [taken and one < 0.5]  # the rest is looked for one by one
 
 
 @pytest.mark.parametrize(("share", "tried_together"), [(1.0, False), (0.9, True), (0.5, True)])

@@ -60,7 +60,8 @@ def with_fitted_givens(
         return None
     grasps = fit.problem.grasps
     target, simulators = dataclasses.replace(target, grasps=grasps), Simulators(fit.problem)
-    loaded = dataclasses.replace(loaded, measured=dataclasses.replace(measured, grasps=grasps))
+    measured = dataclasses.replace(measured, grasps=grasps, radius_std_m=std_m)
+    loaded = dataclasses.replace(loaded, measured=measured)
     return loaded, (target, simulators, ended(fit, target, simulators, base.errors, hasty=True))
 
 

@@ -92,7 +92,9 @@ class AtOnce:
             if enough(further):
                 self.so_far.all = study, found, further
             little = leaves_little(study, further, begun.error, begun.floor)
-            return little or (enough(further) and self.given_is_first(study, further))
+            # what that leaves is looked for one by one: a dozen effects more may each explain a little of it
+            as_one_by_one = least < EXPLAINED_FAR
+            return little or (enough(further) and (as_one_by_one or self.given_is_first(study, further)))
 
         found = add_several(study, fit, steps, begun.effects, begun.given, self.rng, keep, straight=screen)
         of_all = 0.0 if found is None else share_of_all(study, fit, found[1])
