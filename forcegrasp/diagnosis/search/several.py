@@ -32,7 +32,7 @@ from forcegrasp.diagnosis.signatures import (
     trials_of,
 )
 from forcegrasp.diagnosis.study import Study
-from forcegrasp.diagnosis.verdict import EXPLAINED
+from forcegrasp.diagnosis.verdict import EXPLAINED, LEAST_SHARE
 from forcegrasp.effects import Effect
 from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.identify.fit import Fit, fit_exactly, fit_once
@@ -174,7 +174,8 @@ def add_several(
             continue
         held, after = study.heldout(fit), study.heldout(further)
         # the first five together explain little only where they are look-alikes of what is not known
-        if study.explained(held, after) < (EXPLAINED if fit is before else LEAST_SHARE_OF_MANY):
+        further_on = LEAST_SHARE_OF_MANY if straight is None else LEAST_SHARE  # one by one as much is asked for
+        if study.explained(held, after) < (EXPLAINED if fit is before else further_on):
             break
         change = f"{study.error(held):.2f} → {study.error(after):.2f} × noise"
         study.progress(f"found {', '.join(names)}: held-out error {change}")
