@@ -219,6 +219,24 @@ def test_rounds_end_where_one_leaves_little(small, monkeypatch):
     assert {one.effect.name for one in fit.problem.effects} == set(rounds[1])
 
 
+@pytest.mark.parametrize(("add_up", "rounds"), [(True, 1), (False, 2)])
+def test_a_round_of_those_that_add_up_must_explain_a_quarter(small, monkeypatch, add_up, rounds):
+    study, base = small
+    monkeypatch.setattr(several, "_AT_ONCE", 1)
+    monkeypatch.setattr(several, "_SEVERAL", 1)
+    shares = itertools.chain([0.9], itertools.repeat(0.2))
+    monkeypatch.setattr(Study, "explained", lambda *_: next(shares))
+    found = []
+
+    def keep(steps, fit):
+        found.append(steps)
+        return len(found) == 2
+
+    straight = Screen(CATALOGUE, study) if add_up else None
+    add_several(study, base.fit, (), CATALOGUE, 0, np.random.default_rng(0), keep, straight=straight)
+    assert len(found) == rounds
+
+
 @pytest.mark.parametrize("why_not", ["none is found", "too little is explained", "one does as well", "one does all"])
 def test_otherwise_they_are_looked_for_one_by_one(small, monkeypatch, why_not):
     study, base = small
