@@ -15,6 +15,7 @@ from forcegrasp.diagnosis.givens import fitted_givens
 from forcegrasp.diagnosis.givens.fitted_givens import told_as_moved, with_fitted_givens
 from forcegrasp.effects.for_gripper import effect_of
 from forcegrasp.effects.setting import EffectSetting
+from forcegrasp.identify.cross_validation import make_folds
 from forcegrasp.identify.fit_set import fit_model
 from forcegrasp.identify.loading import Loaded
 from forcegrasp.identify.problem import Problem
@@ -128,7 +129,8 @@ def test_what_makes_no_difference_is_taken_as_it_is_given(off, said, found, monk
 def test_without_grasps_that_were_left_out_the_base_model_is_of_the_others(off, said, found):
     rest = np.arange(1, len(found.target.grasps))
     few = dataclasses.replace(found, target=found.target.subset(rest), fit=found.fit.subset(rest))
-    few = dataclasses.replace(few, base=dataclasses.replace(found.base, fit=few.fit), verdict=Verdict.EFFECT)
+    base, folds = dataclasses.replace(found.base, fit=few.fit), tuple(make_folds(few.target.grasps))
+    few = dataclasses.replace(few, base=base, folds=folds, verdict=Verdict.EFFECT)
     told = told_as_moved(few, off, said)
     assert told is not None
     assert told.base is few.base

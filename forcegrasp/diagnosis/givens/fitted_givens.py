@@ -97,6 +97,10 @@ def told_as_moved(found: Diagnosis, loaded: Loaded[MeasurementSet], said: Fitted
     all_of_them = len(found.target.grasps) == len(target.grasps)
     most = found.verdict.names_effects and _explained(found) >= LEAST_SHARE_TOGETHER
     radii, places = (_of(moved, kind).is_within for kind in ("radius_m", "offset_m"))
+    tolerances = loaded.measured.radius_std_m, loaded.measured.offset_std_m
+    if radii and any(grasp.fitted_m != tolerances for grasp in found.target.grasps):
+        found = _fitted_again(found, tolerances)  # with what was found the set is as exact as it says
+        moved = _moved(found.fit, loaded.measured.radius_std_m)
     if not radii or not (places or most):
         wrong = most_radii(loaded, moved)
         if wrong is None or (found.left and not most) or found.fault is not None or not places:
@@ -105,8 +109,9 @@ def told_as_moved(found: Diagnosis, loaded: Loaded[MeasurementSet], said: Fitted
     shows_at_once = all_of_them and _shows_at_once(said, found.base.fit)
     if found.verdict.names_effects and all_of_them:
         found = dataclasses.replace(found, base=base)
-    if not _make_a_difference(found.fit):
-        return _as_given(found)
+    as_given = _fitted_again(found, (0.0, 0.0))
+    if _may_be_chance(as_given.fit.cost - found.fit.cost, len(found.fit.problem.priors)):
+        return as_given
     if found.fault is not None and (timing := found.fault.moved) is not None:
         moved = Moved((*timing.numbers, *moved.numbers), np.r_[timing.deviations, moved.deviations])
     fault = moved_as_fault(loaded, moved)
@@ -126,22 +131,14 @@ def _of(moved: Moved, kind: str) -> Moved:
     return Moved(tuple(moved.numbers[index] for index in where), moved.deviations[where])
 
 
-def _make_a_difference(fit: Fit) -> bool:
-    """Whether much more would be left with radii and places as they are given, the others making up for it."""
-    given = np.flatnonzero(fit.problem.priors.precision)
-    off = fit.vector[given] - fit.problem.priors.expected[given]
-    known = np.linalg.inv(fit.covariance()[np.ix_(given, given)])
-    return not _may_be_chance(float(off @ known @ off), len(given))
-
-
 def _may_be_chance(squares: float, numbers: int) -> bool:
     """Whether so many numbers that are as given take so much off what is left by chance (Wilks 1938)."""
     return bool(squares < chi2.isf(_CHANCE, numbers))
 
 
-def _as_given(found: Diagnosis) -> Diagnosis:
-    """The diagnosis with its model fitted to radii and places as they are given."""
-    grasps = tuple(dataclasses.replace(grasp, fitted_m=(0.0, 0.0)) for grasp in found.target.grasps)
+def _fitted_again(found: Diagnosis, fitted_m: tuple[float, float]) -> Diagnosis:
+    """The diagnosis with its model fitted to radii and places with these standard deviations, metres; 0 as given."""
+    grasps = tuple(dataclasses.replace(grasp, fitted_m=fitted_m) for grasp in found.target.grasps)
     target = dataclasses.replace(found.target, grasps=grasps)
     problem = Problem(found.fit.problem.gripper, grasps, found.fit.effects)
     start = coordinates_by_name(problem, (found.fit.problem, found.fit.vector))
