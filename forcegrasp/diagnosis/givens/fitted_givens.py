@@ -92,32 +92,38 @@ def told_as_moved(found: Diagnosis, loaded: Loaded[MeasurementSet], said: Fitted
       loaded: the set as it is.
       said: the same, fitted.
     """
-    target, _, base = said
-    moved = _moved(found.fit, loaded.measured.radius_std_m)
+    (target, _, base), measured = said, loaded.measured
     all_of_them = len(found.target.grasps) == len(target.grasps)
+    shows_at_once = all_of_them and _shows_at_once(said, found.base.fit)
     most = found.verdict.names_effects and _explained(found) >= LEAST_SHARE_TOGETHER
+    if found.verdict.names_effects and all_of_them:
+        found = dataclasses.replace(found, base=base)
+    # from where they are given: without the effects they may have gone where no slope leads back from
+    as_given = _fitted_again(found, (0.0, 0.0))
+    if _does_as_well(as_given.fit, found.fit):
+        return as_given
+    tolerances = measured.radius_std_m, measured.offset_std_m
+    if any(grasp.fitted_m != tolerances for grasp in found.target.grasps):
+        as_exact_as_said = _fitted_again(as_given, tolerances)
+        found = as_exact_as_said if _does_as_well(as_exact_as_said.fit, found.fit) else found
+    moved = _moved(found.fit, measured.radius_std_m)
     radii, places = (_of(moved, kind).is_within for kind in ("radius_m", "offset_m"))
-    tolerances = loaded.measured.radius_std_m, loaded.measured.offset_std_m
-    if radii and any(grasp.fitted_m != tolerances for grasp in found.target.grasps):
-        found = _fitted_again(found, tolerances)  # with what was found the set is as exact as it says
-        moved = _moved(found.fit, loaded.measured.radius_std_m)
     if not radii or not (places or most):
         wrong = most_radii(loaded, moved)
         if wrong is None or (found.left and not most) or found.fault is not None or not places:
             return None
         return with_fault(found, wrong.told_by(found.fit), (target, base.fit))
-    shows_at_once = all_of_them and _shows_at_once(said, found.base.fit)
-    if found.verdict.names_effects and all_of_them:
-        found = dataclasses.replace(found, base=base)
-    as_given = _fitted_again(found, (0.0, 0.0))
-    if _may_be_chance(as_given.fit.cost - found.fit.cost, len(found.fit.problem.priors)):
-        return as_given
     if found.fault is not None and (timing := found.fault.moved) is not None:
         moved = Moved((*timing.numbers, *moved.numbers), np.r_[timing.deviations, moved.deviations])
     fault = moved_as_fault(loaded, moved)
     if shows_at_once:
         return with_fault(found, fault, (target, base.fit))
     return dataclasses.replace(found, fault=fault, error_moved=found.error_of_base)
+
+
+def _does_as_well(fit: Fit, other: Fit) -> bool:
+    """Whether a fit leaves no more than one in which more of what is given is open, but for what chance may."""
+    return _may_be_chance(fit.cost - other.cost, len(other.problem.priors))
 
 
 def _explained(found: Diagnosis) -> float:
