@@ -366,33 +366,11 @@ def test_what_replaces_the_law_of_contacts_is_fitted_however_little_it_promises(
     assert fitted == [effect.name for effect in effects[:12]] + ["hunt_crossley_contact"]
 
 
-@pytest.mark.parametrize("of_forms", [True, False])
-def test_effects_that_promise_little_are_not_fitted_for_what_forms_leave(
-    creeping, fitted_anyway, monkeypatch, of_forms
-):
-    study, base = creeping
-    asked = []
-
-    def step(study, fit, *_, anyway=False, **__):
-        asked.append(anyway)
-        return Step((), (), (), 2.0, 2.0) if fit.problem.effects else fitted_anyway
-
-    monkeypatch.setattr(search, "look_further", step)
-    for module in (search, conclusion):
-        monkeypatch.setattr(module, "odd_grasps", lambda *_: ())
-    monkeypatch.setattr("forcegrasp.diagnosis.search.left_over.left_over", lambda *_: ("somewhere", None))
-    monkeypatch.setattr(search, "leaves_little", lambda *_: False)
-    monkeypatch.setattr(search, "leaves_forms", lambda *_: of_forms)
-    for module, name in ((search, "exchange"), (search, "split"), (at_once, "add_several")):
-        monkeypatch.setattr(module, name, lambda *_: None)
-    monkeypatch.setattr(conclusion, "may_be_forms", lambda *_: False)
-    search.diagnose(study.target, base, study.simulators, [SMOOTH, DELAY], np.random.default_rng(0))
-    assert asked == [False, False, False] + [True] * (not of_forms)
-
-
-@pytest.mark.parametrize(("left", "anyway"), [("", []), ("somewhere", [True])])
-def test_effects_that_promise_little_are_not_fitted_for_what_seems_to_be_noise(
-    creeping, fitted_anyway, monkeypatch, left, anyway
+@pytest.mark.parametrize(
+    ("of_forms", "left", "fitted"), [(True, "somewhere", []), (False, "", []), (False, "somewhere", [True])]
+)
+def test_effects_that_promise_little_are_not_fitted_for_what_forms_or_noise_leave(
+    creeping, fitted_anyway, monkeypatch, of_forms, left, fitted
 ):
     """Beside one that was found; signatures are asked once more, for an effect may look like stronger noise."""
     study, base = creeping
@@ -406,14 +384,14 @@ def test_effects_that_promise_little_are_not_fitted_for_what_seems_to_be_noise(
     for module in (search, conclusion):
         monkeypatch.setattr(module, "odd_grasps", lambda *_: ())
     monkeypatch.setattr("forcegrasp.diagnosis.search.left_over.left_over", lambda *_: (left, None))
-    monkeypatch.setattr(search, "leaves_little", lambda *_: False)
-    monkeypatch.setattr(search, "leaves_forms", lambda *_: False)
     monkeypatch.setattr(search, "is_worth_looking", lambda *_: True)
+    monkeypatch.setattr(search, "leaves_little", lambda *_: False)
+    monkeypatch.setattr(search, "leaves_forms", lambda *_: of_forms)
     for module, name in ((search, "exchange"), (search, "split"), (at_once, "add_several")):
         monkeypatch.setattr(module, name, lambda *_: None)
     monkeypatch.setattr(conclusion, "may_be_forms", lambda *_: False)
     search.diagnose(study.target, base, study.simulators, [SMOOTH, DELAY], np.random.default_rng(0))
-    assert asked == [False, False, False, *anyway]
+    assert asked == [False, False, False, *fitted]
 
 
 def test_an_effect_that_comes_back_after_it_gave_way_is_kept(made_up):
