@@ -8,6 +8,7 @@ explains more.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
+from functools import partial
 
 import numpy as np
 
@@ -20,6 +21,7 @@ from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.identify.fit import Fit, fit_exactly, fit_once
 from forcegrasp.identify.predict import predict
 from forcegrasp.identify.problem import Problem
+from forcegrasp.identify.side_by_side import side_by_side
 from forcegrasp.physics.gripper import Gripper
 
 # An effect is the simpler one if what it has beyond it is within so many standard errors of doing nothing.
@@ -164,7 +166,8 @@ def roughly_as(
         )  # fmt: skip
 
     kinds = dict.fromkeys(one.kind for one in settings)
-    return min((of_kind([one for one in settings if one.kind == kind]) for kind in kinds), key=lambda one: one.cost)
+    fits = side_by_side([partial(of_kind, [one for one in settings if one.kind == kind]) for kind in kinds])
+    return min(fits, key=lambda one: one.cost)
 
 
 def refit_as_richer(container: type[Effect], fit: Fit, without: str, study: Study) -> Fit:

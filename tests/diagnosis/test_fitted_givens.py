@@ -251,23 +251,20 @@ def test_what_seems_moved_is_fitted_beside_effects_before_it_is_put_there(
 
 def test_radii_that_a_ruler_seems_to_have_measured_are_fitted_as_if_it_had(truly):
     """Some are larger and some smaller; if all were smaller it might be lost motion."""
-    measured = said_otherwise(truly, RULER_M, 0.0).measured
-    radii = {grasp.object: grasp.radius_m for grasp in truly.measured.grasps}
-    true = {grasp.name: grasp.offset_m for grasp in truly.measured.grasps}
-    names = list(radii)
 
-    def with_calliper(by_m: list[float]) -> Loaded[MeasurementSet]:
+    def with_calliper(loaded: Loaded[MeasurementSet], by_m: list[float]) -> Loaded[MeasurementSet]:
+        measured = loaded.measured
+        names = list(dict.fromkeys(grasp.object for grasp in measured.grasps))
         grasps = tuple(
-            dataclasses.replace(g, radius_m=radii[g.object] + by_m[names.index(g.object)], offset_m=true[g.name])
-            for g in measured.grasps
+            dataclasses.replace(g, radius_m=g.radius_m + by_m[names.index(g.object)]) for g in measured.grasps
         )
         return dataclasses.replace(
-            truly, measured=dataclasses.replace(measured, grasps=grasps, radius_std_m=CALLIPER_M)
+            loaded, measured=dataclasses.replace(measured, grasps=grasps, radius_std_m=CALLIPER_M)
         )
 
-    either_way = with_calliper([5e-4 * (-1) ** place for place in range(len(names))])
+    either_way = with_calliper(truly, [5e-4, -5e-4, 5e-4])
     fitted = with_fitted_givens(either_way, fit_model(either_way, 0, silent, hasty=True), silent)
     assert fitted is not None
     assert {grasp.fitted_m[0] for grasp in fitted[0].measured.grasps} == {fitted[0].measured.radius_std_m} == {RULER_M}
-    larger = with_calliper([5e-4 + 3e-4 * place for place in range(len(names))])
+    larger = with_calliper(light_set(grasps=9, samples=54), [3e-4, 5e-4, 7e-4])
     assert with_fitted_givens(larger, fit_model(larger, 0, silent, hasty=True), silent) is None

@@ -240,9 +240,10 @@ def test_a_round_of_those_that_add_up_must_explain_a_quarter(small, monkeypatch,
 @pytest.mark.parametrize("why_not", ["none is found", "too little is explained", "one does as well", "one does all"])
 def test_otherwise_they_are_looked_for_one_by_one(small, monkeypatch, why_not):
     study, base = small
-    asked = []
+    asked, at_once_tried = [], []
 
     def added(study, fit, steps, *_, **__):
+        at_once_tried.append(fit)
         one = [Step((), (), (), 2.0, 2.0)]
         further = {"none is found": None, "too little is explained": (one, fit)}
         return further.get(why_not, (one, fit_with([setting("force_bias")], fit.vector, study, fit)))
@@ -262,6 +263,7 @@ def test_otherwise_they_are_looked_for_one_by_one(small, monkeypatch, why_not):
     diagnosis = search.diagnose(study.target, base, study.simulators, CATALOGUE, np.random.default_rng(0))
     assert asked[0] == (len(CATALOGUE), [])
     assert diagnosis.preferred == ()
+    assert bool(at_once_tried) == (why_not != "one does all")
 
 
 @pytest.mark.parametrize(

@@ -295,7 +295,9 @@ def test_a_search_fits_anyway_once_and_judges_odd_grasps_again(creeping, fitted_
     for module in (search, conclusion):
         monkeypatch.setattr(module, "odd_grasps", odd)
     monkeypatch.setattr("forcegrasp.diagnosis.search.left_over.left_over", lambda *_: ("somewhere", None))
-    monkeypatch.setattr(search, "leaves_little", lambda *_: False)
+    monkeypatch.setattr(search, "leaves_more_than_noise", lambda *_: True)
+    for what in ("leaves_little", "leaves_forms"):
+        monkeypatch.setattr(search, what, lambda *_: False)
     for module, name in ((search, "exchange"), (search, "split"), (at_once, "add_several")):
         monkeypatch.setattr(module, name, lambda *_: None)
     monkeypatch.setattr(conclusion, "may_be_forms", lambda *_: False)

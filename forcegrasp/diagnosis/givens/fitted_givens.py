@@ -75,7 +75,7 @@ def _with_priors(measured: MeasurementSet, said: Fitted, radius_std_m: float) ->
         return None
     start = coordinates_by_name(problem, (base.fit.problem, base.fit.vector))
     fit = fit_once(dataclasses.replace(target, grasps=grasps), problem, Simulators(problem), start)
-    return None if _may_be_chance(base.fit.cost - fit.cost, len(problem.priors)) else fit
+    return None if _does_as_well(base.fit, fit) else fit
 
 
 def told_as_moved(found: Diagnosis, loaded: Loaded[MeasurementSet], said: Fitted) -> Diagnosis | None:
@@ -122,8 +122,8 @@ def told_as_moved(found: Diagnosis, loaded: Loaded[MeasurementSet], said: Fitted
 
 
 def _does_as_well(fit: Fit, other: Fit) -> bool:
-    """Whether a fit leaves no more than one in which more of what is given is open, but for what chance may."""
-    return _may_be_chance(fit.cost - other.cost, len(other.problem.priors))
+    """Whether a fit leaves no more than one in which more of what is given is open, but for chance (Wilks 1938)."""
+    return bool(fit.cost - other.cost < chi2.isf(_CHANCE, len(other.problem.priors)))
 
 
 def _explained(found: Diagnosis) -> float:
@@ -135,11 +135,6 @@ def _of(moved: Moved, kind: str) -> Moved:
     """Only what was moved of radii, or of places."""
     where = [index for index, number in enumerate(moved.numbers) if number.kind == kind]
     return Moved(tuple(moved.numbers[index] for index in where), moved.deviations[where])
-
-
-def _may_be_chance(squares: float, numbers: int) -> bool:
-    """Whether so many numbers that are as given take so much off what is left by chance (Wilks 1938)."""
-    return bool(squares < chi2.isf(_CHANCE, numbers))
 
 
 def _fitted_again(found: Diagnosis, fitted_m: tuple[float, float]) -> Diagnosis:

@@ -103,7 +103,7 @@ def _asked(study: Study, step: Step, rivals: Sequence[Candidate], fit: Fit) -> t
 
 def _with_rival(rival: Candidate, fit: Fit, own: str, study: Study) -> Fit:
     """The whole model with a rival in an effect's place, from the best of the sizes that a diagnosis tries."""
-    rough = roughly_as([rival.setting, *trials([rival.effect])], fit, own, study)
+    rough = roughly_as([rival.setting, *trials([rival.effect])], fit, own, study, at_the_end=False)
     return refit_as(rough.effects[-1], fit, own, study)
 
 

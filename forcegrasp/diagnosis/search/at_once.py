@@ -81,8 +81,10 @@ class AtOnce:
         if self.alone:
             return False
         begun, before = self.begun, study.error(study.heldout(fit))
-        # where no effect alone explains half, those that are found one by one need explain no more than that, either
-        least = EXPLAINED_FAR if one >= EXPLAINED else LEAST_SHARE_TOGETHER
+        # where no effect alone explains half, these need explain no more than those that are found one by one; and what
+        # they leave is looked for so, for a dozen effects more may each explain a little of it
+        as_one_by_one = one < EXPLAINED
+        least = LEAST_SHARE_TOGETHER if as_one_by_one else EXPLAINED_FAR
 
         def enough(further: Fit) -> bool:
             after = study.error(study.heldout(further))
@@ -92,8 +94,6 @@ class AtOnce:
             if enough(further):
                 self.so_far.all = study, found, further
             little = leaves_little(study, further, begun.error, begun.floor)
-            # what that leaves is looked for one by one: a dozen effects more may each explain a little of it
-            as_one_by_one = least < EXPLAINED_FAR
             return little or (enough(further) and (as_one_by_one or self.given_is_first(study, further)))
 
         found = add_several(study, fit, steps, begun.effects, begun.given, self.rng, keep, straight=screen)

@@ -175,10 +175,10 @@ def _add_effects(so_far: SoFar, begun: Begun, rng: np.random.Generator, stop_whe
             screen, screened = Screen(effects, study), fit
             step = look_further(study, fit, screen, untried, rng, before=step.candidates)
             step = _of_another(step, study) if forms else step
-        much = much and not leaves_forms(study, fit, begun.error, begun.floor)
+        much = much and not step.effects and not leaves_forms(study, fit, begun.error, begun.floor)
         # of what seems to be stronger noise, beside what was found, signatures say enough
         much = much and (fit is begun.fit or leaves_more_than_noise(study, fit))
-        if much and not step.effects:
+        if much:
             far = FAR if study.target.gripper.is_servo else _FAR_OF_CONTACTS
             worth_it = untried and not tried_anyway and step.error_before < far
             found = _fitted_anyway(study, fit, screen, untried, rng) if worth_it else None

@@ -29,7 +29,7 @@ from forcegrasp.diagnosis.signatures import (
     direction,
     null_gains,
     of_best_effects,
-    trials_of,
+    trials,
 )
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.diagnosis.verdict import EXPLAINED, LEAST_SHARE
@@ -125,12 +125,9 @@ def share_of_alike(
     some, part = study.on_few(fit)
     best = [score.setting.effect for score in _chosen(study, fit, screen, effects)[:1]]
     alike = [*best, *(other for own in best for other in look_alikes_of(own, effects, of_any_family=True))]
-    kinds = [trials_of(effect, variant) for effect in alike for variant in effect.variants]
-    fits = side_by_side([partial(roughly_as, kind, part, (), some, at_the_end=False) for kind in kinds])
-    beyond, shares = max(some.target.beyond_noise(part.residual), 1e-9), dict[type[Effect], float]()
-    for (first, *_), one in zip(kinds, fits, strict=True):
-        shares[first.effect] = max((part.cost - one.cost) / beyond, shares.get(first.effect, 0.0))
-    return shares
+    fits = side_by_side([partial(roughly_as, trials([e]), part, (), some, at_the_end=False) for e in alike])
+    beyond = max(some.target.beyond_noise(part.residual), 1e-9)
+    return {e: max((part.cost - one.cost) / beyond, 0.0) for e, one in zip(alike, fits, strict=True)}
 
 
 def share_of_all(study: Study, fit: Fit, further: Fit) -> float:
@@ -243,9 +240,8 @@ def _in_best_variants(study: Study, fit: Fit, before: Fit) -> Fit:
     for name in [name for name in _names(fit) if name not in _names(before)]:
         some, part = study.on_few(fit)
         own = fit.effect(name)
-        kinds = [trials_of(own.effect, variant) for variant in own.effect.variants if variant != own.variant]
-        fits = side_by_side([partial(roughly_as, kind, part, name, some, at_the_end=False) for kind in kinds])
-        best = min(fits, key=lambda one: one.cost, default=part)
+        others = [one for one in trials([own.effect]) if one.variant != own.variant]
+        best = roughly_as(others, part, name, some, at_the_end=False) if others else part
         if best.cost < NO_BETTER * part.cost:
             fit = roughly_as([best.effects[-1]], fit, name, study)
     return fit
