@@ -3,7 +3,8 @@
     python tools/hidden_effects.py run [--only REGEX] [--jobs 2]   diagnoses what has no result yet; may be stopped,
                                                                    and goes on where docs/hidden-effects.jsonl ends
     python tools/hidden_effects.py run --renew                     also what other code than the present has measured
-    python tools/hidden_effects.py report                          writes docs/hidden-effects*.md from the results
+    python tools/hidden_effects.py report                          writes docs/hidden-effects*.md from the results of
+                                                                   the code that measured last
     python tools/hidden_effects.py check                           fails if a page is of other code than the present
 
 The recorder is tests/independent: it shares no code with the effects under test. Sets come in random order, so that a
@@ -297,10 +298,14 @@ def run(only: str, workers: int, renew: bool) -> None:
 
 
 def load_results() -> list[dict]:
-    """All results so far, the last of each name."""
+    """All results so far, the last of each name, in the order in which these were measured."""
     from tools.json_lines import read
 
-    return list({row["name"]: row for row in read(RESULTS)}.values())
+    results: dict[str, dict] = {}
+    for row in read(RESULTS):
+        results.pop(row["name"], None)
+        results[row["name"]] = row
+    return list(results.values())
 
 
 def check() -> int:

@@ -20,14 +20,17 @@ SIZES = ("small", "medium", "large")
 
 
 def write(rows: list[dict], jobs: list, right_names: Callable) -> None:
-    """Writes the page of grippers, with its figures, and that of servos; not one of which there is no result."""
+    """Writes the page of grippers, with its figures, and that of servos; not one of which there is no result.
+
+    Each is of one code, that of its last row: rates of what several have measured are of none of them.
+    """
     right = {job.name: right_names(job) for job in jobs}
     rows = [row for row in rows if row["name"] in right]
     for row in rows:
         row["judged"] = judge(row, right[row["name"]])
         row["right"] = sorted(right[row["name"]])
-    servos = [r for r in rows if r["group"].startswith("servo")]
-    grippers = [r for r in rows if r not in servos]
+    servos = _of_last_code([r for r in rows if r["group"].startswith("servo")])
+    grippers = _of_last_code([r for r in rows if not r["group"].startswith("servo")])
     planned = sum(job.group.startswith("servo") for job in jobs)
     for name, found, text, count in (
         ("hidden-effects", grippers, _page, len(jobs) - planned),
@@ -40,6 +43,11 @@ def write(rows: list[dict], jobs: list, right_names: Callable) -> None:
     for draw, groups in ((_matrix, ("one", "other reading", "law", "outside", "none")), (_power, ("one",))):
         if chosen := [r for r in grippers if r["group"] in groups]:
             draw(chosen)
+
+
+def _of_last_code(rows: list[dict]) -> list[dict]:
+    """The results of the code that measured last."""
+    return [r for r in rows if r.get("digest") == rows[-1].get("digest")]
 
 
 def _share(rows: list[dict], *judged: str) -> str:
@@ -170,7 +178,8 @@ def _page(rows: list[dict], planned: int) -> str:
         "",
         *sentences(rows),
         f"Results of {len(rows)} sets ({planned} in the whole campaign). Rates have 95 % intervals (Wilson).",
-        "Of servos: [a page of their own](hidden-effects-of-servos.md).",
+        "Of servos: [a page of their own](hidden-effects-of-servos.md). What earlier code did, set by set, and what was",
+        "mended for it: [a log](hidden-effects-log.md).",
         "",
         "| | result |",
         "|---|---|",

@@ -120,14 +120,16 @@ def test_a_set_that_failed_is_counted_and_not_measured(page):
     assert "| … error left at most 1.1 × the floor | 1 of 1 (100%; 21–100 %) |" in text
 
 
-def test_the_page_says_which_code_its_results_are_of(page):
-    text = page([row(NONE[0], "explained", **CODE), row(NONE[1], "explained", **CODE), row(NONE[2], "explained")], NONE)
-    assert "Measured with commit `0123456789ab+`, digest `aaaabbbbcccc`: 2 sets." in text
-    assert "Measured with code that was not noted: 1 sets." in text
-    assert measured_code.outdated(text, "aaaabbbbcccc") == ["Measured with code that was not noted: 1 sets."]
-    clean = page([row(NONE[0], "explained", **CODE)], NONE)
-    assert measured_code.outdated(clean, "aaaabbbbcccc") == []
-    assert measured_code.outdated(clean, "another") == [line for line in clean.splitlines() if "aaaabbbbcccc" in line]
+def test_the_page_is_of_the_code_that_measured_last_and_says_so(page):
+    of_both = [row(NONE[0], "explained", **(CODE | {"digest": "earlier"})), row(NONE[1], "explained", **CODE)]
+    text = page(of_both, NONE)
+    assert "Measured with commit `0123456789ab+`, digest `aaaabbbbcccc`: 1 sets." in text
+    assert "earlier" not in text
+    assert "Results of 1 sets (4 in the whole campaign)." in text
+    assert measured_code.outdated(text, "aaaabbbbcccc") == []
+    assert measured_code.outdated(text, "another") == [line for line in text.splitlines() if "aaaabbbbcccc" in line]
+    unknown = page([row(NONE[0], "explained", **CODE), row(NONE[2], "explained")], NONE)
+    assert measured_code.outdated(unknown, "aaaabbbbcccc") == ["Measured with code that was not noted: 1 sets."]
     assert measured_code.outdated("# a page\n", "x") == ["It does not say which code it measured."]
 
 
@@ -177,6 +179,7 @@ def test_results_are_stamped_and_those_of_other_code_are_renewed_on_demand(tmp_p
     found = {r["name"]: r for r in map(json.loads, added)}
     assert set(found) == set(names.values()) - {names[one] for one in done}
     assert all({key: r[key] for key in now} == now for r in found.values())
+    assert hidden_effects.load_results()[0]["name"] == names["new" if renew else "old"]  # in the order of measuring
 
 
 class InThisProcess:
