@@ -374,13 +374,13 @@ def test_check_has_a_line_for_each_table_and_card_of_other_code(results, reposit
     assert not [line for line in found if "its marks are not on the page" in line]
     pages.write_pages(Settings(out=results), Notes(results), every, lambda text: None)
     assert all("card.md" in line for line in pages.check(repository))
-    page = repository / "README.md"
+    page = repository / "docs/quickstart.md"
     page.write_text(page.read_text().replace(digests()["training"], "another"))
     assert [
-        line for line in pages.check(repository) if line.startswith("README.md, force-reward-picture: Measured with")
+        line for line in pages.check(repository) if line.startswith("docs/quickstart.md, paper-pictures: Measured with")
     ]
     page.write_text("# no marks\n")
-    assert "README.md, force-reward-picture: its marks are not on the page." in pages.check(repository)
+    assert "docs/quickstart.md, paper-pictures: its marks are not on the page." in pages.check(repository)
 
 
 def test_the_check_says_how_to_skip_it(monkeypatch, capsys):

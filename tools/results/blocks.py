@@ -55,5 +55,4 @@ BLOCKS = (
     Block(_TRANSFER, "transfer-picture", ("render-transfer",), of_package=True),
     Block("docs/robots.md", "robots", ("robots",), tables.robots, of_package=True),
     Block("docs/quickstart.md", "paper-pictures", ("pictures",), of_package=True),
-    Block("README.md", "force-reward-picture", ("pictures",), of_package=True),
 )
