@@ -12,7 +12,7 @@ import numpy as np
 from forcegrasp.diagnosis.cut_short import REASONS, cut_short
 from forcegrasp.diagnosis.evidence import LEAST_SHARE_TOGETHER
 from forcegrasp.diagnosis.faults.suspects import Fault, besides, leaves_nothing, suspects, uneven_stamps
-from forcegrasp.diagnosis.givens.doubt import leaves_less, more_likely, with_fault, with_fault_beside
+from forcegrasp.diagnosis.givens.doubt import leaves_less, leaves_more, more_likely, with_fault, with_fault_beside
 from forcegrasp.diagnosis.givens.fitted_givens import told_as_moved, with_fitted_givens
 from forcegrasp.diagnosis.givens.give_back import without_move
 from forcegrasp.diagnosis.givens.givens_besides import Fitted, with_givens_put_right
@@ -227,7 +227,9 @@ class _Ways:
         return fault, self.fitted(fault.put_right)
 
     def put_right(self, fault: Fault, said: Fitted, widely: bool = False) -> tuple[Fault, Fitted] | None:
-        """The fault, or a wider one, and the set without it, fitted; None unless that leaves much less.
+        """The fault, or a wider one, and the set without it, fitted; None unless that leaves much less, or as much.
+
+        As much will do where the log itself tells the fault: what the model lacks may hide what putting it right does.
 
         Args:
           fault: what may be wrong.
@@ -243,7 +245,8 @@ class _Ways:
             before = right if less else said
             if leaves_less(wider, (more[0], more[2].fit), (before[0], before[2].fit)):
                 return wider, more
-        return (fault, right) if less else None
+        tells = fault.of_log and not leaves_more(fault, (right[0], right[2].fit), (said[0], said[2].fit))
+        return (fault, right) if less or tells else None
 
 
 def _is_no_surprise(found: Diagnosis) -> bool:
@@ -269,7 +272,7 @@ def _put_right_or_as_said(ways: _Ways, loaded: Loaded[MeasurementSet], said: Fit
                 return both[1]
         if (better := ways.put_right(suspect, said)) is None:
             continue
-        fault, right = better
+        (fault, right), of_said = better, said[1]
         # what is a little off besides shows once the fault does not hide it
         further, on_moved = (ways.search(*right), None) if fault.moved else ways.search_and_move(fault.put_right, right)
         if on_moved is not None:
@@ -287,9 +290,13 @@ def _put_right_or_as_said(ways: _Ways, loaded: Loaded[MeasurementSet], said: Fit
             left = explained_share(likely.error_before, likely.error_after, noise=likely.floor) < EXPLAINED_FAR
             most = np.inf if left else _AS_WELL * further.fit.cost
             given = never if left and likely.left else always
-            as_it_is = ways.search(*said, stop_when=StopWhen(given, most=most))
+            if fault.of_log:  # in the set as it is, too, what is given may be a little off
+                found, on_moved = search(loaded, said)
+                as_it_is, of_said = on_moved or (found, of_said)
+            else:
+                as_it_is = ways.search(*said, stop_when=StopWhen(given, most=most))
             likely = dataclasses.replace(more_likely(likely, as_it_is), stopped=as_it_is.stopped)
-        return likely, right[1] if likely.target.grasps is right[0].grasps else said[1]
+        return likely, right[1] if likely.target.grasps is right[0].grasps else of_said
     found, further = search(loaded, said)
     if further is None and (further := ways.put_right_besides(found, loaded)) is None:
         return within_tolerance_after_all(found, loaded), said[1]

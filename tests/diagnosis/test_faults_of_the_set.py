@@ -311,6 +311,26 @@ def test_a_fault_is_put_right_and_told(request, measured, name, told, change):
     assert told in found["fault"]["words"]
 
 
+@pytest.mark.parametrize(
+    ("name", "change"),
+    [
+        ("time_scale", lambda i, g: {"time_s": 1.5 * g.time_s}),
+        ("force_tare", lambda i, g: {"force_n": g.force_n - [0.05 * (i >= 4), 0.0]}),
+    ],
+)
+def test_what_the_log_tells_is_found_beside_an_effect_that_hides_it(sound, name, change):
+    """Encoders that read 0.4 mm too much leave far more than either fault does."""
+    loaded, model = sound
+    places = {g.name: i for i, g in enumerate(loaded.measured.grasps)}
+
+    def spoilt(grasp):
+        return dataclasses.replace(grasp, position_m=grasp.position_m + 4e-4, **change(places[grasp.name], grasp))
+
+    diagnosis, _ = diagnose_set(changed(loaded, spoilt), model, ["encoder_bias"], 0, silent)
+    assert (diagnosis.verdict, diagnosis.effects) == ("effect", (name, "encoder_bias"))
+    assert diagnosis.error_after < 1.1
+
+
 def test_two_faults_are_told_together(sound):
     """Of stamps, and of what is seen once they are put right."""
     loaded, model = sound

@@ -249,6 +249,16 @@ def test_what_seems_moved_is_fitted_beside_effects_before_it_is_put_there(
     assert put == ([] if settled else [suspect])
 
 
+def test_where_the_log_tells_a_fault_what_is_given_is_fitted_in_either_set(off, said, found, monkeypatch):
+    fault, searched = Fault("time_scale", "", "", off, of_log=True), []
+    monkeypatch.setattr(diagnose_set_module, "suspects", lambda *_: [fault])
+    monkeypatch.setattr(_Ways, "put_right", lambda *_: (fault, said))
+    monkeypatch.setattr(_Ways, "search_and_move", lambda _, loaded, __: searched.append(loaded) or (found, None))
+    monkeypatch.setattr(_Ways, "search", lambda *_, **__: pytest.fail("searched as it is given"))
+    _put_right_or_as_said(_Ways(None, [], 0, silent), off, said)
+    assert len(searched) == 2
+
+
 def test_radii_that_a_ruler_seems_to_have_measured_are_fitted_as_if_it_had(truly):
     """Some are larger and some smaller; if all were smaller it might be lost motion."""
 

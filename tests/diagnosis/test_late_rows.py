@@ -8,9 +8,13 @@ import numpy as np
 import pytest
 
 from forcegrasp.diagnosis.diagnose_set import diagnose_set
+from forcegrasp.diagnosis.faults.suspects import moved_as_fault
+from forcegrasp.diagnosis.faults.tolerance import all_radii
+from forcegrasp.diagnosis.givens.late_rows import may_be_late_rows
 from forcegrasp.identify.fit_set import fit_model
 from forcegrasp.identify.fitted_model import model_of
 from forcegrasp.identify.loading import Loaded
+from forcegrasp.identify.verdict import Verdict
 from forcegrasp.models.model_file import Model
 from forcegrasp.reports.diagnosis import answer
 from forcegrasp.reports.diagnosis_words import row_sentence
@@ -47,6 +51,15 @@ def test_forces_that_are_written_late_are_told_beside_the_delay(model, rows):
     told = f"Or the set is wrong, and there is no force_delay: late_row (forces are written {rows} row"
     assert told in answer(diagnosis)
     assert row_sentence(diagnosis) == ""
+    loaded = written_late(rows)
+    moved = all_radii(loaded.measured, diagnosis.target, 3e-5)
+    assert moved is not None
+    fault = moved_as_fault(loaded, moved)
+    alone = dataclasses.replace(diagnosis, verdict=Verdict.EFFECT, effects=("force_delay",), fault=fault)
+    again = may_be_late_rows(alone, loaded)
+    assert (again.verdict, again.effects) == ("one_of", ("force_delay", "late_row"))
+    assert f"late_row (forces are written {rows} row" in answer(again)
+    assert "within its tolerance, radius of thing_0 by" in answer(again)
 
 
 @pytest.mark.long

@@ -35,6 +35,8 @@ from forcegrasp.short_repr import ShortRepr, cut
 _OTHERWISE = 0.2
 # What a scale or a ruler says of a recording's setting is right if it differs by no more than this share.
 _SAME_SETTING = 0.02
+# What readings say by themselves need only leave less, by however little: what the model lacks may leave far more.
+_ANY = 0.0
 # A set of which a fit leaves less than so many times the noise is not doubted.
 _NOTHING = 1.03
 
@@ -55,6 +57,8 @@ class Fault(ShortRepr):
     worth: float = EXPLAINED  #: least share of what is left beyond the noise that it must explain
     of_most: bool = False  #: radii of most objects are doubted, so that an effect may do as well, unless few were wrong
     wider: Fault | None = None  #: the same of more objects, to be tried if something is left
+    #: The log itself says so, and what the model lacks may hide all that it explains: it need not leave less at first.
+    of_log: bool = False
     instead_of: str = ""  #: the one effect that it stands for where it is a rival; otherwise it stands for all
 
     def is_borne_out(self, fit: Fit) -> bool:
@@ -139,7 +143,7 @@ def suspects(loaded: Loaded[MeasurementSet], target: Target, fit: Fit) -> list[F
     if (factor := clock_factor(measured, loaded.gripper.period_s, 1 + MOST * measured.period_std_share)) is not None:
         words = f"time stamps are {times(factor)} for commands {loaded.gripper.period_s:g} s apart"
         right = _changed(loaded, lambda _, g: _slower(g, 1 / factor))
-        found.append(Fault("time_scale", words, "the clock and unit of t_s", right))
+        found.append(Fault("time_scale", words, "the clock and unit of t_s", right, of_log=True))
     tare, drift, left = find_tare(measured), session_drift(target, fit), np.inf
     if tare is not None:
         tare, left = _sharper(tare, target, fit)
@@ -159,7 +163,8 @@ def suspects(loaded: Loaded[MeasurementSet], target: Target, fit: Fit) -> list[F
     if (unit := find_odd_unit(measured)) is not None:
         words = f"column {measured.columns.force[unit.channel]} {unit.words(measured.grasps)}"
         right = _changed(loaded, lambda index, g: unit.put_right(g) if index in unit.grasps else g)
-        found.append(Fault("force_unit", words, "unit and sign of that column in the logs of these grasps", right))
+        check = "unit and sign of that column in the logs of these grasps"
+        found.append(Fault("force_unit", words, check, right, worth=_ANY))
     early = _early_readings(target, fit)
     if early:
         late = ", or commands stand one row late" if len(early) > 1 else ""
@@ -299,7 +304,7 @@ def _tared(loaded: Loaded[MeasurementSet], tares: Sequence[Tare], words: str, ch
         changes = [tare.change_n for tare in tares if tare.first <= index < tare.end]
         return dataclasses.replace(grasp, force_n=grasp.force_n - sum(changes)) if changes else grasp
 
-    return Fault("force_tare", words, check, _changed(loaded, levelled))
+    return Fault("force_tare", words, check, _changed(loaded, levelled), worth=_ANY)
 
 
 def _one_row_later(grasp: MeasuredGrasp, kinds: Sequence[str]) -> MeasuredGrasp:

@@ -30,6 +30,11 @@ def leaves_less(fault: Fault, right: _Fitted, said: _Fitted) -> bool:
     return is_beyond_chance(_gains(fault, right, said), LEAST_LEAD) and explained_share(before, after) > fault.worth
 
 
+def leaves_more(fault: Fault, right: _Fitted, said: _Fitted) -> bool:
+    """Whether the base model of a set put right leaves more on held-out grasps than that of the set as it is."""
+    return is_beyond_chance(-_gains(fault, right, said), LEAST_LEAD)
+
+
 def with_fault(found: Diagnosis, fault: Fault, said: _Fitted) -> Diagnosis:
     """The diagnosis of a set put right: its fault comes first among what was found, the error before is the set's."""
     before, right = rms(_held(*said), said[0]), found.error_of_base

@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 
-from forcegrasp.diagnosis.faults.suspects import Fault
+from forcegrasp.diagnosis.faults.suspects import Fault, besides
 from forcegrasp.diagnosis.result import Diagnosis, kept_steps
 from forcegrasp.identify.intervals import intervals, standard_errors
 from forcegrasp.identify.loading import Loaded
@@ -31,7 +31,8 @@ def may_be_late_rows(found: Diagnosis, loaded: Loaded[MeasurementSet]) -> Diagno
       found: a diagnosis.
       loaded: the set.
     """
-    if loaded.gripper.is_servo or found.fault is not None or not found.verdict.names_effects:
+    moved = found.fault if found.fault is not None and found.fault.moved is not None else None  # it is no fault
+    if loaded.gripper.is_servo or found.fault is not moved or not found.verdict.names_effects:
         return found
     named = {step.effects[0] for step in kept_steps(found.steps)}
     for name in _WRITTEN:
@@ -39,7 +40,7 @@ def may_be_late_rows(found: Diagnosis, loaded: Loaded[MeasurementSet]) -> Diagno
         if rows:
             words = _WRITTEN[name].format(rows=counted(rows, "row"))
             check = "in which row each column is written, and in which it was read or commanded"
-            fault = Fault("late_row", words, check, loaded, instead_of=name)
+            fault = besides(Fault("late_row", words, check, loaded, instead_of=name), moved)
             return dataclasses.replace(found, verdict=Verdict.ONE_OF, effects=(*found.effects, fault.name), fault=fault)
     return found
 
