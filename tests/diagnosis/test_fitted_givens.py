@@ -149,6 +149,9 @@ def test_what_is_put_beyond_its_tolerance_is_another_matter(off, said, found):
     far = found.fit.vector + 9 * np.where(priors.precision > 0, 1 / np.maximum(priors.precision, 1e-9), 0.0)
     beyond = dataclasses.replace(found, fit=dataclasses.replace(found.fit, vector=far))
     assert told_as_moved(beyond, off, said) is None
+    cut_short = told_as_moved(dataclasses.replace(beyond, stopped="its 3 min were over"), off, said)
+    assert cut_short is not None
+    assert "by more than its tolerance" in fault_words(cut_short)  # there is no time to look at that
 
 
 @pytest.mark.parametrize(("left", "far", "told"), [("", True, True), ("much", True, False), ("", False, False)])

@@ -108,7 +108,8 @@ def told_as_moved(found: Diagnosis, loaded: Loaded[MeasurementSet], said: Fitted
         found = as_exact_as_said if _does_as_well(as_exact_as_said.fit, found.fit) else found
     moved = _moved(found.fit, measured.radius_std_m)
     radii, places = (_of(moved, kind).is_within for kind in ("radius_m", "offset_m"))
-    if not radii or not (places or most):
+    # where the time is over what was found is told, wherever the set was put
+    if not found.stopped and (not radii or not (places or most)):
         wrong = most_radii(loaded, moved)
         if wrong is None or (found.left and not most) or found.fault is not None or not places:
             return None
