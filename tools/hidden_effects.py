@@ -3,8 +3,8 @@
     python tools/hidden_effects.py run [--only REGEX] [--jobs 2]   diagnoses what has no result yet; may be stopped,
                                                                    and goes on where docs/hidden-effects.jsonl ends
     python tools/hidden_effects.py run --renew                     also what other code than the present has measured
-    python tools/hidden_effects.py report                          writes docs/hidden-effects*.md from the results of
-                                                                   the code that measured last
+    python tools/hidden_effects.py report [--all]                  writes docs/hidden-effects*.md from the results of
+                                                                   the code that measured last, or of all code
     python tools/hidden_effects.py check                           fails if a page is of other code than the present
 
 The recorder is tests/independent: it shares no code with the effects under test. Sets come in random order, so that a
@@ -329,6 +329,7 @@ def main() -> int:
     parser.add_argument("--only", default="", help="regular expression that a set's name must match")
     parser.add_argument("--jobs", type=int, default=2, help="diagnoses side by side")
     parser.add_argument("--renew", action="store_true", help="measure again what is not of the present code")
+    parser.add_argument("--all", action="store_true", help="report the results of all code, not of the last alone")
     arguments = parser.parse_args()
     if arguments.what == "check":
         return check()
@@ -337,7 +338,7 @@ def main() -> int:
     else:
         from tools.hidden_effects_report import write
 
-        write(load_results(), jobs(), right_names)
+        write(load_results(), jobs(), right_names, of_all=arguments.all)
     return 0
 
 

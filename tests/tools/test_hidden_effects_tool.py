@@ -35,8 +35,8 @@ def page(tmp_path, monkeypatch):
     """``page(rows, jobs, of)``: the page of "grippers" or "servos" as it is written; empty if it is not."""
     monkeypatch.setattr(hidden_effects_report, "DOCS", tmp_path)
 
-    def written(rows: list[dict], jobs: list[Job], of: str = "servos") -> str:
-        hidden_effects_report.write(rows, jobs, lambda job: set(job.hidden))
+    def written(rows: list[dict], jobs: list[Job], of: str = "servos", of_all: bool = False) -> str:
+        hidden_effects_report.write(rows, jobs, lambda job: set(job.hidden), of_all)
         file = tmp_path / ("hidden-effects-of-servos.md" if of == "servos" else "hidden-effects.md")
         return file.read_text() if file.exists() else ""
 
@@ -131,6 +131,15 @@ def test_the_page_is_of_the_code_that_measured_last_and_says_so(page):
     unknown = page([row(NONE[0], "explained", **CODE), row(NONE[2], "explained")], NONE)
     assert measured_code.outdated(unknown, "aaaabbbbcccc") == ["Measured with code that was not noted: 1 sets."]
     assert measured_code.outdated("# a page\n", "x") == ["It does not say which code it measured."]
+
+
+def test_the_page_may_be_of_all_code_and_is_never_the_present_one_then(page):
+    rows = [row(job, "explained", commit="c", digest=f"d{job.seed}") for job in NONE]
+    text = page(rows, NONE, of_all=True)
+    assert "Results of 4 sets (4 in the whole campaign)." in text
+    assert "Measured with 4 versions of the code" in text
+    assert measured_code.outdated(text, "d3")
+    assert "Measured with commit `c`, digest `d1`: 1 sets." in page(rows[:2], NONE, of_all=True)
 
 
 def test_the_digest_is_of_each_line_of_the_packages_and_of_no_others(tmp_path):
