@@ -24,7 +24,7 @@ _FEW_CODES = 3
 def write(rows: list[dict], jobs: list, right_names: Callable, of_all: bool = False) -> None:
     """Writes the page of grippers, with its figures, and that of servos; not one of which there is no result.
 
-    Each is of one code, that of its last row, unless results of all code are asked for: such rates are of none of them.
+    Each is of the code that measured its last row; or of all code, so that its rates are those of no version.
     """
     right = {job.name: right_names(job) for job in jobs}
     rows = [row for row in rows if row["name"] in right]
@@ -56,7 +56,7 @@ def _of_last_code(rows: list[dict]) -> list[dict]:
 
 def _measured_with(rows: list[dict]) -> list[str]:
     """Which code the results are of, in a sentence for each, or in one for many."""
-    codes = list(dict.fromkeys(r.get("digest", "") for r in rows))
+    codes = {r.get("digest", "") for r in rows}
     if len(codes) <= _FEW_CODES:
         return sentences(rows)
     return [
@@ -240,8 +240,8 @@ def _page(rows: list[dict], planned: int) -> str:
         "",
         "![power](figures/hidden_effects_power.png)",
         "",
-        "How often each effect is found, by size. Sizes are those of `tests/independent/catalogue.py`; a small one",
-        "moves some signal by about 3 σ somewhere.",
+        "How often each effect is found, by size; where nothing stands none was measured. Sizes are those of",
+        "`tests/independent/catalogue.py`; a small one moves some signal by about 3 σ somewhere.",
         "",
         *_what_it_costs(
             {"nothing": plain_none, "one effect": one, "two to five effects": several, "a messy rig": messy}

@@ -72,6 +72,12 @@ def changed(loaded: Loaded, change) -> Loaded:
     return dataclasses.replace(loaded, measured=dataclasses.replace(loaded.measured, grasps=grasps))
 
 
+def changed_by_place(loaded: Loaded, change) -> Loaded:
+    """The set with some fields of each grasp changed by a function of its place among them and of itself."""
+    places = {g.name: i for i, g in enumerate(loaded.measured.grasps)}
+    return changed(loaded, lambda g: dataclasses.replace(g, **change(places[g.name], g)))
+
+
 def test_a_wrong_radius_is_found(sound):
     loaded, model = sound
     wrong = changed(loaded, lambda g: dataclasses.replace(g, radius_m=g.radius_m + 0.0005))
@@ -298,9 +304,7 @@ def row_early(values: np.ndarray) -> np.ndarray:
 )
 def test_a_fault_is_put_right_and_told(request, measured, name, told, change):
     loaded, model = request.getfixturevalue(measured)
-    places = {g.name: i for i, g in enumerate(loaded.measured.grasps)}
-    wrong = changed(loaded, lambda g: dataclasses.replace(g, **change(places[g.name], g)))
-    diagnosis, _ = diagnose_set(wrong, model, ["force_bias", "command_delay"], 0, silent)
+    diagnosis, _ = diagnose_set(changed_by_place(loaded, change), model, ["force_bias", "command_delay"], 0, silent)
     assert (diagnosis.verdict, diagnosis.effects) == ("data", (name,))
     assert diagnosis.error_before > 1.3 > diagnosis.error_after
     text = answer(diagnosis)
@@ -321,12 +325,8 @@ def test_a_fault_is_put_right_and_told(request, measured, name, told, change):
 def test_what_the_log_tells_is_found_beside_an_effect_that_hides_it(sound, name, change):
     """Encoders that read 0.4 mm too much leave far more than either fault does."""
     loaded, model = sound
-    places = {g.name: i for i, g in enumerate(loaded.measured.grasps)}
-
-    def spoilt(grasp):
-        return dataclasses.replace(grasp, position_m=grasp.position_m + 4e-4, **change(places[grasp.name], grasp))
-
-    diagnosis, _ = diagnose_set(changed(loaded, spoilt), model, ["encoder_bias"], 0, silent)
+    spoilt = changed_by_place(loaded, lambda i, g: {"position_m": g.position_m + 4e-4, **change(i, g)})
+    diagnosis, _ = diagnose_set(spoilt, model, ["encoder_bias"], 0, silent)
     assert (diagnosis.verdict, diagnosis.effects) == ("effect", (name, "encoder_bias"))
     assert diagnosis.error_after < 1.1
 
@@ -334,15 +334,12 @@ def test_what_the_log_tells_is_found_beside_an_effect_that_hides_it(sound, name,
 def test_two_faults_are_told_together(sound):
     """Of stamps, and of what is seen once they are put right."""
     loaded, model = sound
-    places = {g.name: i for i, g in enumerate(loaded.measured.grasps)}
 
-    def spoilt(grasp):
-        place = places[grasp.name]
+    def spoilt(place, grasp):
         scatter = np.random.default_rng(place).uniform(-0.009, 0.009, len(grasp.time_s))
-        shift = [0.2 * (place >= 4), 0.0]
-        return dataclasses.replace(grasp, time_s=grasp.time_s + scatter, force_n=grasp.force_n - shift)
+        return {"time_s": grasp.time_s + scatter, "force_n": grasp.force_n - [0.2 * (place >= 4), 0.0]}
 
-    diagnosis, _ = diagnose_set(changed(loaded, spoilt), model, ["force_bias"], 0, silent)
+    diagnosis, _ = diagnose_set(changed_by_place(loaded, spoilt), model, ["force_bias"], 0, silent)
     assert (diagnosis.verdict, diagnosis.effects) == ("data", ("force_tare",))
     assert diagnosis.error_after < 1.3
     text = answer(diagnosis)
