@@ -11,8 +11,8 @@ import numpy as np
 
 from forcegrasp.diagnosis.cut_short import REASONS, cut_short
 from forcegrasp.diagnosis.evidence import LEAST_SHARE_TOGETHER
-from forcegrasp.diagnosis.faults.suspects import Fault, besides, leaves_nothing, suspects, uneven_stamps
-from forcegrasp.diagnosis.givens.doubt import leaves_less, leaves_more, more_likely, with_fault, with_fault_beside
+from forcegrasp.diagnosis.faults.suspects import Fault, leaves_nothing, suspects, uneven_stamps
+from forcegrasp.diagnosis.givens.doubt import is_worth_a_search, more_likely, with_fault_beside
 from forcegrasp.diagnosis.givens.fitted_givens import told_as_moved, with_fitted_givens
 from forcegrasp.diagnosis.givens.give_back import without_move
 from forcegrasp.diagnosis.givens.givens_besides import Fitted, with_givens_put_right
@@ -227,9 +227,7 @@ class _Ways:
         return fault, self.fitted(fault.put_right)
 
     def put_right(self, fault: Fault, said: Fitted, widely: bool = False) -> tuple[Fault, Fitted] | None:
-        """The fault, or a wider one, and the set without it, fitted; None unless that leaves much less, or as much.
-
-        As much will do where the log itself tells the fault: what the model lacks may hide what putting it right does.
+        """The fault, or a wider one, and the set without it, fitted; None unless that leaves much less.
 
         Args:
           fault: what may be wrong.
@@ -238,15 +236,18 @@ class _Ways:
         """
         self.progress(f"fitting the set with {fault.name} put right")
         right, wider = self.fitted(fault.put_right), fault.wider
-        less = leaves_less(fault, (right[0], right[2].fit), (said[0], said[2].fit))
+        less = is_worth_a_search(fault, _model(right), _model(said))
         if wider is not None and (less or widely) and not leaves_nothing(right[2].fit, right[0]):
             self.progress("fitting it with the radii of more objects put right")
             more = self.fitted(wider.put_right)
-            before = right if less else said
-            if leaves_less(wider, (more[0], more[2].fit), (before[0], before[2].fit)):
+            if is_worth_a_search(wider, _model(more), _model(right if less else said)):
                 return wider, more
-        tells = fault.of_log and not leaves_more(fault, (right[0], right[2].fit), (said[0], said[2].fit))
-        return (fault, right) if less or tells else None
+        return (fault, right) if less else None
+
+
+def _model(fitted: Fitted) -> tuple[Target, Fit]:
+    """A set lined up, and the model that was fitted to it."""
+    return fitted[0], fitted[2].fit
 
 
 def _is_no_surprise(found: Diagnosis) -> bool:
@@ -261,10 +262,23 @@ def _is_convincing(moved: Diagnosis) -> bool:
     return not moved.left or explained >= LEAST_SHARE_TOGETHER
 
 
-def _put_right_or_as_said(ways: _Ways, loaded: Loaded[MeasurementSet], said: Fitted) -> Found:
-    """The diagnosis with the first fault put right that makes the set likelier; of the set as it is if none does."""
+def _put_right_or_as_said(
+    ways: _Ways, loaded: Loaded[MeasurementSet], said: Fitted, known: Sequence[Fault] = ()
+) -> Found:
+    """The diagnosis with the first fault put right that makes the set likelier; of the set as it is if none does.
+
+    A set may have several: once one is put right, the others are looked for in what is left.
+
+    Args:
+      ways: how it is fitted and searched.
+      loaded: the set.
+      said: the same, fitted.
+      known: faults that were put right already, or are not to be.
+    """
     search = ways.search_and_move
     for suspect in suspects(loaded, said[0], said[2].fit):
+        if suspect.of in [fault.of for fault in known]:
+            continue
         if suspect.moved is not None and suspect.moved.groups == ("object",):
             # beside effects they go where these leave them; put where the base model wants them they are in their way
             both, search = ways.search_with_givens(loaded, said), ways.search_as_it_is
@@ -273,14 +287,14 @@ def _put_right_or_as_said(ways: _Ways, loaded: Loaded[MeasurementSet], said: Fit
         if (better := ways.put_right(suspect, said)) is None:
             continue
         (fault, right), of_said = better, said[1]
-        # what is a little off besides shows once the fault does not hide it
-        further, on_moved = (ways.search(*right), None) if fault.moved else ways.search_and_move(fault.put_right, right)
-        if on_moved is not None:
-            further, simulators = on_moved
-            right, fault = (further.target, simulators, further.base), besides(fault, further.fault)
+        if fault.moved:
+            further = ways.search(*right)
+        else:  # what else is wrong, or a little off, shows once the fault does not hide it
+            further, simulators = _put_right_or_as_said(ways, fault.put_right, right, (*known, fault))
+            right = further.target, simulators, further.base
         if not further.stopped and not fault.is_borne_out(further.fit):  # an effect had made it seem so
             continue
-        likely = with_fault(further, fault.told_by(further.fit), (said[0], said[2].fit))
+        likely = with_fault_beside(further, fault.told_by(further.fit), _model(said))
         of_most = fault.of_most and not fault.is_of_few(further.fit)
         certain = likely.verdict is Verdict.DATA and not (likely.left or fault.moved or of_most)
         # what is as exact as was said, and leaves nothing, leaves no effect anything to explain
@@ -290,9 +304,8 @@ def _put_right_or_as_said(ways: _Ways, loaded: Loaded[MeasurementSet], said: Fit
             left = explained_share(likely.error_before, likely.error_after, noise=likely.floor) < EXPLAINED_FAR
             most = np.inf if left else _AS_WELL * further.fit.cost
             given = never if left and likely.left else always
-            if fault.of_log:  # in the set as it is, too, what is given may be a little off
-                found, on_moved = search(loaded, said)
-                as_it_is, of_said = on_moved or (found, of_said)
+            if fault.of_log:  # in the set as it is, too, something else may be wrong, or a little off
+                as_it_is, of_said = _put_right_or_as_said(ways, loaded, said, (*known, fault))
             else:
                 as_it_is = ways.search(*said, stop_when=StopWhen(given, most=most))
             likely = dataclasses.replace(more_likely(likely, as_it_is), stopped=as_it_is.stopped)

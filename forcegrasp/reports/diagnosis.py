@@ -12,6 +12,7 @@ from rich.table import Table as Printed
 from rich.text import Text as Plain
 
 from forcegrasp.diagnosis.advice import Advice
+from forcegrasp.diagnosis.faults.suspects import Fault
 from forcegrasp.diagnosis.result import NOTHING, Candidate, Diagnosis, Step, taken_over_by
 from forcegrasp.effects import Effect
 from forcegrasp.effects.for_gripper import effect_of
@@ -82,10 +83,7 @@ def diagnosis_json(diagnosis: Diagnosis, advice: Advice | None, tried: Sequence[
         "explained_share": diagnosis.explained,
         "shares": diagnosis.shares(),
         "left_share": left_share(diagnosis) if diagnosis.shares() else None,
-        "fault": None if diagnosis.fault is None else {
-            "name": diagnosis.fault.name, "words": diagnosis.fault.words, "check": diagnosis.fault.check,
-            "moved": None if diagnosis.fault.moved is None else diagnosis.fault.moved.moves,
-        },
+        "fault": _fault_json(diagnosis.fault),
         "law": law_json(diagnosis.law),
         "odd_grasps": [dataclasses.asdict(grasp) for grasp in diagnosis.odd],
         "left_out": [dataclasses.asdict(grasp) for grasp in diagnosis.left_out],
@@ -117,6 +115,13 @@ def diagnosis_json(diagnosis: Diagnosis, advice: Advice | None, tried: Sequence[
         "noise": noise_json(diagnosis),
         "warnings": final_warnings(diagnosis),
     }  # fmt: skip
+
+
+def _fault_json(fault: Fault | None) -> dict[str, Any] | None:
+    if fault is None:
+        return None
+    then = _fault_json(fault.then)
+    return {"name": fault.name, "words": fault.words, "check": fault.check, "moved": fault.moved_by, "then": then}
 
 
 def _step_json(step: Step, diagnosis: Diagnosis) -> dict[str, Any]:
@@ -153,7 +158,7 @@ def _missed_objects(d: Diagnosis) -> str:
 
 def _of_model(diagnosis: Diagnosis) -> str:
     d, cell, noise = diagnosis, worst_cell(remaining(diagnosis).cells()), noise_words(diagnosis)
-    found = listed([*([d.fault.name] if d.verdict is Verdict.DATA and d.fault else []), *d.preferred] or [""])
+    found = listed([*(d.fault.names if d.verdict is Verdict.DATA and d.fault else []), *d.preferred] or [""])
     place = f"{words(cell.signal)}, {words(cell.phase)} ({cell.ratio:.1f} × noise)"
     if is_of_labels(d):
         return lacks(d)

@@ -52,14 +52,14 @@ def answer_box(diagnosis: Diagnosis, advice: Advice | None, commands: Sequence[C
     fault = d.fault if d.verdict is Verdict.DATA and not kept_steps(d.steps) else None  # that is all that was found
     what = lacks(d) if found else answer(d)
     if fault is not None:
-        what = f"Not the model but the set seems to be wrong: {fault.name}."
+        what = f"Not the model but the set seems to be wrong: {listed(fault.names)}."
     shows_rest = (found or d.verdict is Verdict.UNKNOWN) and not is_of_labels(d)
     rows = [
         ("Not finished", stopped_words(d) if found else ""),
         ("Left out", left_out[:1].upper() + left_out[1:] if found else ""),
         ("The set", fault_words(d) if found else ""),
-        ("What is wrong", f"{fault.words[0].upper()}{fault.words[1:]}." if fault else ""),
-        ("To check", f"{fault.check[0].upper()}{fault.check[1:]}." if fault else ""),
+        ("What is wrong", _sentences([one.words for one in fault.all]) if fault else ""),
+        ("To check", _sentences([one.check for one in fault.all]) if fault else ""),
         ("Explains", shares_sentence(d) if found else ""),
         ("Error", f"{fall}; up to {d.floor:.2f} is noise." if (found and d.steps) or fault else ""),
         ("How sure", certainty(d)),
@@ -79,6 +79,10 @@ def answer_box(diagnosis: Diagnosis, advice: Advice | None, commands: Sequence[C
         [(f"{name} {percent(share)}", share) for name, share in shares.items()],
         commands,
     )
+
+
+def _sentences(texts: Sequence[str]) -> str:
+    return " ".join(f"{text[:1].upper()}{text[1:]}." for text in texts)
 
 
 def certainty(diagnosis: Diagnosis) -> str:

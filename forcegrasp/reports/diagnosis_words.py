@@ -44,7 +44,7 @@ def lacks(diagnosis: Diagnosis) -> str:
         seems = f"Not the model but the set seems to be wrong: {odd_words(diagnosis)}"
         return f"{seems}. Put their labels right, or leave them out."
     if diagnosis.verdict is Verdict.DATA:
-        faults = [_named(diagnosis.fault)] if diagnosis.fault is not None else []
+        faults = [_named(fault) for fault in diagnosis.fault.all] if diagnosis.fault is not None else []
         faults += [_of_step(step, diagnosis) for step in steps]
         return f"{_but(diagnosis)}Not the model but the set seems to be wrong: {listed(faults)}."
     if len(steps) == 1 and len(steps[0].effects) > 1:
@@ -102,10 +102,9 @@ def fault_words(diagnosis: Diagnosis) -> str:
     """What seems to be wrong with the set besides what the model lacks, or in place of it; empty if nothing."""
     if diagnosis.fault is None or diagnosis.verdict is Verdict.DATA:
         return ""
-    named = _named(diagnosis.fault)
+    named = listed([_named(fault) for fault in diagnosis.fault.all])
     if is_only_moved(diagnosis) and diagnosis.fault.moved is not None:
-        how = "within its tolerance" if diagnosis.fault.moved.is_within else "by more than its tolerance"
-        moved = f"What the set gives was moved {how}: {diagnosis.fault.words}"
+        moved = f"What the set gives was moved {diagnosis.fault.moved.how}: {diagnosis.fault.words}"
         if smaller := diagnosis.fault.moved.smaller_m:
             moved += f" (objects are {1e3 * smaller:.2g} mm smaller on average so, as backlash would have them look)"
         if diagnosis.error_moved is None:

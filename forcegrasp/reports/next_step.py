@@ -109,7 +109,7 @@ def _to_tell_apart(diagnosis: Diagnosis, tied: Sequence[str], advice: Advice | N
     rivals, fault = [effect_of(name, diagnosis.target.gripper) for name in tied], diagnosis.fault
     faults = "".join(f"check {e.name} in the set ({e.separates}); " for e in rivals if e.of_set)
     if fault is not None and diagnosis.fault_is_rival:
-        faults += f"check {fault.name} in the set ({fault.check}); "
+        faults += "".join(f"check {one.name} in the set ({one.check}); " for one in fault.all)
     if not tied:
         return f"{faults}put right what is wrong there, and diagnose again"
     if advice is not None:

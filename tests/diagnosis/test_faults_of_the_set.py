@@ -14,10 +14,10 @@ from forcegrasp.diagnosis.diagnose_set import diagnose_set
 from forcegrasp.diagnosis.faults import odd_grasps as odd_grasps_module
 from forcegrasp.diagnosis.faults.felt_sizes import doubtful_radii
 from forcegrasp.diagnosis.faults.odd_grasps import odd_grasps
-from forcegrasp.diagnosis.faults.suspects import suspects
+from forcegrasp.diagnosis.faults.suspects import Fault, suspects
 from forcegrasp.diagnosis.faults.tolerance import move_given, wanted_moves
 from forcegrasp.diagnosis.givens import doubt
-from forcegrasp.diagnosis.givens.doubt import with_fault
+from forcegrasp.diagnosis.givens.doubt import with_fault_beside
 from forcegrasp.diagnosis.givens.moved_set import go_on_with_moved, within_tolerance_after_all
 from forcegrasp.diagnosis.result import Diagnosis
 from forcegrasp.diagnosis.search.search import diagnose
@@ -134,10 +134,10 @@ def test_in_place_of_a_fault_that_leaves_next_to_nothing_an_effect_must_do_as_we
     searched, found, module = [], [], importlib.import_module("forcegrasp.diagnosis.diagnose_set")
 
     def with_some_left(found, fault, said):
-        told = with_fault(found, fault, said)
+        told = with_fault_beside(found, fault, said)
         return dataclasses.replace(told, left="something", error_before=4.0, error_after=after, floor=1.0)
 
-    monkeypatch.setattr(module, "with_fault", with_some_left)
+    monkeypatch.setattr(module, "with_fault_beside", with_some_left)
 
     def searching(target, *asked):
         searched.append((target, *asked))
@@ -231,6 +231,17 @@ def test_a_fault_that_spares_no_effect_is_left_out(monkeypatch, made_up, verdict
     right = found(with_fault, verdict=Verdict(verdict), fault=fault, effects=("early_row",) + ("lag",) * with_fault)
     said = found(without, effects=("backlash",), left=left)
     assert doubt.more_likely(right, said).effects == named
+
+
+def test_sets_are_compared_by_the_grasps_that_none_has_left_out(sound, refitted):
+    """A grasp that went wrong may be left out beside effects alone, or once the set was put right alone."""
+    (target, _, base), last = refitted, np.arange(2, 9)
+    fewer = target.subset(last), base.fit.subset(last)
+    fault = Fault("time_scale", "", "", sound[0])
+    for right, said in ((fewer, (target, base.fit)), ((target, base.fit), fewer)):
+        gains = doubt._gains(fault, right, said)
+        assert gains.shape == (7,)
+        assert np.abs(gains).max() < 20.0  # it is the same grasps: those of others would differ by hundreds
 
 
 def test_swapped_force_columns_are_told(sound):
@@ -340,11 +351,37 @@ def test_two_faults_are_told_together(sound):
         return {"time_s": grasp.time_s + scatter, "force_n": grasp.force_n - [0.2 * (place >= 4), 0.0]}
 
     diagnosis, _ = diagnose_set(changed_by_place(loaded, spoilt), model, ["force_bias"], 0, silent)
-    assert (diagnosis.verdict, diagnosis.effects) == ("data", ("force_tare",))
+    assert (diagnosis.verdict, diagnosis.effects) == ("data", ("uneven_stamps", "force_tare"))
     assert diagnosis.error_after < 1.3
     text = answer(diagnosis)
-    assert "force_tare (the zero changes at grasp 4" in text
-    assert "; besides, time stamps scatter by 5" in text
+    assert "uneven_stamps (time stamps scatter by 5" in text
+    assert ") and force_tare (the zero changes at grasp 4" in text
+
+
+@pytest.mark.parametrize(
+    ("effects", "spoil"),
+    [
+        (("time_scale", "force_tare", "object_radius"), ("clock", "tare", "radius")),
+        (("swapped_positions", "force_tare"), ("columns", "tare")),
+    ],
+)
+def test_several_faults_are_put_right_one_after_the_other(sound, effects, spoil):
+    loaded, model = sound
+
+    def spoilt(place, grasp):
+        changes = {
+            "clock": {"time_s": 1.5 * grasp.time_s},
+            "tare": {"force_n": grasp.force_n - [0.2 * (place >= 4), 0.0]},
+            "radius": {"radius_m": grasp.radius_m + 0.001 * (grasp.object == "thing_0")},
+            "columns": {"position_m": grasp.position_m[:, ::-1]},
+        }
+        return {name: value for what in spoil for name, value in changes[what].items()}
+
+    diagnosis, _ = diagnose_set(changed_by_place(loaded, spoilt), model, ["force_bias"], 0, silent)
+    assert (diagnosis.verdict, diagnosis.effects) == ("data", effects)
+    assert diagnosis.error_after < 1.1
+    assert all(f"{name} (" in answer(diagnosis) for name in effects)
+    assert "f_l_n by -0.20" in answer(diagnosis)
 
 
 def inexact(name: str, radius_m: float, offset_m: float, radius_std_m: float = 5e-5):

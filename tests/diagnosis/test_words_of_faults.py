@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from forcegrasp.diagnosis.faults.suspects import Fault
+from forcegrasp.diagnosis.faults.suspects import Fault, besides
 from forcegrasp.diagnosis.faults.tolerance import Moved
 from forcegrasp.effects import get_effect
 from forcegrasp.effects.setting import EffectSetting
@@ -16,7 +16,7 @@ from forcegrasp.identify.problem import Problem
 from forcegrasp.identify.verdict import Verdict
 from forcegrasp.reports.diagnosis import answer, diagnosis_json, lines
 from forcegrasp.reports.diagnosis_box import answer_box
-from forcegrasp.reports.diagnosis_words import row_sentence
+from forcegrasp.reports.diagnosis_words import fault_words, row_sentence
 from forcegrasp.reports.next_step import after_diagnosis
 
 
@@ -65,7 +65,7 @@ def test_a_fault_besides_an_effect_is_told_first(made_up, fault):
     assert answer(both).startswith("The set seems to be wrong: time_scale (stamps are too long; to check: the clock).")
     assert "The model lacks force_bias" in answer(both)
     assert diagnosis_json(both, None, made_up.tried, "s")["fault"] == {
-        "name": "time_scale", "words": "stamps are too long", "check": "the clock", "moved": None
+        "name": "time_scale", "words": "stamps are too long", "check": "the clock", "moved": None, "then": None
     }  # fmt: skip
 
 
@@ -104,6 +104,37 @@ def test_radii_that_are_smaller_on_average_may_be_backlash(made_up, fault, moves
     said = answer(dataclasses.replace(found, fault=fault, error_moved=0.8 * found.error_before))
     assert ("smaller on average so, as backlash would have them look" in said) == told
     assert ("objects are 0.39 mm smaller" in said) == told
+
+
+@pytest.mark.parametrize(("move", "told"), [(2.0, "within its tolerance"), (4.0, "by more than its tolerance")])
+def test_what_was_moved_besides_is_told_with_the_fault(made_up, fault, move, told):
+    found = made_up.diagnosis("effect")
+    moved = Moved((Given("radius_m", "cup", 1e-4, np.ones(2, bool)),), np.array([move]))
+    then = Fault("object_tolerance", "radius of cup", "the cup", made_up.loaded, moved)
+    both = besides(fault, then)
+    assert (both.name, both.words) == ("time_scale", f"stamps are too long; then, {told}, radius of cup")
+    told_in_json = diagnosis_json(dataclasses.replace(found, fault=both), None, made_up.tried, "set")["fault"]["moved"]
+    assert told_in_json == pytest.approx({"radius_m of cup": 1e-4 * move})
+
+
+def test_two_faults_are_told_as_two(made_up, fault):
+    put_right = dataclasses.replace(made_up.loaded)
+    both = besides(fault, Fault("object_radius", "the radius of cup is 20 mm", "the cup", put_right))
+    assert both.put_right is put_right
+    assert both.moved_by is None
+    found = dataclasses.replace(made_up.diagnosis("explained"), verdict=Verdict.DATA, effects=both.names, fault=both)
+    assert found.effects == ("time_scale", "object_radius")
+    first, second = "time_scale (stamps are too long;", "object_radius (the radius of cup is 20 mm; to check: the cup)"
+    assert f"wrong: {first} to check: the clock) and {second}" in answer(found)
+    assert f"wrong: {first} to check: the clock) and {second}" in fault_words(
+        dataclasses.replace(found, verdict=Verdict.UNKNOWN)
+    )
+    told = diagnosis_json(found, None, made_up.tried, "s")["fault"]
+    assert (told["name"], told["then"]["name"]) == found.effects
+    box = answer_box(dataclasses.replace(found, steps=()), None, [])
+    assert box.what == "Not the model but the set seems to be wrong: time_scale and object_radius."
+    assert dict(box.rows)["What is wrong"] == "Stamps are too long. The radius of cup is 20 mm."
+    assert dict(box.rows)["To check"] == "The clock. The cup."
 
 
 @pytest.mark.parametrize(("delay_s", "told"), [(0.04, "1 row"), (0.0802, "2 rows"), (0.06, ""), (0.003, "")])

@@ -50,6 +50,8 @@ class Fault(ShortRepr):
     check: str  #: what to look at
     put_right: Loaded[MeasurementSet]
     moved: Moved | None = None  #: what was moved within the tolerance of what is given, so that it is no fault
+    moved_besides: Moved | None = None  #: what was moved once it was put right
+    then: Fault | None = None  #: what else was found wrong once it was put right
     #: What is given and is fitted instead, such as ``radius_m of sponge``, as the set has it.
     fitted: dict[str, float] = field(default_factory=dict)
     moves: dict[str, float] = field(default_factory=dict)  #: by how much a linear step moves what is given, by name
@@ -60,6 +62,27 @@ class Fault(ShortRepr):
     #: The log itself says so, and what the model lacks may hide all that it explains: it need not leave less at first.
     of_log: bool = False
     instead_of: str = ""  #: the one effect that it stands for where it is a rival; otherwise it stands for all
+
+    @property
+    def of(self) -> tuple[str, ...]:
+        """What it is of, by which it is known again: its name, and what is fitted instead."""
+        return (self.name, *self.fitted)
+
+    @property
+    def all(self) -> tuple[Fault, ...]:
+        """It, and whatever else was found wrong, in the order in which they were put right."""
+        return (self, *(self.then.all if self.then is not None else ()))
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of all, each once."""
+        return tuple(dict.fromkeys(fault.name for fault in self.all))
+
+    @property
+    def moved_by(self) -> dict[str, float] | None:
+        """By how much what is given was moved, by name as :attr:`.Moved.moves` has it; None if nothing was."""
+        moves = [moved.moves for moved in (self.moved, self.moved_besides) if moved is not None]
+        return {name: by for each in moves for name, by in each.items()} if moves else None
 
     def is_borne_out(self, fit: Fit) -> bool:
         """Whether a fit of the set put right, with the effects that were found, still puts elsewhere what was given."""
@@ -106,17 +129,19 @@ def _told(name: str, value: float, said: float) -> str:
     return f"{name} is {value:.3g}, the set says {said:.3g}"
 
 
-def besides(fault: Fault, moved: Fault | None) -> Fault:
-    """The fault, with words of what was moved within its tolerance once it was put right."""
-    if moved is None:
+def besides(fault: Fault, then: Fault | None) -> Fault:
+    """The fault, with what was moved, or put right as well, once it was."""
+    if then is None:
         return fault
-    words = f"{fault.words}; then, within its tolerance, {moved.words}"
-    return dataclasses.replace(fault, words=words, put_right=moved.put_right)
+    if then.moved is None:
+        return dataclasses.replace(fault, put_right=then.put_right, then=then)
+    words = f"{fault.words}; then, {then.moved.how}, {then.words}"
+    return dataclasses.replace(fault, words=words, put_right=then.put_right, moved_besides=then.moved)
 
 
-def told_with(fault: Fault, first: Fault) -> Fault:
-    """A fault that was found once another one was put right, with words of both."""
-    words, check = (f"{getattr(fault, of)}; besides, {getattr(first, of)}" for of in ("words", "check"))
+def told_with(fault: Fault, other: Fault) -> Fault:
+    """A fault that may not be one, with words of another that is."""
+    words, check = (f"{getattr(fault, of)}; besides, {getattr(other, of)}" for of in ("words", "check"))
     return dataclasses.replace(fault, words=words, check=check)
 
 
@@ -144,6 +169,11 @@ def suspects(loaded: Loaded[MeasurementSet], target: Target, fit: Fit) -> list[F
         words = f"time stamps are {times(factor)} for commands {loaded.gripper.period_s:g} s apart"
         right = _changed(loaded, lambda _, g: _slower(g, 1 / factor))
         found.append(Fault("time_scale", words, "the clock and unit of t_s", right, of_log=True))
+    # before what is estimated from all that a fit leaves: beside exchanged columns that would come out wrong
+    if positions_are_swapped(target, fit):
+        words = f"columns {listed(measured.columns.position)} stand for one another"
+        check = "which encoder each column is written from: move one finger by hand"
+        found.append(Fault("swapped_positions", words, check, _changed(loaded, lambda _, g: with_positions_swapped(g))))
     tare, drift, left = find_tare(measured), session_drift(target, fit), np.inf
     if tare is not None:
         tare, left = _sharper(tare, target, fit)
@@ -179,10 +209,6 @@ def suspects(loaded: Loaded[MeasurementSet], target: Target, fit: Fit) -> list[F
             return dataclasses.replace(grasp, command_m=command_row_later(grasp.command_m, side))
 
         found.append(Fault("late_side", words, check, _changed(loaded, right_side)))
-    if positions_are_swapped(target, fit):
-        words = f"columns {listed(measured.columns.position)} stand for one another"
-        check = "which encoder each column is written from: move one finger by hand"
-        found.append(Fault("swapped_positions", words, check, _changed(loaded, lambda _, g: with_positions_swapped(g))))
     # rows that do not keep step with commands make a clock seem off: that must not hide the rest
     moved = wanted_moves(measured, target, fit) if all(one.name == "time_scale" for one in found) else None
     most = None if moved is None or moved.is_within else most_radii(loaded, moved)

@@ -79,6 +79,11 @@ class Moved:
         """Whether all are within the tolerance."""
         return bool((np.abs(self.deviations) < _limits(self.numbers)).all())
 
+    @property
+    def how(self) -> str:
+        """How far, in words."""
+        return "within its tolerance" if self.is_within else "by more than its tolerance"
+
     def radii_apart(self) -> list[str]:
         """Objects whose radius is beyond the tolerance, if that is not so of all alike, as an effect would have it.
 

@@ -24,15 +24,16 @@ from forcegrasp.identify.verdict import Verdict
 _Fitted = tuple[Target, Fit]
 
 
-def leaves_less(fault: Fault, right: _Fitted, said: _Fitted) -> bool:
-    """Whether the base model of a set put right leaves much less on held-out grasps than that of the set as it is."""
+def is_worth_a_search(fault: Fault, right: _Fitted, said: _Fitted) -> bool:
+    """Whether the base model of a set put right leaves much less on held-out grasps than that of the set as it is.
+
+    Or no more, where the log itself tells the fault: what the model lacks may hide what putting it right does.
+    """
+    gains = _gains(fault, right, said)
+    if fault.of_log:
+        return not is_beyond_chance(-gains, LEAST_LEAD)
     before, after = rms(_held(*said), said[0]), rms(_held(*right), right[0])
-    return is_beyond_chance(_gains(fault, right, said), LEAST_LEAD) and explained_share(before, after) > fault.worth
-
-
-def leaves_more(fault: Fault, right: _Fitted, said: _Fitted) -> bool:
-    """Whether the base model of a set put right leaves more on held-out grasps than that of the set as it is."""
-    return is_beyond_chance(-_gains(fault, right, said), LEAST_LEAD)
+    return is_beyond_chance(gains, LEAST_LEAD) and explained_share(before, after) > fault.worth
 
 
 def with_fault(found: Diagnosis, fault: Fault, said: _Fitted) -> Diagnosis:
@@ -43,18 +44,17 @@ def with_fault(found: Diagnosis, fault: Fault, said: _Fitted) -> Diagnosis:
         return found
     nearly_all = not kept_steps(found.steps) and explained_share(before, found.error_after) >= EXPLAINED_FAR
     if found.verdict is Verdict.EXPLAINED or (found.verdict is Verdict.UNKNOWN and nearly_all):
-        return dataclasses.replace(found, verdict=Verdict.DATA, effects=(fault.name,))
-    effects = (fault.name, *found.effects) if found.verdict.names_effects else ()
+        return dataclasses.replace(found, verdict=Verdict.DATA, effects=fault.names)
+    effects = tuple(dict.fromkeys((fault.name, *found.effects))) if found.verdict.names_effects else ()
     return dataclasses.replace(found, effects=effects)
 
 
 def with_fault_beside(found: Diagnosis, first: Fault, said: _Fitted) -> Diagnosis:
     """The diagnosis of a set that had a fault put right before anything else, told with what was found since."""
-    fault = found.fault
-    if fault is None or fault.moved is not None:
-        return with_fault(found, besides(first, fault), said)
-    told = with_fault(found, first, said)
-    return dataclasses.replace(told, verdict=found.verdict, effects=found.effects, fault=told_with(fault, first))
+    if found.fault is None or not found.fault_is_rival:
+        return with_fault(found, besides(first, found.fault), said)
+    told, rival = with_fault(found, first, said), told_with(found.fault, first)
+    return dataclasses.replace(told, verdict=found.verdict, effects=found.effects, fault=rival)
 
 
 def more_likely(right: Diagnosis, said: Diagnosis) -> Diagnosis:
@@ -84,17 +84,24 @@ def _held(target: Target, fit: Fit) -> np.ndarray:
 
 
 def _gains(fault: Fault, right: _Fitted, said: _Fitted) -> np.ndarray:
-    """Change of the log-likelihood of each held-out grasp, or window, over the rows that both sets have: the last ones.
+    """Change of the log-likelihood of each held-out grasp, or window, over what both sets have: the last rows.
 
     Of recordings that are cut into other windows now it is that of each recording.
     """
     better, worse = _held(*right), _held(*said)
     better = better * (right[0].sigma / said[0].sigma)
+    both = (better, right[0]), (worse, said[0])
     if right[0].recordings:
-        after, before = (log_likelihood_of_sizes(*one) for one in ((better, right[0]), (worse, said[0])))
+        after, before = (log_likelihood_of_sizes(*one) for one in both)
         return after - before if len(after) == len(before) else _of_each(after, right[0]) - _of_each(before, said[0])
-    gains = log_likelihood(better) - log_likelihood(worse[:, -better.shape[1] :])
+    after, before = (_by_name(log_likelihood(held[:, -better.shape[1] :]), target) for held, target in both)
+    gains = np.array([after[name] - before[name] for name in after if name in before])
     return gains - (fault.moved.price / len(gains) if fault.moved else 0.0)
+
+
+def _by_name(log_likelihoods: np.ndarray, target: Target) -> dict[str, float]:
+    """Of each grasp, by its name: grasps may have been left out of one set and not of another."""
+    return dict(zip((grasp.name for grasp in target.grasps), log_likelihoods.tolist(), strict=True))
 
 
 def _of_each(log_likelihoods: np.ndarray, target: Target) -> np.ndarray:
