@@ -23,6 +23,7 @@ import time
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass
+from itertools import combinations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -62,6 +63,11 @@ PAIRS_OF_SERVOS = (
 )
 
 
+#: What is wrong with a set, two at a time, and what tells it.
+MISTAKES = {
+    "clock_doubled": "time_scale", "positions_swapped": "swapped_positions", "forces_swapped": "swapped_forces",
+    "tare": "force_tare", "one_radius": "object_radius",
+}  # fmt: skip
 #: What every real rig has: objects 0.3 mm off, encoders, gains, a little friction, a clock, heavy-tailed noise.
 MESS: dict[str, dict[str, float]] = {
     "encoder_bias": {"left": 1e-4, "right": -6e-5},
@@ -135,6 +141,9 @@ def jobs() -> list[Job]:
     for spoiled in sorted(set(SPOILED) - {""}):
         found += [Job("spoiled", (), "", seed, spoiled=spoiled) for seed in range(30, 37)]
 
+    for k, pair in enumerate(combinations(MISTAKES, 2)):
+        found += [Job("two mistakes", (), "", seed, spoiled="+".join(pair)) for seed in (30 + k, 50 + k)]
+
     def messy(hidden: tuple[str, ...], size: str, seed: int) -> Job:
         return Job("messy", hidden, size, seed, noise="heavy", spoiled="radius_0.3mm")
 
@@ -175,6 +184,8 @@ def right_names(job: Job) -> set[str]:
 
     if job.group == "outside":
         return set()
+    if job.group == "two mistakes":
+        return {MISTAKES[spoiled] for spoiled in job.spoiled.split("+")}
     called = VARIANT_OF | CALLED | {name: answer for name, (answer, _) in OTHERWISE.items()}
     of_contact = {
         "mujoco_rubbing": "contact_friction", "mujoco_damped": "contact_damping", "mujoco_ringing": "contact_damping",
@@ -245,6 +256,7 @@ def run_job(job: Job) -> dict:
         "processor_s": processor,
         "intervals": [] if job.is_servo else _intervals(model, truth),
         "moved": "" if diagnosis.fault is None else diagnosis.fault.words,
+        "faults": [] if diagnosis.fault is None or diagnosis.fault.moved else list(diagnosis.fault.names),
         "law": None if diagnosis.law is None else _law(diagnosis.law),
         "further": further,
     }

@@ -60,6 +60,9 @@ def judge(row: dict, right: set[str]) -> str:
         if verdict in ("data", "refused"):
             return "first"
         return "in set" if any(is_of_set(name) for name in named) else "wrong" if named else "missed"
+    if group == "two mistakes":
+        told = named_of(row, right)
+        return "first" if told == right else "in set" if told else "wrong" if named else "missed"
     if group == "outside":
         return "first" if verdict == "unknown" else "wrong" if named else "missed"
     if group == "contact" and not right:
@@ -105,8 +108,8 @@ def _judge_several(row: dict, right: set[str]) -> str:
 
 
 def named_of(row: dict, right: set[str]) -> set[str]:
-    """Those of the hidden effects that are named, alone or in a tie."""
-    return right & {name for step in steps_of(row) for name in step}
+    """Those of the hidden effects, or mistakes of the set, that are named, alone or in a tie."""
+    return right & {*row.get("faults", []), *(name for step in steps_of(row) for name in step)}
 
 
 def false_names(row: dict, right: set[str]) -> list[str]:

@@ -89,12 +89,16 @@ def _at_floor(rows: list[dict]) -> str:
     return _rate([r["error_after"] <= 1.1 * r["floor"] for r in rows if "error_after" in r])
 
 
+def _named(rows: list[dict]) -> list[bool]:
+    """Of each thing that is hidden in a set, or wrong with it, whether it is named."""
+    return [name in named_of(r, set(r["right"])) for r in rows for name in r["right"]]
+
+
 def _several_lines(what: str, rows: list[dict]) -> list[str]:
     """How many of the hidden effects are named, and how many of the names are right."""
-    hidden = [name in named_of(r, set(r["right"])) for r in rows for name in r["right"]]
     named = [step[0] not in false_names(r, set(r["right"])) for r in rows for step in steps_of(r)]
     return [
-        f"| {what}: share of them that is named | {_rate(hidden)} |",
+        f"| {what}: share of them that is named | {_rate(_named(rows))} |",
         f"| … share of names that are right | {_rate(named)} |",
         f"| … error left at most 1.1 × the floor | {_at_floor(rows)} |",
     ]
@@ -174,7 +178,7 @@ def _page(rows: list[dict], planned: int) -> str:
 
     one, plain_none, noisy = of("one", grasps=24), of("none"), of("noise")
     laws, contacts, several, messy = of("law"), of("contact"), of("several"), of("messy")
-    outside, nothing = of("outside"), plain_none + noisy
+    outside, nothing, two_mistakes = of("outside"), plain_none + noisy, of("two mistakes")
     fitted = [r for r in rows if r["group"] in ("one", "none") and r["judged"] == "first"]
     inside, counted = _coverage(fitted)
     ratios = [r["error_after"] / r["floor"] for r in one if r["judged"] == "first"]
@@ -223,6 +227,8 @@ def _page(rows: list[dict], planned: int) -> str:
         f"| … called explained | {_share(noisy, 'first')} |",
         f"| a mistake of the set: told as one, or in a tie | {_share(of('spoiled'), 'first', 'in set')} |",
         f"| … an effect named without a doubt | {_share(of('spoiled'), 'wrong')} |",
+        f"| two mistakes of the set: share of them that is told | {_rate(_named(two_mistakes))} |",
+        f"| … an effect named without a doubt | {_besides(two_mistakes)} |",
         f"| an effect outside the catalogue: called unknown | {_share(outside, 'first')} |",
         f"| … the library of terms has one for it: a law with that term | {_known(map(has_right_term, outside))} |",
         f"| nothing hidden, odd noise or not: a law proposed | {_rate([bool(r.get('law')) for r in nothing])} |",

@@ -22,7 +22,7 @@ from .noises import NOISES
 from .penalty import PenaltyPlant
 from .plan import Setup, draw_setup
 from .scene import SAMPLE_S, STEP_S, MujocoPlant, Servo
-from .spoiled import SPOILED, Sheet
+from .spoiled import SPOILED, Sheet, spoil
 
 __all__ = [
     "CATALOGUE", "OTHERWISE", "OUTSIDE", "VARIANTS", "Recording", "Truth", "draw_setup", "record", "record_one_more",
@@ -94,13 +94,13 @@ def record(
       contact: one of :data:`PLANTS`; all but the first are another contact law than the model's.
       noise: one of :data:`NOISES`; the set states the standard deviations of white noise.
       jitter_s: samples are taken up to so much earlier or later than their time stamps say.
-      spoiled: what is wrong with the set, one of :data:`SPOILED`.
+      spoiled: what is wrong with the set, see :func:`.spoil`.
     """
     folder = Path(folder)
     setup = draw_setup(seed, grasps, plan, samples)
     hidden = build_effects(effects or {})
     recording = simulate(setup, hidden, seed, contact, noise, jitter_s)
-    _write(folder, SPOILED[spoiled](_sheet(setup, recording), np.random.default_rng([seed, 4])), setup.session)
+    _write(folder, spoil(_sheet(setup, recording), spoiled, np.random.default_rng([seed, 4])), setup.session)
     placed = zip(setup.thing, setup.offset, setup.session, strict=True)
     truth = Truth(
         seed, plan, contact, setup.servo.gain, setup.servo.b2,

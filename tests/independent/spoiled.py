@@ -66,6 +66,7 @@ SPOILED: dict[str, Spoil] = {
     "radius_0.3mm": _larger(3e-4),
     "radius_2mm": _larger(2e-3),
     "one_radius": _one_radius,
+    "positions_swapped": lambda sheet, rng: replace(sheet, q=sheet.q[:, :, ::-1]),
     "forces_swapped": lambda sheet, rng: replace(sheet, f=sheet.f[:, :, ::-1]),
     "labels_swapped": _swapped_labels,
     "clock_doubled": lambda sheet, rng: replace(sheet, period_s=2 * sheet.period_s),
@@ -73,3 +74,10 @@ SPOILED: dict[str, Spoil] = {
     "forces_late": lambda sheet, rng: _late(sheet, f=sheet.f),
     "tare": _tare,
 }
+
+
+def spoil(sheet: Sheet, names: str, rng: np.random.Generator) -> Sheet:
+    """With what is wrong by these names of :data:`SPOILED`, as in ``clock_doubled+tare``."""
+    for name in names.split("+"):
+        sheet = SPOILED[name](sheet, rng)
+    return sheet

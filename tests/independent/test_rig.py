@@ -222,7 +222,7 @@ def written(tmp_path_factory) -> Callable[[str], dict[str, list[dict[str, str]]]
     return read
 
 
-@pytest.mark.parametrize("name", sorted(SPOILED))
+@pytest.mark.parametrize("name", [*sorted(SPOILED), "clock_doubled+tare"])
 def test_a_spoiled_set_differs_in_what_is_written_alone(name: str, written) -> None:
     def columns_that_differ(file: str) -> set[str]:
         pairs = zip(written("")[file], written(name)[file], strict=True)
@@ -232,7 +232,8 @@ def test_a_spoiled_set_differs_in_what_is_written_alone(name: str, written) -> N
         "": set(), "clock_doubled": {"t_s"}, "forces_swapped": {"f_l_n", "f_r_n"}, "forces_late": {"f_l_n", "f_r_n"},
         "commands_late": {"qdes_l_m", "qdes_r_m"}, "tare": {"f_l_n"}, "calliper": {"object_radius_m"},
         "radius_0.3mm": {"object_radius_m"}, "radius_2mm": {"object_radius_m"}, "one_radius": {"object_radius_m"},
-        "labels_swapped": {"object", "object_radius_m"},
+        "labels_swapped": {"object", "object_radius_m"}, "positions_swapped": {"q_l_m", "q_r_m"},
+        "clock_doubled+tare": {"t_s", "f_l_n"},
     }  # fmt: skip
     assert columns_that_differ("grasps.csv") | columns_that_differ("samples.csv") == expected[name]
 

@@ -70,6 +70,16 @@ def test_what_is_named_and_what_is_named_falsely() -> None:
     assert false_names({**row("messy", "effect", "encoder_bias"), "group": "several"}, right) == ["encoder_bias"]
 
 
+def test_mistakes_of_a_set_are_named_by_the_fault() -> None:
+    right = {"time_scale", "swapped_forces"}
+    one = {**row("two mistakes", "data", "swapped_forces"), "faults": ["force_tare"]}
+    assert (judge(one, right), named_of(one, right)) == ("in set", {"swapped_forces"})
+    both = {**one, "faults": ["time_scale"]}
+    assert (judge(both, right), named_of(both, right), false_names(both, right)) == ("first", right, [])
+    assert judge(row("two mistakes", "effect", "backlash"), right) == "wrong"
+    assert judge(row("two mistakes", "unknown"), right) == "missed"
+
+
 def test_families_are_those_of_the_catalogue() -> None:
     assert families(["stiction", "coulomb_friction", "early_row"]) == {"friction"}
 
