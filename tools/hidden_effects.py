@@ -65,8 +65,7 @@ PAIRS_OF_SERVOS = (
 
 #: What is wrong with a set, two at a time, and what tells it.
 MISTAKES = {
-    "clock_doubled": "time_scale", "positions_swapped": "swapped_positions", "forces_swapped": "swapped_forces",
-    "tare": "force_tare", "one_radius": "object_radius",
+    "clock_doubled": "time_scale", "commands_late": "early_row", "tare": "force_tare", "one_radius": "object_radius",
 }  # fmt: skip
 #: What every real rig has: objects 0.3 mm off, encoders, gains, a little friction, a clock, heavy-tailed noise.
 MESS: dict[str, dict[str, float]] = {
@@ -142,7 +141,7 @@ def jobs() -> list[Job]:
         found += [Job("spoiled", (), "", seed, spoiled=spoiled) for seed in range(30, 37)]
 
     for k, pair in enumerate(combinations(MISTAKES, 2)):
-        found += [Job("two mistakes", (), "", seed, spoiled="+".join(pair)) for seed in (30 + k, 50 + k)]
+        found += [Job("two mistakes", (), "", seed, spoiled="+".join(pair)) for seed in range(30 + 3 * k, 33 + 3 * k)]
 
     def messy(hidden: tuple[str, ...], size: str, seed: int) -> Job:
         return Job("messy", hidden, size, seed, noise="heavy", spoiled="radius_0.3mm")

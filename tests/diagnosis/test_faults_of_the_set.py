@@ -363,6 +363,7 @@ def test_two_faults_are_told_together(sound):
     [
         (("time_scale", "force_tare", "object_radius"), ("clock", "tare", "radius")),
         (("swapped_positions", "force_tare"), ("columns", "tare")),
+        (("object_radius", "force_tare"), ("far", "tare")),
     ],
 )
 def test_several_faults_are_put_right_one_after_the_other(sound, effects, spoil):
@@ -373,6 +374,7 @@ def test_several_faults_are_put_right_one_after_the_other(sound, effects, spoil)
             "clock": {"time_s": 1.5 * grasp.time_s},
             "tare": {"force_n": grasp.force_n - [0.2 * (place >= 4), 0.0]},
             "radius": {"radius_m": grasp.radius_m + 0.001 * (grasp.object == "thing_0")},
+            "far": {"radius_m": grasp.radius_m + 0.003 * (grasp.object == "thing_0")},
             "columns": {"position_m": grasp.position_m[:, ::-1]},
         }
         return {name: value for what in spoil for name, value in changes[what].items()}

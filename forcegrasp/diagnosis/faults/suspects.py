@@ -158,45 +158,84 @@ def suspects(loaded: Loaded[MeasurementSet], target: Target, fit: Fit) -> list[F
       target: the same, lined up.
       fit: of the base model.
     """
-    measured, found = loaded.measured, []
     if leaves_nothing(fit, target):
         return []
     if loaded.gripper.is_servo:
         return _of_recordings(loaded, target, fit)
     if any(grasp.like for grasp in odd_grasps(target, fit)):  # wrong labels may look like any other fault
         return []
-    if (factor := clock_factor(measured, loaded.gripper.period_s, 1 + MOST * measured.period_std_share)) is not None:
-        words = f"time stamps are {times(factor)} for commands {loaded.gripper.period_s:g} s apart"
-        right = _changed(loaded, lambda _, g: _slower(g, 1 / factor))
-        found.append(Fault("time_scale", words, "the clock and unit of t_s", right, of_log=True))
-    # before what is estimated from all that a fit leaves: beside exchanged columns that would come out wrong
-    if positions_are_swapped(target, fit):
-        words = f"columns {listed(measured.columns.position)} stand for one another"
-        check = "which encoder each column is written from: move one finger by hand"
-        found.append(Fault("swapped_positions", words, check, _changed(loaded, lambda _, g: with_positions_swapped(g))))
+    measured, first = loaded.measured, [*_of_clock(loaded), *_of_swapped(loaded, target, fit)]
+    others = [*_of_zeros(loaded, target, fit), *_of_units(loaded), *_of_rows(loaded, target, fit)]
+    # rows that do not keep step with commands make a clock seem off: that must not hide the rest
+    all_of_clock = all(fault.name == "time_scale" for fault in (*first, *others))
+    moved = wanted_moves(measured, target, fit) if all_of_clock else None
+    most = None if moved is None or moved.is_within else most_radii(loaded, moved)
+    if wrong := doubtful_radii(target, fit, measured.radius_std_m):
+        wider = most if most is not None and set(most.fitted) > {f"radius_m of {name}" for name in wrong} else None
+        # they are fitted beside all else; what is estimated once, as a change of zero, is right only after them
+        return [*first, dataclasses.replace(_wrong_radii(loaded, wrong, moved), wider=wider), *others]
+    if most is not None:
+        return [*first, most]
+    return [*first, moved_as_fault(loaded, moved)] if moved is not None and moved.is_within else [*first, *others]
+
+
+def _of_clock(loaded: Loaded[MeasurementSet]) -> list[Fault]:
+    """Time stamps in another unit."""
+    measured = loaded.measured
+    factor = clock_factor(measured, loaded.gripper.period_s, 1 + MOST * measured.period_std_share)
+    if factor is None:
+        return []
+    words = f"time stamps are {times(factor)} for commands {loaded.gripper.period_s:g} s apart"
+    right = _changed(loaded, lambda _, g: _slower(g, 1 / factor))
+    return [Fault("time_scale", words, "the clock and unit of t_s", right, of_log=True)]
+
+
+def _of_swapped(loaded: Loaded[MeasurementSet], target: Target, fit: Fit) -> list[Fault]:
+    """Columns of positions that stand for one another; whatever is estimated beside them would come out wrong."""
+    if not positions_are_swapped(target, fit):
+        return []
+    words = f"columns {listed(loaded.measured.columns.position)} stand for one another"
+    check = "which encoder each column is written from: move one finger by hand"
+    return [Fault("swapped_positions", words, check, _changed(loaded, lambda _, g: with_positions_swapped(g)))]
+
+
+def _of_zeros(loaded: Loaded[MeasurementSet], target: Target, fit: Fit) -> list[Fault]:
+    """Zeros or gains of forces that change."""
+    measured = loaded.measured
     tare, drift, left = find_tare(measured), session_drift(target, fit), np.inf
     if tare is not None:
         tare, left = _sharper(tare, target, fit)
     if tare is not None and (drift is None or left <= drift.left):
         words = f"the zero changes at grasp {measured.grasps[tare.first].name}: {tare.words(measured)}"
-        found.append(_tared(loaded, [tare], words, "whether sensors were set to zero there"))
-    elif drift is not None:
+        return [_tared(loaded, [tare], words, "whether sensors were set to zero there")]
+    if drift is not None:
         order = order_in_session(measured.grasps)
         check = "whether sensors or motors warm up meanwhile: grasp one object first and last, and compare"
         right = _changed(loaded, lambda index, g: drift.taken_out(g, order[index]))
         words = drift.words(measured.columns.force)
-        found.append(Fault(f"force_{drift.of}_drift", words, check, right, worth=LEAST_SHARE))
-    elif odd := [_sharper(one, target, fit)[0] for one in find_odd_zeros(measured)]:
+        return [Fault(f"force_{drift.of}_drift", words, check, right, worth=LEAST_SHARE)]
+    if odd := [_sharper(one, target, fit)[0] for one in find_odd_zeros(measured)]:
         each = [f"grasp {measured.grasps[one.first].name} ({one.words(measured)})" for one in odd]
         words = f"forces have another zero in {listed(each)} alone"
-        found.append(_tared(loaded, odd, words, "whether sensors were set to zero there while something was held"))
-    if (unit := find_odd_unit(measured)) is not None:
-        words = f"column {measured.columns.force[unit.channel]} {unit.words(measured.grasps)}"
-        right = _changed(loaded, lambda index, g: unit.put_right(g) if index in unit.grasps else g)
-        check = "unit and sign of that column in the logs of these grasps"
-        found.append(Fault("force_unit", words, check, right, worth=_ANY))
-    early = _early_readings(target, fit)
-    if early:
+        return [_tared(loaded, odd, words, "whether sensors were set to zero there while something was held")]
+    return []
+
+
+def _of_units(loaded: Loaded[MeasurementSet]) -> list[Fault]:
+    """A column of forces in another unit, or with another sign."""
+    measured = loaded.measured
+    if (unit := find_odd_unit(measured)) is None:
+        return []
+    words = f"column {measured.columns.force[unit.channel]} {unit.words(measured.grasps)}"
+    right = _changed(loaded, lambda index, g: unit.put_right(g) if index in unit.grasps else g)
+    check = "unit and sign of that column in the logs of these grasps"
+    return [Fault("force_unit", words, check, right, worth=_ANY)]
+
+
+def _of_rows(loaded: Loaded[MeasurementSet], target: Target, fit: Fit) -> list[Fault]:
+    """Columns that are written to another row than the rest."""
+    measured, found = loaded.measured, []
+    if early := _early_readings(target, fit):
         late = ", or commands stand one row late" if len(early) > 1 else ""
         words = f"{listed(early)} are what was read one row later{late}"
         check = "which row each column was written to, and its clock"
@@ -209,16 +248,6 @@ def suspects(loaded: Loaded[MeasurementSet], target: Target, fit: Fit) -> list[F
             return dataclasses.replace(grasp, command_m=command_row_later(grasp.command_m, side))
 
         found.append(Fault("late_side", words, check, _changed(loaded, right_side)))
-    # rows that do not keep step with commands make a clock seem off: that must not hide the rest
-    moved = wanted_moves(measured, target, fit) if all(one.name == "time_scale" for one in found) else None
-    most = None if moved is None or moved.is_within else most_radii(loaded, moved)
-    if wrong := doubtful_radii(target, fit, measured.radius_std_m):
-        wider = most if most is not None and set(most.fitted) > {f"radius_m of {name}" for name in wrong} else None
-        found.append(dataclasses.replace(_wrong_radii(loaded, wrong, moved), wider=wider))
-    elif most is not None:
-        found.append(most)
-    elif moved is not None and moved.is_within:
-        found.append(moved_as_fault(loaded, moved))
     return found
 
 
