@@ -154,6 +154,18 @@ def test_a_setting_is_fitted_and_told_in_the_answer(recorded):
 
 
 @pytest.mark.long
+def test_two_recordings_that_are_odd_in_the_same_way_are_both_told(recorded):
+    turned = changed(recorded, "waves", force_n=lambda f: -f)
+    found, _ = diagnose_set(changed(turned, "steps", force_n=lambda f: 1.29 * f), None, ["coulomb_friction"], 0, silent)
+    assert (found.verdict, found.effects) == (Verdict.DATA, ("odd_recording",))
+    assert found.error_after < 1.05
+    assert found.fault is not None
+    told = " ".join(fault.words for fault in found.fault.all)
+    assert "efforts of steps are 1.29 times" in told
+    assert "efforts of waves are -1 times" in told
+
+
+@pytest.mark.long
 def test_it_is_told_beside_an_effect_that_had_hidden_it(tmp_path, monkeypatch):
     """As if the base model had given no reason to look for it."""
     monkeypatch.setattr(import_module("forcegrasp.diagnosis.diagnose_set"), "suspects", lambda *_: [])

@@ -61,12 +61,13 @@ class Fault(ShortRepr):
     wider: Fault | None = None  #: the same of more objects, to be tried if something is left
     #: The log itself says so, and what the model lacks may hide all that it explains: it need not leave less at first.
     of_log: bool = False
+    part: str = ""  #: what of which recording is wrong, if it is one
     instead_of: str = ""  #: the one effect that it stands for where it is a rival; otherwise it stands for all
 
     @property
     def of(self) -> tuple[str, ...]:
-        """What it is of, by which it is known again: its name, and what is fitted instead."""
-        return (self.name, *self.fitted)
+        """What it is of, by which it is known again: its name, the part, and what is fitted instead."""
+        return (self.name, self.part, *self.fitted)
 
     @property
     def all(self) -> tuple[Fault, ...]:
@@ -275,7 +276,8 @@ def _of_recording(loaded: Loaded[MeasurementSet], wrong: RecordingFault) -> Faul
     right = _changed(loaded, lambda _, g: wrong.put_right(g))
     fitted = wrong.fitted(loaded.measured.grasps)
     least = _SAME_SETTING * max(map(abs, fitted.values()), default=0.0)
-    return Fault(wrong.name, wrong.words(loaded.measured.columns.unit), wrong.check, right, fitted=fitted, least=least)
+    words, part = wrong.words(loaded.measured.columns.unit), f"{wrong.what} of {wrong.recording}"
+    return Fault(wrong.name, words, wrong.check, right, fitted=fitted, least=least, part=part)
 
 
 def _wrong_radii(loaded: Loaded[MeasurementSet], wrong: dict[str, float], moved: Moved | None) -> Fault:
