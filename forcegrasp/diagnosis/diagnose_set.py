@@ -87,10 +87,8 @@ def diagnose_set(
         if stamps is not None:
             loaded, said = stamps[0].put_right, stamps[1]
         diagnosis, simulators = _put_right_or_as_said(ways, loaded, said)
-    except REASONS as reason:  # before any search had begun
-        stopped = cut_short(reason, progress)
-        nothing = dataclasses.replace(ways, effects=[]).search(*said)
-        diagnosis, simulators = dataclasses.replace(nothing, stopped=stopped), said[1]
+    except REASONS as reason:
+        diagnosis, simulators = ways.found_nothing(said, reason)
     diagnosis = timing_within_tolerance_after_all(diagnosis, loaded)
     if stamps is not None:
         diagnosis = with_fault_beside(diagnosis, stamps[0], (given[0], given[2].fit))
@@ -130,6 +128,12 @@ class _Ways:
         """See :func:`.search.diagnose`."""
         rng = np.random.default_rng(self.seed + 1)
         return diagnose(target, base, simulators, self.effects, rng, self.progress, start, stop_when)
+
+    def found_nothing(self, said: Fitted, reason: BaseException) -> Found:
+        """The diagnosis of a set that was cut short before any search of it had begun."""
+        stopped = cut_short(reason, self.progress)
+        nothing = dataclasses.replace(self, effects=[]).search(*said)
+        return dataclasses.replace(nothing, stopped=stopped), said[1]
 
     def moved(self, found: Diagnosis, loaded: Loaded[MeasurementSet], briefly: bool = False) -> Found | None:
         """The diagnosis with what the set gives moved within its tolerance; None if nothing asks for that.
@@ -267,7 +271,8 @@ def _put_right_or_as_said(
 ) -> Found:
     """The diagnosis with the first fault put right that makes the set likelier; of the set as it is if none does.
 
-    A set may have several: once one is put right, the others are looked for in what is left.
+    A set may have several: once one is put right, the others are looked for in what is left. Where that is cut short
+    what was put right by then is told.
 
     Args:
       ways: how it is fitted and searched.
@@ -275,6 +280,14 @@ def _put_right_or_as_said(
       said: the same, fitted.
       known: faults that were put right already, or are not to be.
     """
+    try:
+        return _likeliest(ways, loaded, said, known)
+    except REASONS as reason:
+        return ways.found_nothing(said, reason)
+
+
+def _likeliest(ways: _Ways, loaded: Loaded[MeasurementSet], said: Fitted, known: Sequence[Fault]) -> Found:
+    """See :func:`_put_right_or_as_said`, whose arguments these are."""
     search = ways.search_and_move
     for suspect in suspects(loaded, said[0], said[2].fit):
         if suspect.of in [fault.of for fault in known]:

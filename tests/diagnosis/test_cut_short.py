@@ -12,6 +12,7 @@ from forcegrasp.cli.diagnose import sigterm_as_ctrl_c
 from forcegrasp.diagnosis.cut_short import INTERRUPTED
 from forcegrasp.diagnosis.diagnose_set import diagnose_set
 from forcegrasp.diagnosis.faults.suspects import Fault
+from forcegrasp.diagnosis.givens.doubt import with_fault_beside
 from forcegrasp.diagnosis.search.search import diagnose
 from forcegrasp.diagnosis.search.so_far import SoFar
 from forcegrasp.diagnosis.search.step import look_further
@@ -92,6 +93,29 @@ def test_it_may_be_cut_short_anywhere_once_the_base_model_is_fitted(rubbing, mon
     assert found.stopped
     assert found.effects == (() if where == "suspects" else ("coulomb_friction",))
     assert not found.law_sought
+
+
+@pytest.mark.parametrize("reason", [reason for reason, _ in REASONS])
+@pytest.mark.parametrize("when", [1, 2])
+def test_a_fault_that_was_put_right_by_then_is_told(monkeypatch, when, reason):
+    """Cut short while the set put right is doubted again, or while the set as it is, is searched to be held against."""
+    loaded, asked = light_set(), []
+    grasps = tuple(dataclasses.replace(grasp, time_s=1.5 * grasp.time_s) for grasp in loaded.measured.grasps)
+    loaded = dataclasses.replace(loaded, measured=dataclasses.replace(loaded.measured, grasps=grasps))
+    suspects = OF_SET.suspects
+
+    def doubted(*arguments):
+        if len(asked) == when:
+            raise reason
+        return asked.append(arguments) or suspects(*arguments)
+
+    monkeypatch.setattr(OF_SET, "suspects", doubted)
+    # so that the set as it is must be held against it
+    monkeypatch.setattr(OF_SET, "with_fault_beside", lambda *_: dataclasses.replace(with_fault_beside(*_), left="much"))
+    found, _ = diagnose_set(loaded, None, ["force_bias"], 0, silent)
+    assert found.stopped
+    assert found.fault is not None
+    assert found.fault.name == "time_scale"
 
 
 @pytest.mark.parametrize(("reason", "words"), REASONS)
