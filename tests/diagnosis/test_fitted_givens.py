@@ -172,22 +172,28 @@ def test_radii_that_are_put_beyond_it_one_by_one_are_wrong_where_nothing_is_left
 
 
 @pytest.mark.parametrize(
-    ("kind", "explained", "told"),
+    ("kind", "by", "explained", "left", "told"),
     [
-        ("offset_m", 0.9, "What the set gives was moved by more than its tolerance: place in grasp"),
-        ("offset_m", 0.5, ""),
-        ("radius_m", 0.9, "The set seems to be wrong: object_radius"),
-        ("radius_m", 0.5, ""),
+        ("offset_m", 9, 0.9, "", "What the set gives was moved by more than its tolerance: place in grasp"),
+        ("offset_m", 9, 0.5, "", ""),
+        ("radius_m", 9, 0.9, "much", "The set seems to be wrong: object_radius"),
+        ("radius_m", 2, 0.9, "", "The set seems to be wrong: object_radius"),
+        ("radius_m", 2, 0.9, "much", "What the set gives was moved by more than its tolerance: radius of thing_0"),
+        ("radius_m", 9, 0.5, "much", ""),
     ],
 )
-def test_what_is_beyond_its_tolerance_beside_effects_that_explain_most_is_told(off, said, found, kind, explained, told):
+def test_what_is_beyond_its_tolerance_beside_effects_that_explain_most_is_told(
+    off, said, found, kind, by, explained, left, told
+):
+    """Radii were fitted as if a ruler had measured them, though the set says that a calliper did."""
+    off = dataclasses.replace(off, measured=dataclasses.replace(off.measured, radius_std_m=5e-5))
     fit, priors = found.fit, found.fit.problem.priors
     one = next(index for index, entry in enumerate(fit.problem.entries) if entry.parameter == kind)
     vector = np.where(priors.precision > 0, priors.expected, fit.vector)
-    vector[one] += 9 / priors.precision[one]
+    vector[one] += by / priors.precision[one]
     after = np.sqrt((1 - explained) * (found.error_of_base**2 - found.floor**2) + found.floor**2)
     beyond = dataclasses.replace(
-        found, fit=dataclasses.replace(fit, vector=vector), verdict=Verdict.EFFECT, error_after=after
+        found, fit=dataclasses.replace(fit, vector=vector), verdict=Verdict.EFFECT, error_after=after, left=left
     )
     moved = told_as_moved(beyond, off, said)
     assert ("" if moved is None else fault_words(moved)).startswith(told)

@@ -100,6 +100,11 @@ class Moved:
         return float(np.ptp([by_m for name, by_m in self.moves.items() if name.startswith("radius_m")] or [0.0]))
 
     @property
+    def most_of_radii_m(self) -> float:
+        """By how much the radius that was moved most was moved, metres."""
+        return max((abs(by_m) for name, by_m in self.moves.items() if name.startswith("radius_m")), default=0.0)
+
+    @property
     def smaller_m(self) -> float:
         """By how much radii were moved down on average, metres, where chance would hardly do it to all; else 0."""
         radii = [(n.std, move) for n, move in zip(self.numbers, self.deviations, strict=True) if n.kind == "radius_m"]

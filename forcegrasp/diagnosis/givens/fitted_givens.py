@@ -10,7 +10,7 @@ from scipy.stats import chi2
 from forcegrasp.diagnosis.evidence import LEAST_SHARE_TOGETHER
 from forcegrasp.diagnosis.faults.odd_grasps import coordinates_by_name
 from forcegrasp.diagnosis.faults.suspects import leaves_nothing, most_radii, moved_as_fault
-from forcegrasp.diagnosis.faults.tolerance import RULER_M, Moved
+from forcegrasp.diagnosis.faults.tolerance import MOST, RULER_M, Moved
 from forcegrasp.diagnosis.givens.doubt import with_fault
 from forcegrasp.diagnosis.givens.givens_besides import Fitted
 from forcegrasp.diagnosis.result import Diagnosis
@@ -82,10 +82,11 @@ def told_as_moved(found: Diagnosis, loaded: Loaded[MeasurementSet], said: Fitted
     """The diagnosis of a set whose radii and places were fitted, with where they were put, or with them as given.
 
     As given where nothing asks for another place: then nothing else need be less certain for it. Radii that are beyond
-    their tolerance, some more and some less, are wrong where that leaves nothing; None if that is not so, and something
-    is beyond its tolerance. Where effects explain most of what was left, something may be left, and places may be
-    beyond it: each grasp has one of its own, which makes up for whatever else differs, such as a delay that is not
-    steady. Effects stand beside the base model of the set as it is, which users go on with.
+    their tolerance, some more and some less, are wrong where that leaves nothing, or effects explain most of what was
+    left and a ruler could not be so far off; None if that is not so, and something is beyond its tolerance. Where
+    effects explain most, something may be left, and places, and radii by what a ruler may be off, may be beyond it:
+    they make up for whatever else differs, such as another contact, or a delay that is not steady. Effects stand beside
+    the base model of the set as it is, which users go on with.
 
     Args:
       found: the diagnosis.
@@ -113,7 +114,9 @@ def told_as_moved(found: Diagnosis, loaded: Loaded[MeasurementSet], said: Fitted
         wrong = most_radii(loaded, moved)
         if wrong is None or (found.left and not most) or found.fault is not None or not places:
             return None
-        return with_fault(found, wrong.told_by(found.fit), (target, base.fit))
+        # by less than a ruler may be off they may make up for what is left
+        if not found.left or moved.most_of_radii_m > MOST * RULER_M:
+            return with_fault(found, wrong.told_by(found.fit), (target, base.fit))
     if found.fault is not None and (timing := found.fault.moved) is not None:
         moved = Moved((*timing.numbers, *moved.numbers), np.r_[timing.deviations, moved.deviations])
     fault = moved_as_fault(loaded, moved)
