@@ -193,7 +193,7 @@ def _page(rows: list[dict], planned: int) -> str:
         "given no hints. Sets are taken in random order, so that a part of the campaign is a fair sample of it.",
         "Each set's result is a line of `docs/hidden-effects.jsonl`.",
         "",
-        "    python tools/hidden_effects.py run      # two minutes of a core a set; goes on where it was stopped",
+        "    python tools/hidden_effects.py run      # three minutes of a core a set; goes on where it was stopped",
         "    python tools/hidden_effects.py report   # this page, of the code that measured last; --all: of all code",
         "",
         *_measured_with(rows),

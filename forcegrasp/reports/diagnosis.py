@@ -67,6 +67,7 @@ from forcegrasp.reports.law import law_json, law_section, law_words
 from forcegrasp.reports.physics_step import shorter_step
 from forcegrasp.reports.symptom import symptom_of
 from forcegrasp.reports.view import view_section
+from forcegrasp.short_repr import as_sentence
 
 _PRINTED = 5
 
@@ -308,7 +309,7 @@ def _step_section(number: int, step: Step, before: Fit, diagnosis: Diagnosis) ->
     fall = f"Held-out error {step.error_before:.2f} → {step.error_after:.2f} × noise."
     told = _symptom(step, before, diagnosis)
     blocks: list = [
-        Text(f"{told[0].upper()}{told[1:]}. {fall}", strong=True),
+        Text(f"{as_sentence(told)} {fall}", strong=True),
         seen,
         Text(f"What is known of {effect.name}: {effect.symptom}."),
     ]
@@ -345,7 +346,7 @@ def _advice_section(diagnosis: Diagnosis, advice: Advice) -> Section:
     return Section(
         "What to record next",
         [
-            Text(f"{advice.sentence()[0].upper()}{advice.sentence()[1:]}.", strong=True),
+            Text(as_sentence(advice.sentence()), strong=True),
             Picture(
                 figures.rivals(diagnosis.target, advice.time_s, advice.command_m, advice.predicted, advice.rivals),
                 f"What {one} and {other} predict of the grasp “{advice.grasp}” on {advice.next_grasp.object}.",
@@ -389,9 +390,8 @@ def _left_sections(diagnosis: Diagnosis) -> list[Section]:
     worst = int(np.argmax(left.by_grasp()))
     grasp = target.grasps[worst]
     model = "the base model" if not diagnosis.fit.problem.effects else "the final model"
-    sentence = left_sentence(diagnosis)
     blocks: list = [
-        Text(f"{sentence[0].upper()}{sentence[1:]}."),
+        Text(as_sentence(left_sentence(diagnosis))),
         grid_picture(left, model),
         Picture(
             figures.overlay(target, worst, left.predicted[worst]),
@@ -399,6 +399,6 @@ def _left_sections(diagnosis: Diagnosis) -> list[Section]:
             " noise. Dots are measured, lines are the model's.",
             in_view=True,
         ),
-        Text(f"S{noise_sentence(target)[1:]}."),
+        Text(as_sentence(noise_sentence(target))),
     ]
     return [Section("What is left", blocks), dependence_section(left, "What the rest goes with")]

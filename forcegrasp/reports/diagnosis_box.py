@@ -28,6 +28,7 @@ from forcegrasp.reports.diagnosis_words import (
 from forcegrasp.reports.html import Answer, Command
 from forcegrasp.reports.law import law_words
 from forcegrasp.reports.physics_step import step_warning
+from forcegrasp.short_repr import as_sentence
 
 # Below so many times the floor noise of another kind may be all that is left.
 _SURELY = 1.2
@@ -58,17 +59,17 @@ def answer_box(diagnosis: Diagnosis, advice: Advice | None, commands: Sequence[C
         ("Not finished", stopped_words(d) if found else ""),
         ("Left out", left_out[:1].upper() + left_out[1:] if found else ""),
         ("The set", fault_words(d) if found else ""),
-        ("What is wrong", _sentences([one.words for one in fault.all]) if fault else ""),
-        ("To check", _sentences([one.check for one in fault.all]) if fault else ""),
+        ("What is wrong", " ".join(as_sentence(one.words) for one in fault.all) if fault else ""),
+        ("To check", " ".join(as_sentence(one.check) for one in fault.all) if fault else ""),
         ("Explains", shares_sentence(d) if found else ""),
         ("Error", f"{fall}; up to {d.floor:.2f} is noise." if (found and d.steps) or fault else ""),
         ("How sure", certainty(d)),
         ("Runner-up", runner_up(d) if d.verdict.lacks_effects else ""),
-        ("What is left", f"{left[0].upper()}{left[1:]}." if shows_rest else ""),
+        ("What is left", as_sentence(left) if shows_rest else ""),
         ("Perhaps", f"{more}." if (more := besides_sentence(d)) else ""),
         ("A law", f"{law_words(d.law)}." if d.law is not None else ""),
         ("Noise", noise_words(d) if found else ""),
-        ("Physics step", f"{step[:1].upper()}{step[1:]}." if (step := step_warning(d)) else ""),
+        ("Physics step", as_sentence(step) if (step := step_warning(d)) else ""),
         ("Look first at", f"{odd_words(d)}." if d.odd and d.steps else ""),
         ("Record next", f"{record}." if record else ""),
         ("Note", note),
@@ -79,10 +80,6 @@ def answer_box(diagnosis: Diagnosis, advice: Advice | None, commands: Sequence[C
         [(f"{name} {percent(share)}", share) for name, share in shares.items()],
         commands,
     )
-
-
-def _sentences(texts: Sequence[str]) -> str:
-    return " ".join(f"{text[:1].upper()}{text[1:]}." for text in texts)
 
 
 def certainty(diagnosis: Diagnosis) -> str:

@@ -26,6 +26,7 @@ from forcegrasp.reports.comparison import amount, noise_sentence, value_text, wo
 from forcegrasp.reports.html import Answer, Command, Picture, Section, Table, Text
 from forcegrasp.reports.symptom import symptom_of
 from forcegrasp.reports.view import view_section
+from forcegrasp.short_repr import as_sentence
 
 #: What to do about a fit that did not converge.
 ADVICE = (
@@ -160,7 +161,7 @@ def fit_sections(base: BaseFit, target: Target, model: Model) -> list[Section]:
         Table(("start", "error ÷ noise where it ended, on the first grasps of each object"), starts),
         Text(
             f"Largest slope of the error at the end: {base.fit.gradient:.2f} standard errors of a parameter."
-            f" {noise_sentence(target)[0].upper()}{noise_sentence(target)[1:]}."
+            f" {as_sentence(noise_sentence(target))}"
         ),
     ]
     errors = rms_of_grasps(base.fit.residual, target)
@@ -237,8 +238,8 @@ def add_sections(added: Added, effect: type[Effect]) -> list[Section]:
     models = {"base model": added.before.predicted, f"model with {effect.name}": added.after.predicted}
     return [
         view_section(added.target, models),
-        Section("Before and after", [fall, Text(f"S{noise_sentence(added.target)[1:]}.")]),
-        Section(f"What {effect.name} looks like here", [Text(f"{told[0].upper()}{told[1:]}."), seen]),
+        Section("Before and after", [fall, Text(as_sentence(noise_sentence(added.target)))]),
+        Section(f"What {effect.name} looks like here", [Text(as_sentence(told)), seen]),
         parameters_section(added.model),
     ]
 

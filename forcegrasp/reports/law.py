@@ -13,6 +13,7 @@ from forcegrasp.identify.intervals import listed
 from forcegrasp.identify.target import Target
 from forcegrasp.reports import figures
 from forcegrasp.reports.html import Picture, Section, Table, Text
+from forcegrasp.short_repr import as_sentence
 
 _PLACES = {
     "motor": "a force on the motors", "command": "a shift of the command",
@@ -69,7 +70,7 @@ def law_section(found: FoundLaw, target: Target) -> Section:
     return Section(
         "A law for what is left",
         [
-            Text(f"{words[0].upper()}{words[1:]}.", strong=True),
+            Text(as_sentence(words), strong=True),
             Picture(
                 picture,
                 "Measured − model ÷ noise without the law (grey: single samples; green: their median and middle 80 %)"
