@@ -11,7 +11,8 @@ import numpy as np
 
 from forcegrasp.diagnosis.cut_short import REASONS, cut_short
 from forcegrasp.diagnosis.evidence import LEAST_SHARE_TOGETHER
-from forcegrasp.diagnosis.faults.suspects import Fault, leaves_nothing, suspects, uneven_stamps
+from forcegrasp.diagnosis.faults.fault import Fault
+from forcegrasp.diagnosis.faults.suspects import leaves_nothing, suspects, uneven_stamps
 from forcegrasp.diagnosis.givens.doubt import is_worth_a_search, more_likely, with_fault_beside
 from forcegrasp.diagnosis.givens.fitted_givens import told_as_moved, with_fitted_givens
 from forcegrasp.diagnosis.givens.give_back import without_move

@@ -9,8 +9,8 @@ from functools import cached_property
 
 import numpy as np
 
+from forcegrasp.diagnosis.faults.fault import Fault
 from forcegrasp.diagnosis.faults.odd_grasps import OddGrasp
-from forcegrasp.diagnosis.faults.suspects import Fault
 from forcegrasp.diagnosis.found_law import FoundLaw
 from forcegrasp.diagnosis.noise.noise_check import Noise, is_uneven_noise
 from forcegrasp.diagnosis.signatures import Score

@@ -12,7 +12,7 @@ from rich.table import Table as Printed
 from rich.text import Text as Plain
 
 from forcegrasp.diagnosis.advice import Advice
-from forcegrasp.diagnosis.faults.suspects import Fault
+from forcegrasp.diagnosis.faults.fault import Fault
 from forcegrasp.diagnosis.result import NOTHING, Candidate, Diagnosis, Step, taken_over_by
 from forcegrasp.effects import Effect
 from forcegrasp.effects.for_gripper import effect_of

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from forcegrasp.diagnosis.evidence import may_be_besides
-from forcegrasp.diagnosis.faults.suspects import Fault
+from forcegrasp.diagnosis.faults.fault import Fault
 from forcegrasp.diagnosis.givens.late_rows import row_s
 from forcegrasp.diagnosis.result import Candidate, Diagnosis, Step, kept_steps
 from forcegrasp.diagnosis.search.forms import FORM_TOLERANCE

@@ -11,7 +11,7 @@ import pytest
 from forcegrasp.cli.diagnose import sigterm_as_ctrl_c
 from forcegrasp.diagnosis.cut_short import INTERRUPTED
 from forcegrasp.diagnosis.diagnose_set import diagnose_set
-from forcegrasp.diagnosis.faults.suspects import Fault
+from forcegrasp.diagnosis.faults.fault import Fault
 from forcegrasp.diagnosis.givens.doubt import with_fault_beside
 from forcegrasp.diagnosis.search.search import diagnose
 from forcegrasp.diagnosis.search.so_far import SoFar

@@ -12,9 +12,10 @@ import pytest
 
 from forcegrasp.diagnosis.diagnose_set import diagnose_set
 from forcegrasp.diagnosis.faults import odd_grasps as odd_grasps_module
+from forcegrasp.diagnosis.faults.fault import Fault
 from forcegrasp.diagnosis.faults.felt_sizes import doubtful_radii
 from forcegrasp.diagnosis.faults.odd_grasps import odd_grasps
-from forcegrasp.diagnosis.faults.suspects import Fault, suspects
+from forcegrasp.diagnosis.faults.suspects import suspects
 from forcegrasp.diagnosis.faults.tolerance import move_given, wanted_moves
 from forcegrasp.diagnosis.givens import doubt
 from forcegrasp.diagnosis.givens.doubt import with_fault_beside

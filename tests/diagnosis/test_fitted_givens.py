@@ -9,8 +9,9 @@ import pytest
 
 from forcegrasp.diagnosis import diagnose_set as diagnose_set_module
 from forcegrasp.diagnosis.diagnose_set import _put_right_or_as_said, _Ways, diagnose_set
-from forcegrasp.diagnosis.faults.suspects import Fault, moved_as_fault
+from forcegrasp.diagnosis.faults.fault import Fault
 from forcegrasp.diagnosis.faults.tolerance import all_radii
+from forcegrasp.diagnosis.faults.wrong_radii import moved_as_fault
 from forcegrasp.diagnosis.givens import fitted_givens
 from forcegrasp.diagnosis.givens.fitted_givens import told_as_moved, with_fitted_givens
 from forcegrasp.effects.for_gripper import effect_of

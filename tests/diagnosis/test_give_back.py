@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from forcegrasp.diagnosis.diagnose_set import _Ways, diagnose_set
-from forcegrasp.diagnosis.faults.suspects import Fault
+from forcegrasp.diagnosis.faults.fault import Fault
 from forcegrasp.diagnosis.faults.tolerance import Moved
 from forcegrasp.diagnosis.givens import give_back
 from forcegrasp.diagnosis.givens.give_back import without_move

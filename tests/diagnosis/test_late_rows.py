@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from forcegrasp.diagnosis.diagnose_set import diagnose_set
-from forcegrasp.diagnosis.faults.suspects import moved_as_fault
 from forcegrasp.diagnosis.faults.tolerance import all_radii
+from forcegrasp.diagnosis.faults.wrong_radii import moved_as_fault
 from forcegrasp.diagnosis.givens.late_rows import may_be_late_rows
 from forcegrasp.identify.fit_set import fit_model
 from forcegrasp.identify.fitted_model import model_of

@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from forcegrasp.diagnosis.faults.suspects import Fault
+from forcegrasp.diagnosis.faults.fault import Fault
 from forcegrasp.diagnosis.faults.tolerance import Moved, _limits
 from forcegrasp.diagnosis.givens.lost_motion import with_lost_motion
 from forcegrasp.diagnosis.givens.moved_set import _Model, _with_lost_motion

@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from forcegrasp.diagnosis.faults.suspects import Fault, besides
+from forcegrasp.diagnosis.faults.fault import Fault, besides
 from forcegrasp.diagnosis.faults.tolerance import Moved
 from forcegrasp.effects import get_effect
 from forcegrasp.effects.setting import EffectSetting

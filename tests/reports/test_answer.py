@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 import yaml
 
+from forcegrasp.diagnosis.faults.fault import Fault
 from forcegrasp.diagnosis.faults.odd_grasps import OddGrasp
-from forcegrasp.diagnosis.faults.suspects import Fault
 from forcegrasp.diagnosis.faults.tolerance import Moved
 from forcegrasp.diagnosis.result import Diagnosis
 from forcegrasp.effects import get_effect

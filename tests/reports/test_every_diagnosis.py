@@ -9,8 +9,8 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
+from forcegrasp.diagnosis.faults.fault import Fault
 from forcegrasp.diagnosis.faults.odd_grasps import OddGrasp
-from forcegrasp.diagnosis.faults.suspects import Fault
 from forcegrasp.diagnosis.faults.tolerance import Moved
 from forcegrasp.diagnosis.noise.noise_check import Noise
 from forcegrasp.diagnosis.result import Diagnosis

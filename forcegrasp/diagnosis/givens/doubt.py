@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 
 from forcegrasp.diagnosis.evidence import LEAST_LEAD, is_beyond_chance
-from forcegrasp.diagnosis.faults.suspects import Fault, besides, told_with
+from forcegrasp.diagnosis.faults.fault import Fault, besides, told_with
 from forcegrasp.diagnosis.result import Diagnosis, kept_steps
 from forcegrasp.diagnosis.verdict import EXPLAINED_FAR, explained_share
 from forcegrasp.identify.cross_validation import (

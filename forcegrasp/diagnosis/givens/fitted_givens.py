@@ -9,8 +9,9 @@ from scipy.stats import chi2
 
 from forcegrasp.diagnosis.evidence import LEAST_SHARE_TOGETHER
 from forcegrasp.diagnosis.faults.odd_grasps import coordinates_by_name
-from forcegrasp.diagnosis.faults.suspects import leaves_nothing, most_radii, moved_as_fault
+from forcegrasp.diagnosis.faults.suspects import leaves_nothing
 from forcegrasp.diagnosis.faults.tolerance import MOST, RULER_M, Moved
+from forcegrasp.diagnosis.faults.wrong_radii import most_radii, moved_as_fault
 from forcegrasp.diagnosis.givens.doubt import with_fault
 from forcegrasp.diagnosis.givens.givens_besides import Fitted
 from forcegrasp.diagnosis.result import Diagnosis

@@ -6,7 +6,8 @@ import dataclasses
 from collections.abc import Callable, Iterator, Sequence
 
 from forcegrasp.diagnosis.families import may_join, refit_as
-from forcegrasp.diagnosis.faults.suspects import Fault, suspects
+from forcegrasp.diagnosis.faults.fault import Fault
+from forcegrasp.diagnosis.faults.suspects import suspects
 from forcegrasp.diagnosis.few import with_few
 from forcegrasp.diagnosis.givens.doubt import with_fault
 from forcegrasp.diagnosis.givens.moved_set import SearchOn, one_after_the_other

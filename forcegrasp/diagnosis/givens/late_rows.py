@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 
-from forcegrasp.diagnosis.faults.suspects import Fault, besides
+from forcegrasp.diagnosis.faults.fault import Fault, besides
 from forcegrasp.diagnosis.result import Diagnosis, kept_steps
 from forcegrasp.identify.intervals import intervals, standard_errors
 from forcegrasp.identify.loading import Loaded

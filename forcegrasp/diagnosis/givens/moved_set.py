@@ -11,8 +11,9 @@ from scipy.stats import chi2
 
 from forcegrasp.diagnosis.evidence import LEAST_LEAD, LEAST_SHARE_OF_MANY, is_beyond_chance, rivals_in
 from forcegrasp.diagnosis.families import refit_without, roughly_as, roughly_without
-from forcegrasp.diagnosis.faults.suspects import Fault, besides, within_tolerance
+from forcegrasp.diagnosis.faults.fault import Fault, besides
 from forcegrasp.diagnosis.faults.tolerance import MOST, RULER_M, WORTH, Moved, all_radii, first_move, time_of_reading
+from forcegrasp.diagnosis.faults.wrong_radii import within_tolerance
 from forcegrasp.diagnosis.few import with_few
 from forcegrasp.diagnosis.givens.lost_motion import with_lost_motion
 from forcegrasp.diagnosis.result import Candidate, Diagnosis, Step, kept_steps
