@@ -32,6 +32,8 @@ _HALF = 0.5
 # Nor is one whose fit of all grasps leaves so many times what the other's leaves: where few grasps hold an object,
 # held-out ones say little. Rough fits end far nearer.
 _FITS_WORSE = 1.5
+# So many grasps at least may show an effect without the one that gains most.
+_AGREE = 6
 #: Between an effect and a fault of the set a lead below this decides nothing: to take one for the other costs most.
 LEAST_LEAD = 10.0
 
@@ -50,7 +52,7 @@ def is_significant(
     return (
         candidate.p_family <= ALARM
         and candidate.is_plausible
-        and (is_beyond_chance(candidate.evidence, LEAST_RISE, errors) or _shows_in_some(candidate, errors))
+        and (_is_shown_by_all(candidate.evidence, errors) or _shows_in_some(candidate, errors))
         and candidate.largest_fall >= least_gain
         and candidate.share >= least_share
     )
@@ -62,6 +64,16 @@ def may_be_besides(steps: Sequence[Step]) -> Candidate | None:
         return None
     best = steps[-1].candidates[0]
     return best if not best.replaces and is_significant(best, 0.0, LEAST_SHARE_OF_MANY) else None
+
+
+def _is_shown_by_all(gains: np.ndarray, errors: float) -> bool:
+    """Whether all grasps together gain beyond chance, ``(G,)``, or all but the one that gains most.
+
+    One that gains far more than the others makes these scatter so much that nothing seems sure, though they agree.
+    """
+    gains = gains[np.isfinite(gains)]
+    others = np.delete(gains, np.argmax(gains)) if len(gains) > _AGREE else gains
+    return any(is_beyond_chance(some, LEAST_RISE, errors) for some in (gains, others))
 
 
 def _shows_in_some(candidate: Candidate, errors: float) -> bool:

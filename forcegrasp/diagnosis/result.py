@@ -12,9 +12,10 @@ import numpy as np
 from forcegrasp.diagnosis.faults.fault import Fault
 from forcegrasp.diagnosis.faults.odd_grasps import OddGrasp
 from forcegrasp.diagnosis.found_law import FoundLaw
+from forcegrasp.diagnosis.noise.clock_jitter import ClockJitter, clock_jitter
 from forcegrasp.diagnosis.noise.noise_check import Noise, is_uneven_noise
 from forcegrasp.diagnosis.signatures import Score
-from forcegrasp.diagnosis.verdict import explained_share
+from forcegrasp.diagnosis.verdict import MUCH, explained_share
 from forcegrasp.effects import Effect
 from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.identify.base_fit import BaseFit
@@ -200,6 +201,13 @@ class Diagnosis(ShortRepr):
             return False
         numerical = beyond_fit(self.fit, self.numerical)
         return is_uneven_noise(self.heldout(), numerical, self.target, self.fit.predicted)
+
+    @cached_property
+    def clock_jitter(self) -> ClockJitter | None:
+        """By how much rows are read off their time stamps; None if that is not seen, or the model lacks too much."""
+        if not self.numerical or self.error_after > MUCH * self.floor:
+            return None
+        return clock_jitter(self.heldout(), self.target, self.fit)
 
     @property
     def explained(self) -> float:

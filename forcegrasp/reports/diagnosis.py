@@ -91,6 +91,7 @@ def diagnosis_json(diagnosis: Diagnosis, advice: Advice | None, tried: Sequence[
         "alone": diagnosis.alone,
         "may_be_forms": diagnosis.may_be_forms,
         "uneven_noise": diagnosis.is_uneven_noise,
+        "clock_jitter": None if diagnosis.clock_jitter is None else dataclasses.asdict(diagnosis.clock_jitter),
         "steps": [_step_json(step, diagnosis) for step in diagnosis.steps],
         "ranking": ranking(diagnosis),
         "no_trace": no_trace(diagnosis, tried),

@@ -94,6 +94,20 @@ def test_a_gain_may_have_to_be_several_of_its_standard_errors(made_up):
     assert not is_significant(candidate(made_up, gains=gains), 0.02, errors=2.1)
 
 
+def test_a_grasp_that_gains_far_more_than_the_others_makes_nothing_unsure_that_these_are_sure_of(made_up):
+    agree = np.array([1.0, 2.0, 3.0, 2.0, 1.0, 3.0])  # a sum of 12, uncertain by 2.2
+
+    def shown(gains: np.ndarray) -> bool:
+        return is_significant(candidate(made_up, gains=gains), 0.02, errors=2.0)
+
+    assert shown(agree)
+    assert shown(np.append(agree, 300.0))
+    assert shown(np.r_[np.nan, agree, 300.0])
+    assert not shown(np.append(agree[:5], 300.0))  # five are too few to do without it
+    assert not shown(np.r_[agree, 300.0, 300.0])  # two hold nearly all of it
+    assert not shown(np.r_[agree - 2, 300.0])  # and the others gain nothing
+
+
 @pytest.mark.parametrize(("ahead", "equal"), [(4.9, True), (5.1, False)])
 def test_a_lead_within_its_standard_error_decides_nothing(made_up, ahead, equal):
     """Leads of four grasps with standard deviation 10: their sum is uncertain by 20."""
