@@ -211,13 +211,16 @@ def run_job(job: Job) -> dict:
     folder = Path(tempfile.mkdtemp())
     try:
         chosen: dict[str, str | dict] = dict.fromkeys(job.hidden, job.size)
+        of_jitter = 0.0
         if job.is_servo:
             truth = slide.record(folder / "set", chosen, job.seed)
         else:
             messy = job.group == "messy"
+            hidden = {**MESS, **chosen} if messy else chosen
+            of_jitter = rig.left_by_jitter(hidden, job.seed, MESSY_JITTER_S) if messy else 0.0
             truth = rig.record(
                 folder / "set",
-                {**MESS, **chosen} if messy else chosen,
+                hidden,
                 job.seed,
                 job.grasps,
                 job.plan,
@@ -249,6 +252,7 @@ def run_job(job: Job) -> dict:
         "error_before": diagnosis.error_before,
         "error_after": diagnosis.error_after,
         "floor": diagnosis.floor,
+        "of_jitter": of_jitter,
         "left": diagnosis.left,
         "reason": diagnosis.base.reason,
         "seconds": seconds,

@@ -113,6 +113,21 @@ def record(
     return truth
 
 
+def left_by_jitter(
+    effects: dict[str, str | dict] | None, seed: int, jitter_s: float, grasps: int = 24, plan: str = "rich",
+    contact: str = "mujoco",
+) -> float:  # fmt: skip
+    """rms of what readings off their time stamps differ by, ÷ noise: no model of such a set foretells it.
+
+    Args:
+      effects, seed, jitter_s, grasps, plan, contact: of the set, as for :func:`record`.
+    """
+    setup = draw_setup(seed, grasps, plan, 150)
+    late, said = (simulate(setup, build_effects(effects or {}), seed, contact, jitter_s=by) for by in (jitter_s, 0.0))
+    kinds = ((late.q - said.q) / POSITION_STD_M, (late.f - said.f) / FORCE_STD_N)
+    return float(np.sqrt(np.mean([np.mean(kind**2) for kind in kinds])))
+
+
 def record_one_more(
     folder: str | Path, truth: Truth, thing: str, offset: float, commands: np.ndarray, noise_seed: int
 ) -> None:

@@ -207,3 +207,12 @@ class InThisProcess:
         future: Future = Future()
         future.set_result(function(job))
         return future
+
+
+def test_what_a_clock_that_is_off_leaves_is_part_of_the_floor(page):
+    jobs = [Job("messy", (), "", k, noise="heavy", spoiled="radius_0.3mm") for k in range(3)]
+    left = zip(jobs, (1.2, 1.4, 1.2), (0.5, 0.5, 0.0), strict=True)  # floors of 1.118, 1.118 and 1
+    rows = [row(job, "explained", after=after, of_jitter=jitter) for job, after, jitter in left]
+    text = page(rows, jobs, "grippers")
+    begins = text.index("| a messy rig")
+    assert "| … error left at most 1.1 × the floor | 1 of 3" in text[begins : begins + 500]
