@@ -37,6 +37,7 @@ from forcegrasp.reports.diagnosis_words import (
     fault_words,
     is_of_labels,
     is_only_moved,
+    jitter_sentence,
     lacks,
     left_out_words,
     left_sentence,
@@ -253,7 +254,8 @@ def lines(diagnosis: Diagnosis, advice: Advice | None) -> list[str]:
         text.append(row)
     if diagnosis.verdict is Verdict.UNKNOWN or diagnosis.verdict.names_effects:
         text.append(left_sentence(diagnosis))
-    text += [more for more in (besides_sentence(diagnosis), recordings_sentence(diagnosis)) if more]
+    besides = (jitter_sentence(diagnosis), besides_sentence(diagnosis), recordings_sentence(diagnosis))
+    text += [more for more in besides if more]
     if diagnosis.law is not None:
         text.append(law_words(diagnosis.law))
     elif diagnosis.law_sought and diagnosis.left:

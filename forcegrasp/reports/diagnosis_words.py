@@ -7,7 +7,6 @@ import numpy as np
 from forcegrasp.diagnosis.evidence import may_be_besides
 from forcegrasp.diagnosis.faults.fault import Fault
 from forcegrasp.diagnosis.givens.late_rows import row_s
-from forcegrasp.diagnosis.noise.clock_jitter import ClockJitter
 from forcegrasp.diagnosis.result import Candidate, Diagnosis, Step, kept_steps
 from forcegrasp.diagnosis.search.forms import FORM_TOLERANCE
 from forcegrasp.diagnosis.verdict import EXPLAINED_FAR, MUCH
@@ -247,18 +246,15 @@ def left_sentence(diagnosis: Diagnosis) -> str:
     """Where the rest of the error is, in words."""
     rest = where(diagnosis)
     place = f"{words(rest['signal'])}, {words(rest['phase'])}: {rest['ratio']:.1f} × noise"
-    jitter = diagnosis.clock_jitter
-    uneven = f"; {_jitter_words(jitter)}" if jitter is not None else ""
     if not diagnosis.left:
-        return f"what is left is noise; it is largest in {place}{uneven}"
+        return f"what is left is noise; it is largest in {place}"
     if diagnosis.is_uneven_noise:
-        of_what = (
-            ": noise that grows with speed or force is so, and so are readings at uneven times; to tell, log the same"
-            " motion twice"
-        )
+        of_what = "noise that grows with speed or force is so, and so are readings at uneven times"
+        if diagnosis.clock_jitter is None:
+            of_what += "; to tell, log the same motion twice"
         return (
             f"what is left is largest in {place}; it is white in time and nothing foretells it, though larger in some"
-            f" states than in others{uneven or of_what}"
+            f" states than in others: {of_what}"
         )
     name, share = next(iter(rest["explained_by"].items()))
     goes = f", of which {share:.0%} goes with {covariate_words(name)}" if share > 0.05 else ""
@@ -270,11 +266,14 @@ def left_sentence(diagnosis: Diagnosis) -> str:
         f"what is left is largest in {place}{goes}; a better model could explain {rest['explainable']:.0%} of the"
         f" remaining mean square error at most{no_better if foretells_no_better(diagnosis) else ''}"
     )
-    return f"{sentence}{_forms_words(diagnosis) if diagnosis.may_be_forms else ''}{uneven}"
+    return f"{sentence}{_forms_words(diagnosis)}" if diagnosis.may_be_forms else sentence
 
 
-def _jitter_words(jitter: ClockJitter) -> str:
-    """By how much rows are read off their time stamps, and what to do about it."""
+def jitter_sentence(diagnosis: Diagnosis) -> str:
+    """By how much rows are read off their time stamps, and what to do about it; empty if that is not seen."""
+    jitter = diagnosis.clock_jitter
+    if jitter is None:
+        return ""
     return (
         f"rows are read {1e3 * jitter.std_s:.2g} ms earlier or later than their time stamps say (standard deviation),"
         f" which makes {jitter.share:.0%} of what positions leave beyond their noise: stamp a row when it is read"
@@ -329,7 +328,9 @@ def noise_words(diagnosis: Diagnosis) -> str:
         which = listed([words(names[k]) for k in range(len(names)) if noise.affected[k]])
         other = f"of {which} has heavy tails, and the size that was {source}"
     no_effect = f"The residuals are {shape} and alike in all phases, which no missing effect makes."
-    return f"But the noise {other}. {no_effect}" + ("" if noise.has_tails_alone else f" To do: {again}.")
+    # rows that are read off their time stamps make it seem larger: what to do about them is told by itself
+    to_do = "" if noise.has_tails_alone or diagnosis.clock_jitter is not None else f" To do: {again}."
+    return f"But the noise {other}. {no_effect}{to_do}"
 
 
 def _scatter(what: str, ratio: float, heavy: bool) -> str:

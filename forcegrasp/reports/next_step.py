@@ -59,7 +59,7 @@ def after_diagnosis(
         look = Command("look at where the model fails", compared)
         return [*right, *finer, look, *([] if d.law_sought else [_for_a_law(data)])]
     if d.verdict is Verdict.EXPLAINED:
-        misstated = d.noise is not None and not d.noise.has_tails_alone
+        misstated = d.noise is not None and not d.noise.has_tails_alone and d.clock_jitter is None
         noise = [Command("give the noise as it is, and diagnose again", again)] if misstated else []
         return [*noise, _use("the model", known, data, gripper)]
     first = next(iter(d.shares()), d.effects[0])  # rounding is in the noise already

@@ -9,12 +9,15 @@ import pytest
 
 from forcegrasp.diagnosis.noise import clock_jitter as module
 from forcegrasp.diagnosis.noise.clock_jitter import ClockJitter, clock_jitter
+from forcegrasp.diagnosis.noise.noise_check import Noise
 from forcegrasp.identify.fit import Fit
 from forcegrasp.identify.fit_set import fit_model
 from forcegrasp.identify.progress import silent
 from forcegrasp.identify.target import Target
-from forcegrasp.reports.diagnosis import diagnosis_json
-from forcegrasp.reports.diagnosis_words import left_sentence
+from forcegrasp.reports.diagnosis import diagnosis_json, lines
+from forcegrasp.reports.diagnosis_box import answer_box
+from forcegrasp.reports.diagnosis_words import left_sentence, noise_words
+from forcegrasp.reports.next_step import after_diagnosis
 from tests.light_set import light_set
 
 
@@ -52,21 +55,23 @@ def test_nothing_else_is_taken_for_it(fitted):
     assert clock_jitter(noisy, target, fit) is None  # it is there, and makes little of what positions leave
 
 
-def test_it_is_told_and_what_to_do(made_up, monkeypatch):
-    found = made_up.diagnosis("effect")
+@pytest.mark.parametrize("verdict", ["effect", "explained", "unknown"])
+def test_it_is_told_whatever_the_verdict_and_in_place_of_larger_noise(made_up, monkeypatch, verdict):
+    noise = Noise(np.full(4, 1.2), np.ones(4), np.ones(4, bool), np.zeros(4), np.zeros(4))
     told = "rows are read 1.2 ms earlier or later than their time stamps say (standard deviation), which makes 60% of"
-    for left in ("", "1.2 × noise in all"):
-        diagnosis = dataclasses.replace(found, left=left)
-        for uneven in (False, True):
-            monkeypatch.setitem(vars(diagnosis), "is_uneven_noise", uneven)
-            monkeypatch.setitem(vars(diagnosis), "clock_jitter", ClockJitter(0.0012, 0.6))
-            assert told in left_sentence(diagnosis)
-            assert "twice" not in left_sentence(diagnosis)
-            assert diagnosis_json(diagnosis, None, [], "set")["clock_jitter"] == {"std_s": 0.0012, "share": 0.6}
-            monkeypatch.setitem(vars(diagnosis), "clock_jitter", None)
-            assert "stamp" not in left_sentence(diagnosis)
-            assert ("twice" in left_sentence(diagnosis)) == bool(left and uneven)
-            assert diagnosis_json(diagnosis, None, [], "set")["clock_jitter"] is None
+    for jitter in (None, ClockJitter(0.0012, 0.6)):
+        diagnosis = dataclasses.replace(made_up.diagnosis(verdict), noise=noise)
+        monkeypatch.setitem(vars(diagnosis), "clock_jitter", jitter)
+        monkeypatch.setitem(vars(diagnosis), "is_uneven_noise", verdict == "unknown")
+        is_told = jitter is not None
+        assert any(told in line for line in lines(diagnosis, None)) is is_told
+        assert ("Time stamps" in str(answer_box(diagnosis, None, []))) is is_told
+        assert ("position_std_m" in noise_words(diagnosis)) is not is_told
+        assert ("twice" in left_sentence(diagnosis)) is (verdict == "unknown" and not is_told)
+        again = [command.purpose for command in after_diagnosis(diagnosis, None, "set", "base.yaml", "model.yaml")]
+        assert ("give the noise as it is, and diagnose again" in again) is (verdict == "explained" and not is_told)
+        said = diagnosis_json(diagnosis, None, [], "set")["clock_jitter"]
+        assert said == ({"std_s": 0.0012, "share": 0.6} if is_told else None)
 
 
 def test_a_model_that_lacks_much_foretells_no_single_row(made_up, monkeypatch):
