@@ -1,10 +1,8 @@
-"""A diagnosis as JSON, as lines for the terminal, and as sections of a report."""
+"""A diagnosis as lines for the terminal, and as sections of a report."""
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from rich import box
@@ -12,14 +10,11 @@ from rich.table import Table as Printed
 from rich.text import Text as Plain
 
 from forcegrasp.diagnosis.advice import Advice
-from forcegrasp.diagnosis.faults.fault import Fault
-from forcegrasp.diagnosis.result import NOTHING, Candidate, Diagnosis, Step, taken_over_by
+from forcegrasp.diagnosis.result import Candidate, Diagnosis, Step, taken_over_by
 from forcegrasp.effects import Effect
 from forcegrasp.effects.for_gripper import effect_of
-from forcegrasp.identify.cross_validation import rms
 from forcegrasp.identify.fit import Fit
 from forcegrasp.identify.intervals import listed, reached_bound
-from forcegrasp.identify.noise_floor import AT_FLOOR
 from forcegrasp.identify.verdict import Verdict
 from forcegrasp.reports import figures
 from forcegrasp.reports.comparison import (
@@ -28,174 +23,34 @@ from forcegrasp.reports.comparison import (
     grid_picture,
     noise_sentence,
     value_text,
-    words,
-    worst_cell,
     wrong_words,
 )
 from forcegrasp.reports.diagnosis_words import (
     besides_sentence,
-    fault_words,
     is_of_labels,
-    is_only_moved,
     jitter_sentence,
-    lacks,
-    left_out_words,
     left_sentence,
-    left_share,
-    noise_words,
     odd_words,
-    preference,
     recordings_sentence,
     row_sentence,
-    shares_sentence,
-    stopped_words,
 )
 from forcegrasp.reports.findings import (
-    candidate_json,
     candidate_parameters,
     final_warnings,
     found_parameters,
     found_steps,
     no_trace,
-    noise_json,
     ranking,
     remaining,
-    where,
 )
-from forcegrasp.reports.fit import ADVICE, rounding_words, steps_picture, symptom_picture
+from forcegrasp.reports.fit import rounding_words, steps_picture, symptom_picture
 from forcegrasp.reports.html import Picture, Section, Table, Text
-from forcegrasp.reports.law import law_json, law_section, law_words
-from forcegrasp.reports.physics_step import shorter_step
+from forcegrasp.reports.law import law_section, law_words
 from forcegrasp.reports.symptom import symptom_of
 from forcegrasp.reports.view import view_section
 from forcegrasp.short_repr import as_sentence
 
 _PRINTED = 5
-
-
-def diagnosis_json(diagnosis: Diagnosis, advice: Advice | None, tried: Sequence[type[Effect]], name: str) -> dict:
-    """The diagnosis in plain types."""
-    return {
-        "set": name,
-        "answer": answer(diagnosis),
-        "verdict": diagnosis.verdict,
-        "stopped": diagnosis.stopped,
-        "effects": list(diagnosis.effects),
-        "preferred": list(diagnosis.preferred),
-        "explained_share": diagnosis.explained,
-        "shares": diagnosis.shares(),
-        "left_share": left_share(diagnosis) if diagnosis.shares() else None,
-        "fault": _fault_json(diagnosis.fault),
-        "law": law_json(diagnosis.law),
-        "odd_grasps": [dataclasses.asdict(grasp) for grasp in diagnosis.odd],
-        "left_out": [dataclasses.asdict(grasp) for grasp in diagnosis.left_out],
-        "alone": diagnosis.alone,
-        "may_be_forms": diagnosis.may_be_forms,
-        "uneven_noise": diagnosis.is_uneven_noise,
-        "clock_jitter": None if diagnosis.clock_jitter is None else dataclasses.asdict(diagnosis.clock_jitter),
-        "steps": [_step_json(step, diagnosis) for step in diagnosis.steps],
-        "ranking": ranking(diagnosis),
-        "no_trace": no_trace(diagnosis, tried),
-        "parameters": {
-            effect: {name: dataclasses.asdict(fitted) for name, fitted in found.items()}
-            for effect, found in found_parameters(diagnosis).items()
-        },
-        "error_before": diagnosis.error_before,
-        "error_moved": diagnosis.error_moved,
-        "error_after": diagnosis.error_after,
-        "floor_ratio": diagnosis.error_after,
-        "floor": diagnosis.floor,
-        "floor_of_model": diagnosis.floor_of_model,
-        "next_grasp": None if advice is None else {
-            **advice.next_grasp.model_dump(),
-            "tells_apart": list(advice.rivals),
-            "differences": dict(advice.differences),
-            "bits": advice.bits[advice.grasp],
-        },
-        "where": where(diagnosis),
-        "reason": diagnosis.base.reason,
-        "noise_given": diagnosis.target.sigma_known,
-        "noise": noise_json(diagnosis),
-        "warnings": final_warnings(diagnosis),
-    }  # fmt: skip
-
-
-def _fault_json(fault: Fault | None) -> dict[str, Any] | None:
-    if fault is None:
-        return None
-    then = _fault_json(fault.then)
-    return {"name": fault.name, "words": fault.words, "check": fault.check, "moved": fault.moved_by, "then": then}
-
-
-def _step_json(step: Step, diagnosis: Diagnosis) -> dict[str, Any]:
-    return {
-        "verdict": step.verdict or NOTHING,
-        "effects": list(step.effects),
-        "preferred_because": preference(step),
-        "error_before": step.error_before,
-        "error_after": step.error_after,
-        "ranking": [candidate_json(c, diagnosis) for c in step.candidates],
-    }
-
-
-def answer(diagnosis: Diagnosis) -> str:
-    """The verdict in words."""
-    of_model, of_set = _of_model(diagnosis), fault_words(diagnosis)
-    alone = f"Only {diagnosis.alone} shows more: look at it." if diagnosis.alone else ""
-    # what was moved within its tolerance is no fault, and comes after the verdict
-    model_first = diagnosis.fault_is_rival or is_only_moved(diagnosis)
-    parts = (of_model, of_set) if model_first else (of_set, of_model)
-    return " ".join(filter(None, (stopped_words(diagnosis), *parts, alone, left_out_words(diagnosis))))
-
-
-def _missed_objects(d: Diagnosis) -> str:
-    """Why held-out error is left though nothing is missing; empty if none is."""
-    fitted = rms(d.fit.residual, d.target)
-    if d.left or d.noise is not None or d.error_after < AT_FLOOR * max(d.floor, fitted):
-        return ""
-    return (
-        f" A fit of all {d.target.part}s leaves {fitted:.2f} ×: where few are left to fit an"
-        " object by, those held out are missed."
-    )
-
-
-def _of_model(diagnosis: Diagnosis) -> str:
-    d, cell, noise = diagnosis, worst_cell(remaining(diagnosis).cells()), noise_words(diagnosis)
-    found = listed([*(d.fault.names if d.verdict is Verdict.DATA and d.fault else []), *d.preferred] or [""])
-    place = f"{words(cell.signal)}, {words(cell.phase)} ({cell.ratio:.1f} × noise)"
-    if is_of_labels(d):
-        return lacks(d)
-    if d.verdict.names_effects:
-        change = f"from {d.error_of_base:.2f} to {d.error_after:.2f} ×"
-        with_found = f"{found} put right" if d.verdict is Verdict.DATA else found
-        fall = f"With {with_found} the error on held-out {d.target.part}s falls {change}"
-        rest = f"What is left is largest in {place}." if d.left else noise
-        told = " ".join(filter(None, (lacks(d), shares_sentence(d))))
-        return f"{told} {fall} the sensor noise; up to {d.floor:.2f} is noise. {rest}".rstrip() + _missed_objects(d)
-    if d.verdict is Verdict.EXPLAINED:
-        of_noise = f"the error on held-out {d.target.part}s is {d.error_after:.2f} × the sensor noise"
-        if noise:
-            return f"The model explains these data: they show no missing effect; {of_noise}. {noise}"
-        return (
-            f"The model explains these data: {of_noise}, and up to {d.floor:.2f} is noise and the simulation's own"
-            f" error. They show no missing effect.{_missed_objects(d)}"
-        )
-    if d.verdict is Verdict.UNKNOWN:
-        best = f"{found} would only take it down to {d.error_after:.2f} ×" if found else "no effect explains it"
-        if d.stopped and not found:
-            best = f"up to {d.floor:.2f} is noise"
-        missing = "Something is missing, and it is none of the effects I know"
-        if d.stopped:
-            missing = "Something is missing"
-        if d.is_uneven_noise:
-            missing += ", or the noise grows with speed or force"
-        if shorter_step(d) is not None:
-            missing += ", as far as the scene's physics step lets me tell"
-        return (
-            f"{missing}: the error on held-out {d.target.part}s is"
-            f" {d.error_of_base:.2f} × the sensor noise, and {best}. Look at {place}."
-        )
-    return f"No diagnosis, for the base model is not fitted: {d.base.reason}. To do: {ADVICE}."
 
 
 def printed(diagnosis: Diagnosis) -> Printed | None:

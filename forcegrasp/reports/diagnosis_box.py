@@ -8,7 +8,7 @@ from forcegrasp.diagnosis.advice import Advice
 from forcegrasp.diagnosis.result import Candidate, Diagnosis, Step, kept_steps
 from forcegrasp.identify.intervals import listed
 from forcegrasp.identify.verdict import Verdict
-from forcegrasp.reports.diagnosis import answer
+from forcegrasp.reports.diagnosis_answer import answer
 from forcegrasp.reports.diagnosis_words import (
     besides_sentence,
     fault_words,

@@ -26,9 +26,9 @@ from forcegrasp.measure import FinalForceTable, MeasurementSet
 from forcegrasp.models.model_file import Model, write_model
 from forcegrasp.reports import comparison as comparison_report
 from forcegrasp.reports import diagnosis as diagnosis_report
+from forcegrasp.reports import diagnosis_answer, diagnosis_as_json, next_step
 from forcegrasp.reports import final_force as final_force_report
 from forcegrasp.reports import fit as fit_report
-from forcegrasp.reports import next_step
 from forcegrasp.reports.diagnosis_box import answer_box
 from forcegrasp.reports.html import Answer, Command, Section
 from forcegrasp.reports.physics_step import warning_of_fit
@@ -260,7 +260,7 @@ class DiagnoseResult(Result):
 
     @property
     def answer(self) -> str:
-        return f"{diagnosis_report.answer(self.diagnosis)} {self._note}".rstrip()
+        return f"{diagnosis_answer.answer(self.diagnosis)} {self._note}".rstrip()
 
     @property
     def _note(self) -> str:
@@ -271,7 +271,7 @@ class DiagnoseResult(Result):
         return f"What the model lacks: {self.name}"
 
     def to_dict(self) -> dict[str, Any]:
-        return diagnosis_report.diagnosis_json(self.diagnosis, self.advice, self.tried, self.name)
+        return diagnosis_as_json.diagnosis_json(self.diagnosis, self.advice, self.tried, self.name)
 
     def sections(self) -> list[Section]:
         return diagnosis_report.sections(self.diagnosis, self.advice, self.tried)

@@ -14,7 +14,8 @@ from forcegrasp.identify.fit import Fit
 from forcegrasp.identify.fit_set import fit_model
 from forcegrasp.identify.progress import silent
 from forcegrasp.identify.target import Target
-from forcegrasp.reports.diagnosis import diagnosis_json, lines
+from forcegrasp.reports.diagnosis import lines
+from forcegrasp.reports.diagnosis_as_json import diagnosis_json
 from forcegrasp.reports.diagnosis_box import answer_box
 from forcegrasp.reports.diagnosis_words import left_sentence, noise_words
 from forcegrasp.reports.next_step import after_diagnosis

@@ -19,7 +19,7 @@ from forcegrasp.diagnosis.search.step import look_further
 from forcegrasp.effects.for_gripper import effect_of
 from forcegrasp.identify.verdict import Verdict
 from forcegrasp.replay.time_limit import OutOfTimeError, check_time, time_limit
-from forcegrasp.reports.diagnosis import answer
+from forcegrasp.reports.diagnosis_answer import answer
 from forcegrasp.reports.diagnosis_box import answer_box
 from forcegrasp.reports.next_step import after_diagnosis
 from tests.diagnosis.test_exchange import rubbing as rubbing  # a fixture

@@ -24,6 +24,7 @@ from forcegrasp.physics.gripper_file import load_gripper
 from forcegrasp.replay.record import parse_effect, record
 from forcegrasp.reports import comparison as comparison_report
 from forcegrasp.reports import diagnosis as diagnosis_report
+from forcegrasp.reports import diagnosis_as_json
 from forcegrasp.reports import fit as fit_report
 from forcegrasp.reports.html import write_report
 from tests.made_up import shortened
@@ -68,7 +69,7 @@ def test_finds_what_was_hidden(name, monkeypatch, tmp_path):
     (found,) = model_of(diagnosis.fit, diagnosis.target, loaded, diagnosis.numerical).effects
     assert found.values == pytest.approx(parse_effect("coulomb_friction", loaded.gripper).values, rel=0.1)
 
-    told = diagnosis_report.diagnosis_json(diagnosis, None, [], "set")
+    told = diagnosis_as_json.diagnosis_json(diagnosis, None, [], "set")
     assert list(told["parameters"]["coulomb_friction"]) == [p.name for p in found.effect.parameters]
     assert diagnosis_report.lines(diagnosis, advise(diagnosis))[0].startswith("coulomb_friction: ")
     write_report(tmp_path / "report.html", "", "", diagnosis_report.sections(diagnosis, None, []), {})

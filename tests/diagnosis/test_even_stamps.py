@@ -15,7 +15,7 @@ from forcegrasp.identify.predict import predict
 from forcegrasp.identify.progress import silent
 from forcegrasp.replay.record import parse_effect
 from forcegrasp.replay.replay import Replay
-from forcegrasp.reports.diagnosis import answer
+from forcegrasp.reports.diagnosis_answer import answer
 from tests.light_set import light_set
 
 

@@ -31,7 +31,9 @@ from forcegrasp.identify.loading import Loaded
 from forcegrasp.identify.problem import Problem
 from forcegrasp.identify.verdict import Verdict
 from forcegrasp.models.model_file import Model
-from forcegrasp.reports.diagnosis import answer, diagnosis_json, sections
+from forcegrasp.reports.diagnosis import sections
+from forcegrasp.reports.diagnosis_answer import answer
+from forcegrasp.reports.diagnosis_as_json import diagnosis_json
 from forcegrasp.reports.diagnosis_words import fault_words
 from tests.light_set import light_set
 

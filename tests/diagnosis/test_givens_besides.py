@@ -15,7 +15,7 @@ from forcegrasp.effects import get_effect
 from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.identify.fitted_model import model_of
 from forcegrasp.identify.loading import Loaded
-from forcegrasp.reports.diagnosis import answer
+from forcegrasp.reports.diagnosis_answer import answer
 from tests.light_set import light_set
 
 OFF_M = {"thing_0": 6e-4, "thing_1": -5e-4}

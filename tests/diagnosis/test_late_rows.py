@@ -16,7 +16,7 @@ from forcegrasp.identify.fitted_model import model_of
 from forcegrasp.identify.loading import Loaded
 from forcegrasp.identify.verdict import Verdict
 from forcegrasp.models.model_file import Model
-from forcegrasp.reports.diagnosis import answer
+from forcegrasp.reports.diagnosis_answer import answer
 from forcegrasp.reports.diagnosis_words import row_sentence
 from tests.light_set import light_set
 

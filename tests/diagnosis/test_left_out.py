@@ -14,7 +14,8 @@ from forcegrasp.diagnosis.diagnose_set import diagnose_set
 from forcegrasp.diagnosis.faults.odd_grasps import OddGrasp
 from forcegrasp.diagnosis.givens.left_out import is_answer, most_missed, without
 from forcegrasp.identify.verdict import Verdict
-from forcegrasp.reports.diagnosis import answer, diagnosis_json
+from forcegrasp.reports.diagnosis_answer import answer
+from forcegrasp.reports.diagnosis_as_json import diagnosis_json
 from forcegrasp.reports.diagnosis_box import answer_box
 from forcegrasp.reports.results import DiagnoseResult
 from tests.diagnosis.test_faults_of_the_set import silent, with_model

@@ -12,7 +12,7 @@ from forcegrasp.effects import get_effect
 from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.identify.problem import Problem
 from forcegrasp.identify.verdict import Verdict
-from forcegrasp.reports.diagnosis import answer
+from forcegrasp.reports.diagnosis_answer import answer
 from tests.made_up import fit_of
 
 DELAY_STD_S = 0.002

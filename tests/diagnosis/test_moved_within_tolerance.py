@@ -18,7 +18,9 @@ from forcegrasp.diagnosis.search.search import diagnose
 from forcegrasp.effects import get_effect
 from forcegrasp.identify.fit_set import apply_model
 from forcegrasp.identify.loading import Loaded
-from forcegrasp.reports.diagnosis import answer, diagnosis_json, sections
+from forcegrasp.reports.diagnosis import sections
+from forcegrasp.reports.diagnosis_answer import answer
+from forcegrasp.reports.diagnosis_as_json import diagnosis_json
 from forcegrasp.reports.diagnosis_box import answer_box
 from tests.diagnosis.test_faults_of_the_set import changed, silent, with_model
 from tests.diagnosis.test_faults_of_the_set import refitted as refitted  # a fixture

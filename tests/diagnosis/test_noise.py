@@ -18,7 +18,7 @@ from forcegrasp.identify.phases import PHASES
 from forcegrasp.identify.target import Target
 from forcegrasp.measure import MeasuredGrasp
 from forcegrasp.physics.gripper_file import load_gripper
-from forcegrasp.reports import diagnosis as diagnosis_report
+from forcegrasp.reports import diagnosis_answer, diagnosis_as_json
 from forcegrasp.reports.next_step import after_diagnosis
 
 G, S, MANY = 8, 150, 24
@@ -305,7 +305,7 @@ def of(made_up, verdict: str, times: list[float], core: list[float], unlike: lis
 
 def test_the_answer_tells_the_noise(made_up):
     diagnosis = of(made_up, "explained", [3.0, 3.1, 1.0, 1.7], [3.0, 3.1, 1.0, 1.1], [True, True, False, True])
-    answer = diagnosis_report.answer(diagnosis)
+    answer = diagnosis_answer.answer(diagnosis)
     assert answer.startswith("The model explains these data: they show no missing effect")
     assert (
         "positions scatter by 3.1 ×, force right scatter by 1.7 × (with heavy tails) the noise that was given" in answer
@@ -313,7 +313,7 @@ def test_the_answer_tells_the_noise(made_up):
     assert "white in time and alike in all phases" in answer
     assert "give position_std_m and force_std_n" in answer
     assert "none of the effects" not in answer
-    found = diagnosis_report.diagnosis_json(diagnosis, None, made_up.tried, "s")
+    found = diagnosis_as_json.diagnosis_json(diagnosis, None, made_up.tried, "s")
     assert set(found["noise"]) == {"position_l", "position_r", "force_r"}
     assert found["noise"]["force_r"] == {
         "times_stated": 1.7,
@@ -329,7 +329,7 @@ def test_the_answer_tells_the_noise(made_up):
 def test_noise_of_the_given_size_with_heavy_tails_is_not_to_be_given_anew(made_up, times, tails_alone):
     diagnosis = of(made_up, "explained", [times, 1.0, 1.0, 1.0], [0.7] * 4, [True, False, False, False])
     answer, commands = (
-        diagnosis_report.answer(diagnosis),
+        diagnosis_answer.answer(diagnosis),
         after_diagnosis(diagnosis, None, "s", "known.yaml", "found.yaml"),
     )
     assert ("the noise of position left has heavy tails, and the size that was given" in answer) == tails_alone
@@ -340,24 +340,24 @@ def test_noise_of_the_given_size_with_heavy_tails_is_not_to_be_given_anew(made_u
 def test_noise_that_is_slow_in_part_is_called_so(made_up):
     diagnosis = of(made_up, "explained", [2.0] * 4, [2.0] * 4, [True] * 4, [0.0, 0.0, 0.9, 0.9])
     diagnosis.noise.slow_share[:] = 0.3
-    assert "in part slow, as behind a filter (force left, force right)" in diagnosis_report.answer(diagnosis)
+    assert "in part slow, as behind a filter (force left, force right)" in diagnosis_answer.answer(diagnosis)
 
 
 def test_slow_noise_is_called_so(made_up):
     diagnosis = of(made_up, "explained", [2.0] * 4, [2.0] * 4, [True] * 4, [0.0, 0.0, 0.7, 0.6])
-    assert "slow, as behind a filter (force left, force right)" in diagnosis_report.answer(diagnosis)
+    assert "slow, as behind a filter (force left, force right)" in diagnosis_answer.answer(diagnosis)
 
 
 def test_an_effect_and_other_noise(made_up):
     diagnosis = of(made_up, "effect", [3.0] * 4, [3.0] * 4, [True] * 4, error_before=5.0, error_after=3.0)
-    answer = diagnosis_report.answer(diagnosis)
+    answer = diagnosis_answer.answer(diagnosis)
     assert answer.startswith("The model lacks force_bias. ")
     assert "positions scatter by 3 ×, forces scatter by 3 ×" in answer
     assert diagnosis.explained == pytest.approx(1)
 
 
 def test_a_noise_that_is_smaller_may_hide_effects(made_up):
-    answer = diagnosis_report.answer(
+    answer = diagnosis_answer.answer(
         of(made_up, "explained", [1, 1, 0.3, 0.3], [1, 1, 0.3, 0.3], [False] * 2 + [True] * 2)
     )
     assert "the noise is smaller than that: forces scatter by 0.3 ×" in answer
@@ -366,8 +366,8 @@ def test_a_noise_that_is_smaller_may_hide_effects(made_up):
 
 def test_noise_as_said_is_not_mentioned(made_up):
     diagnosis = made_up.diagnosis("explained")
-    assert "white in time" not in diagnosis_report.answer(diagnosis)
-    assert diagnosis_report.diagnosis_json(diagnosis, None, made_up.tried, "s")["noise"] is None
+    assert "white in time" not in diagnosis_answer.answer(diagnosis)
+    assert diagnosis_as_json.diagnosis_json(diagnosis, None, made_up.tried, "s")["noise"] is None
 
 
 @pytest.mark.parametrize(("grasps", "of_many"), [(1, False), (2, True)])
@@ -380,7 +380,7 @@ def test_what_one_grasp_alone_shows_is_told_and_is_no_missing_effect(grasps, of_
     left, noise, alone = left_by_many(study, fit)
     assert (bool(left), noise, bool(alone)) == (of_many, None, not of_many)
     told = dataclasses.replace(made_up.diagnosis("explained"), alone=alone)
-    assert ("Only grasp g0 of cup (" in diagnosis_report.answer(told)) is not of_many
+    assert ("Only grasp g0 of cup (" in diagnosis_answer.answer(told)) is not of_many
 
 
 @pytest.mark.parametrize(("fitted", "told"), [(normal(0), None), (student(0), True), (0.5 * normal(0), False)])

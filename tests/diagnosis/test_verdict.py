@@ -23,7 +23,7 @@ from forcegrasp.diagnosis.verdict import conclude, explained_share
 from forcegrasp.effects import get_effect
 from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.identify.verdict import Verdict
-from forcegrasp.reports import diagnosis as diagnosis_report
+from forcegrasp.reports import diagnosis_answer, diagnosis_as_json
 from forcegrasp.reports.diagnosis_box import certainty
 from forcegrasp.reports.diagnosis_words import left_sentence
 
@@ -294,19 +294,19 @@ def two_steps(made_up, rivals: tuple[str, ...] = ("coulomb_friction", "stiction"
 
 def test_the_headline_is_no_stronger_than_its_steps(made_up):
     diagnosis = two_steps(made_up)
-    first = diagnosis_report.answer(diagnosis).partition(". ")[0]
+    first = diagnosis_answer.answer(diagnosis).partition(". ")[0]
     assert first == (
         "The model lacks coulomb_friction (or stiction: these data can't tell which, and coulomb_friction is preferred,"
         " for it has fewer parameters) and force_bias"
     )
-    found = diagnosis_report.diagnosis_json(diagnosis, None, made_up.tried, "s")
+    found = diagnosis_as_json.diagnosis_json(diagnosis, None, made_up.tried, "s")
     assert (found["verdict"], found["effects"]) == ("one_of", ["coulomb_friction", "force_bias", "stiction"])
     assert found["preferred"] == ["coulomb_friction", "force_bias"]
     assert [step["preferred_because"] for step in found["steps"]] == ["it has fewer parameters", ""]
 
 
 def test_of_equally_many_parameters_the_gain_decides(made_up):
-    answer = diagnosis_report.answer(made_up.diagnosis("one_of"))
+    answer = diagnosis_answer.answer(made_up.diagnosis("one_of"))
     assert "force_bias or force_drift: these data can't tell which, and force_bias is preferred" in answer
     assert "for its held-out gain is larger" in answer
 
@@ -323,7 +323,7 @@ def test_of_equally_many_parameters_the_gain_decides(made_up):
 )
 def test_much_that_is_left_is_said_first(made_up, before, after, left, said):
     diagnosis = two_steps(made_up, error_before=before, error_after=after, left=left)
-    first = diagnosis_report.answer(diagnosis).partition(". ")[0]
+    first = diagnosis_answer.answer(diagnosis).partition(". ")[0]
     assert said in first
     assert first.startswith("Not all" if said else "The model lacks")
 
@@ -334,7 +334,7 @@ def test_what_the_model_found_cant_foretell_itself_may_be_all_that_is_left(made_
     shaken[:, :, ::2] = np.where(made_up.target.mask[:, ::2, None], 1.0, 0.0)
     for size, said in ((0.1, "Not all is found: 1.60 ×"), (2.0, "Perhaps not all is found: 1.60 ×")):
         diagnosis = two_steps(made_up, error_after=1.6, left="in all", numerical=tuple(size * shaken))
-        answer = diagnosis_report.answer(diagnosis)
+        answer = diagnosis_answer.answer(diagnosis)
         assert answer.startswith(said)
         assert ("may not foretell any better" in answer) == (size == 2.0)
         assert ("a moment early or late" in left_sentence(diagnosis)) == (size == 2.0)
@@ -345,8 +345,8 @@ def test_what_the_model_found_cant_foretell_itself_may_be_all_that_is_left(made_
 def test_a_set_that_seems_wrong_and_leaves_much_says_so_first(made_up):
     """Objects that were all too large left 1.2 × noise; in truth the encoders read by a wrong scale."""
     diagnosis = two_steps(made_up, verdict=Verdict.DATA, error_after=1.6, left="in all")
-    assert diagnosis_report.answer(diagnosis).startswith("Not all is found: 1.60 ×")
-    assert "Not the model but the set seems to be wrong" in diagnosis_report.answer(diagnosis)
+    assert diagnosis_answer.answer(diagnosis).startswith("Not all is found: 1.60 ×")
+    assert "Not the model but the set seems to be wrong" in diagnosis_answer.answer(diagnosis)
 
 
 @pytest.mark.parametrize(("error", "said"), [(3.0, "Sure that something is missing"), (1.1, "Something small seems")])
@@ -358,7 +358,7 @@ def test_how_sure_it_is_that_something_is_missing_goes_by_the_error(made_up, err
 
 def test_little_explained_is_unknown_and_says_what_it_would_take_off(made_up):
     diagnosis = two_steps(made_up, verdict=Verdict.UNKNOWN, error_before=348.0, error_after=173.0, left="in all")
-    first = diagnosis_report.answer(diagnosis).partition(". ")[0]
+    first = diagnosis_answer.answer(diagnosis).partition(". ")[0]
     assert "none of the effects I know" in first
     assert "348.00 × the sensor noise, and coulomb_friction and force_bias would only take it down to 173.00 ×" in first
 

@@ -14,7 +14,9 @@ from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.identify.givens import Given
 from forcegrasp.identify.problem import Problem
 from forcegrasp.identify.verdict import Verdict
-from forcegrasp.reports.diagnosis import answer, diagnosis_json, lines
+from forcegrasp.reports.diagnosis import lines
+from forcegrasp.reports.diagnosis_answer import answer
+from forcegrasp.reports.diagnosis_as_json import diagnosis_json
 from forcegrasp.reports.diagnosis_box import answer_box
 from forcegrasp.reports.diagnosis_words import fault_words, row_sentence
 from forcegrasp.reports.next_step import after_diagnosis

@@ -36,8 +36,9 @@ from forcegrasp.identify.target import Target, make_target
 from forcegrasp.measure import MeasuredGrasp, MeasurementSet
 from forcegrasp.physics.gripper_file import load_gripper
 from forcegrasp.replay.replay import Replay
-from forcegrasp.reports.diagnosis import diagnosis_json, printed
 from forcegrasp.reports.diagnosis import lines as lines_of
+from forcegrasp.reports.diagnosis import printed
+from forcegrasp.reports.diagnosis_as_json import diagnosis_json
 from tests.light_set import light_set
 
 TIAGO = load_gripper("tiago")

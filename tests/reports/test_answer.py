@@ -20,7 +20,7 @@ from forcegrasp.identify.verdict import Verdict
 from forcegrasp.models.model_file import write_model
 from forcegrasp.reports import comparison as comparison_report
 from forcegrasp.reports import diagnosis as diagnosis_report
-from forcegrasp.reports import figures
+from forcegrasp.reports import diagnosis_answer, diagnosis_as_json, figures
 from forcegrasp.reports.diagnosis_box import answer_box, weakest_step
 from forcegrasp.reports.diagnosis_words import percent, place_of_rest, shares_sentence
 from forcegrasp.reports.html import Answer
@@ -53,9 +53,9 @@ def test_the_headline_says_how_much_each_effect_explains(made_up):
     assert told.startswith(
         "Of the error beyond the noise (mean square) force_bias explains 84%, force_drift 14%; 2% is left, "
     )
-    assert told in diagnosis_report.answer(diagnosis)
-    found = diagnosis_report.diagnosis_json(diagnosis, None, made_up.tried, "s")
-    assert found["answer"] == diagnosis_report.answer(diagnosis)
+    assert told in diagnosis_answer.answer(diagnosis)
+    found = diagnosis_as_json.diagnosis_json(diagnosis, None, made_up.tried, "s")
+    assert found["answer"] == diagnosis_answer.answer(diagnosis)
     assert found["left_share"] + sum(found["shares"].values()) == pytest.approx(1)
     assert [name for name, _ in box(diagnosis).shares] == ["force_bias 84%", "force_drift 14%", "left 2%"]
 
@@ -66,7 +66,7 @@ def test_many_effects_that_leave_much_may_be_others(made_up, error, count, doubt
     diagnosis = two_effects(made_up, left="in all")
     last = dataclasses.replace(diagnosis.steps[-1], error_after=error)
     steps = (*diagnosis.steps[:1] * (count - 1), last)
-    told = diagnosis_report.answer(dataclasses.replace(diagnosis, steps=steps, error_after=error))
+    told = diagnosis_answer.answer(dataclasses.replace(diagnosis, steps=steps, error_after=error))
     assert ("some of them may stand for others" in told) == doubtful
 
 
@@ -276,7 +276,7 @@ def test_a_value_has_one_interval_wherever_it_stands(made_up, tmp_path):
     diagnosis = dataclasses.replace(diagnosis, by_givens=by_givens)  # as a diagnosis of the whole set has them
     write_model(model_of(diagnosis.fit, diagnosis.target, made_up.loaded, diagnosis.numerical), tmp_path / "m.yaml")
     written = yaml.safe_load((tmp_path / "m.yaml").read_text())["effects"]["force_bias"]["left_n"]
-    found = diagnosis_report.diagnosis_json(diagnosis, None, made_up.tried, "s")["parameters"]["force_bias"]["left_n"]
+    found = diagnosis_as_json.diagnosis_json(diagnosis, None, made_up.tried, "s")["parameters"]["force_bias"]["left_n"]
     assert found == pytest.approx(written)
     line = next(text for text in diagnosis_report.lines(diagnosis, None) if text.startswith("  left_n"))
     interval = f"{written['low']:.4g} to {written['high']:.4g}"

@@ -17,6 +17,7 @@ from forcegrasp.diagnosis.result import Diagnosis
 from forcegrasp.identify.givens import Given
 from forcegrasp.identify.verdict import Verdict
 from forcegrasp.reports import diagnosis as report
+from forcegrasp.reports import diagnosis_answer, diagnosis_as_json
 from forcegrasp.reports.diagnosis_box import answer_box
 from forcegrasp.reports.next_step import after_diagnosis
 
@@ -61,10 +62,10 @@ def test_all_that_tells_of_a_diagnosis_can_be_made(made_up, verdict, left, noise
     basis = dataclasses.replace(made_up.diagnosis(verdict), left=left, noise=noise, odd=odd)
     for stepped, advice in zip(with_steps(basis), (None, made_up.advice), strict=False):
         for found in with_faults(stepped, made_up):
-            assert report.answer(found)
+            assert diagnosis_answer.answer(found)
             assert all(isinstance(line, str) for line in report.lines(found, advice))
             report.printed(found)
-            written = report.diagnosis_json(found, advice, made_up.tried, "s")
+            written = diagnosis_as_json.diagnosis_json(found, advice, made_up.tried, "s")
             assert json.loads(json.dumps(written))["verdict"] == found.verdict
             commands = after_diagnosis(found, advice, "set", "base.yaml", "found.yaml")
             assert commands

@@ -23,7 +23,7 @@ from forcegrasp.identify.fitted_model import model_of
 from forcegrasp.replay.next_grasp import NextGrasp
 from forcegrasp.reports import comparison as comparison_report
 from forcegrasp.reports import diagnosis as diagnosis_report
-from forcegrasp.reports import figures
+from forcegrasp.reports import diagnosis_answer, diagnosis_as_json, figures
 from forcegrasp.reports import fit as fit_report
 from forcegrasp.reports.html import Picture, Table
 from tests.made_up import result_of
@@ -224,7 +224,7 @@ def test_a_diagnosis_marks_parameters_at_their_bounds(made_up, tmp_path):
     assert any(line.startswith(f"  left_n {bias:g} (at its bound) N (95 %: ") for line in lines)
     warning = f"force_bias.left_n ended at its bound {bias:g} N: doubt the model, or widen it"
     assert f"warning: {warning}" in lines
-    assert warning in plain(diagnosis_report.diagnosis_json(diagnosis, None, made_up.tried, "s"), tmp_path)["warnings"]
+    assert warning in plain(diagnosis_as_json.diagnosis_json(diagnosis, None, made_up.tried, "s"), tmp_path)["warnings"]
 
 
 def test_values_of_a_step_give_way_to_final_ones(made_up):
@@ -236,7 +236,7 @@ def test_values_of_a_step_give_way_to_final_ones(made_up):
     drift = one.steps[0].candidates[1].setting.parameters
     (left, right) = final.values[-2:]
     assert left != pytest.approx(bias.setting.parameters["left_n"])
-    found = diagnosis_report.diagnosis_json(diagnosis, None, made_up.tried, "s")
+    found = diagnosis_as_json.diagnosis_json(diagnosis, None, made_up.tried, "s")
     for rows in (found["ranking"], found["steps"][0]["ranking"]):
         assert rows[0]["parameters"] == {"left_n": left, "right_n": right}
         assert rows[1]["parameters"] == drift
@@ -255,7 +255,7 @@ def test_values_of_a_step_give_way_to_final_ones(made_up):
 def test_diagnosis_json(made_up, verdict, tmp_path):
     diagnosis = made_up.diagnosis(verdict)
     advice = made_up.advice if verdict == "one_of" else None
-    found = plain(diagnosis_report.diagnosis_json(diagnosis, advice, made_up.tried, "s"), tmp_path)
+    found = plain(diagnosis_as_json.diagnosis_json(diagnosis, advice, made_up.tried, "s"), tmp_path)
     assert found["verdict"] == verdict
     assert found["effects"] == {"effect": ["force_bias"], "one_of": ["force_bias", "force_drift"]}.get(verdict, [])
     assert [step["verdict"] for step in found["steps"]] == (
@@ -299,7 +299,7 @@ def test_diagnosis_json(made_up, verdict, tmp_path):
 )
 def test_the_verdict_in_words(made_up, verdict, told):
     diagnosis = made_up.diagnosis(verdict)
-    assert told in diagnosis_report.answer(diagnosis)
+    assert told in diagnosis_answer.answer(diagnosis)
     lines = "\n".join(diagnosis_report.lines(diagnosis, made_up.advice))
     symptom = (
         "force_bias: without it the model misses force left by 76.4 mN (5.9 × noise) in hold, most of all in grasp g3"
@@ -321,11 +321,11 @@ def test_rounding_is_found_without_any_fit(made_up, tmp_path):
     diagnosis = dataclasses.replace(
         plainly, target=target, steps=(step, *plainly.steps), effects=("quantisation", "force_bias")
     )
-    found = plain(diagnosis_report.diagnosis_json(diagnosis, None, made_up.tried, "s"), tmp_path)
+    found = plain(diagnosis_as_json.diagnosis_json(diagnosis, None, made_up.tried, "s"), tmp_path)
     assert [row["effect"] for row in found["ranking"]][:2] == ["quantisation", "force_bias"]
     assert found["ranking"][0]["parameters"] == {"position_step_m": 0, "force_step_n": 0.04}
     assert found["parameters"]["quantisation"]["force_step_n"]["value"] == 0.04
-    assert "quantisation and force_bias" in diagnosis_report.answer(diagnosis)
+    assert "quantisation and force_bias" in diagnosis_answer.answer(diagnosis)
     lines = diagnosis_report.lines(diagnosis, None)
     assert "quantisation: readings of forces are multiples of 40 mN" in lines
     assert "steps: forces 40 mN" in lines[-1]

@@ -10,7 +10,8 @@ import pytest
 from forcegrasp.diagnosis.result import Diagnosis
 from forcegrasp.identify.verdict import Verdict
 from forcegrasp.reports import results
-from forcegrasp.reports.diagnosis import answer, lines
+from forcegrasp.reports.diagnosis import lines
+from forcegrasp.reports.diagnosis_answer import answer
 from forcegrasp.reports.diagnosis_box import answer_box
 from forcegrasp.reports.next_step import after_diagnosis
 from forcegrasp.reports.physics_step import shorter_step, step_of_scene, warning_of_fit
