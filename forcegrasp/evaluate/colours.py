@@ -11,6 +11,7 @@ from matplotlib.colors import to_hex, to_rgb
 KNOWN = {
     "recommended": "#7b2cbf",
     "ib": "#0072b2",
+    "ib_tuned": "#003f6b",
     "no_ib": "#d55e00",
     "no_rand": "#009e73",
     "force_pi": "#cc79a7",
