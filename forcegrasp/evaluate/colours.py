@@ -11,7 +11,6 @@ from matplotlib.colors import to_hex, to_rgb
 KNOWN = {
     "recommended": "#7b2cbf",
     "ib": "#0072b2",
-    "ib_tuned": "#003f6b",
     "no_ib": "#d55e00",
     "no_rand": "#009e73",
     "force_pi": "#cc79a7",
@@ -23,7 +22,7 @@ KNOWN = {
     "nothing": "#bbbbbb",
 }
 #: Of all other names, each has its place among these.
-OTHERS = ("#6a5acd", "#b22222", "#8c6d31", "#44aa99", "#aa4499", "#ddcc77")
+OTHERS = ("#6a5acd", "#b22222", "#8c6d31", "#003f6b", "#aa4499", "#ddcc77")
 
 
 def policy_colours(names: Iterable[str]) -> dict[str, str]:
