@@ -38,10 +38,13 @@ def read_late(target: Target, fit: Fit, late_s: np.ndarray) -> np.ndarray:
 def test_the_scatter_of_rows_is_measured(fitted, std_s):
     target, fit = fitted
     late_s = std_s * np.random.default_rng(0).standard_normal((*target.mask.shape, 1))
-    found = clock_jitter(read_late(target, fit, late_s), target, fit)
+    left = read_late(target, fit, late_s)
+    found = clock_jitter(left, target, fit)
     assert found is not None
     assert found.std_s == pytest.approx(std_s, rel=0.15)
-    assert 0.7 < found.share <= 1.0
+    of_late = np.mean((left - fit.residual)[..., :2][target.mask] ** 2)
+    beyond_noise = np.mean(left[..., :2][target.mask] ** 2) - 1
+    assert found.share == pytest.approx(min(1.0, of_late / beyond_noise), rel=0.3)
 
 
 def test_nothing_else_is_taken_for_it(fitted):
@@ -51,6 +54,8 @@ def test_nothing_else_is_taken_for_it(fitted):
     assert clock_jitter(read_late(target, fit, np.full((*shape, 1), 0.003)), target, fit) is None  # all alike
     assert clock_jitter(read_late(target, fit, 0.002 * rng.standard_normal((*shape, 4))), target, fit) is None
     assert clock_jitter(fit.residual + rng.standard_normal((*shape, 4)), target, fit) is None
+    shared = np.array([1.0, 1, 0, 0]) * rng.standard_normal((*shape, 1))
+    assert clock_jitter(fit.residual + shared, target, fit) is None
     late_s = 0.0005 * rng.standard_normal((*shape, 1))
     noisy = read_late(target, fit, late_s) + 2 * rng.standard_normal((*shape, 4))
     assert clock_jitter(noisy, target, fit) is None  # it is there, and makes little of what positions leave

@@ -31,7 +31,7 @@ def clock_jitter(residual: np.ndarray, target: Target, fit: Fit) -> ClockJitter 
 
     A row that is read late shows every finger farther on, and the row after it nothing of that. So the residuals of
     two positions go together within a row, by the product of their speeds, and not from one row to the next. The noise
-    of two sensors does neither, and what a model lacks goes on from row to row.
+    of two sensors does not, what both share does so at any speed, and what a model lacks goes on from row to row.
 
     Args:
       residual: of held-out grasps, in units of the noise, ``(G, S, C)``.
@@ -47,13 +47,14 @@ def clock_jitter(residual: np.ndarray, target: Target, fit: Fit) -> ClockJitter 
     together, wanted = (np.zeros(len(target.grasps)) for _ in range(2))
     for one, other in pairs:
         product = (speeds[..., one] * speeds[..., other])[:, 1:-1]
-        # by readings that noise hardly reaches, as by fast ones, as much is known
+        # a row that moves by many times the noise counts no more than one that moves by the noise
         weight = 1 / ((1 + speeds[..., one] ** 2) * (1 + speeds[..., other] ** 2))[:, 1:-1]
         same = (left[..., one] * left[..., other])[:, 1:-1]
         alone = np.where(np.isfinite(same), same - _of_next_rows(left[..., one], left[..., other]), np.nan)
-        there = np.isfinite(alone)
-        together += np.sum(np.where(there, weight * product * alone, 0.0), axis=1)
-        wanted += np.sum(np.where(there, weight * product**2, 0.0), axis=1)
+        weight = np.where(np.isfinite(alone), weight, 0.0)
+        beyond_usual = product - np.sum(weight * product) / max(np.sum(weight), 1e-9)  # slow rows have it, too
+        together += np.nansum(weight * beyond_usual * alone, axis=1)
+        wanted += np.sum(weight * beyond_usual**2, axis=1)
     if not wanted.any():
         return None
     square = together.sum() / wanted.sum()  # of the scatter, in units of the shift
