@@ -8,7 +8,7 @@
     python tools/hidden_effects.py check                           fails if a page is of other code than the present
 
 The recorder is tests/independent: it shares no code with the effects under test. Sets come in random order, so that a
-part of them is a fair sample of all. A set takes two minutes of one core.
+part of them is a fair sample of all. A set takes three minutes of one core.
 """
 
 from __future__ import annotations

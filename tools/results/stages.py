@@ -240,7 +240,7 @@ def _other_programs(settings: Settings) -> Iterator[Stage]:
     measured = ("python", "tools/measured_robots.py", "--out", settings.shown("measured-robots"))
     yield stage("measured-robots", "a table of docs/robots.md", 2, measured, needs=("ship-ib",))
     yield stage("grippers", "docs/grippers.md", 6, *grippers)
-    yield stage("hidden-effects", "docs/hidden-effects.md", 8, *hidden)
+    yield stage("hidden-effects", "docs/hidden-effects.md", 17, *hidden)
     if settings.real_data:
         command = ("python", "-m", "tools.real_data", "--data", str(settings.real_data.resolve()))
         where = ("--out", settings.shown("real-data"), "--page", "docs/real-data.md")
