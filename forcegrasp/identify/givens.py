@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from forcegrasp.identify.fit import Fit
-from forcegrasp.identify.predict import Case, predict
+from forcegrasp.identify.predict import predict
 from forcegrasp.identify.priors import with_rows
 from forcegrasp.identify.simulators import cheap_tier
 from forcegrasp.identify.target import Target
@@ -70,10 +70,7 @@ def given_slopes(target: Target, fit: Fit, numbers: Sequence[Given]) -> np.ndarr
     together = {SKEW: (SKEW, FORCE_SKEW)}  # forces are read with the positions, or by so much later
     # what is read after a command shows what it does at once, what is read before does not: slopes either way
     trials = [(kind, way) for kind in stds if kind != PERIOD for way in ((1, -1) if kind in OF_READING else (1,))]
-    moved = (
-        Case(case.base | {n: case.base[n] + way * stds[kind] for n in together.get(kind, (kind,))}, case.effects)
-        for kind, way in trials
-    )
+    moved = (case.moved(dict.fromkeys(together.get(kind, (kind,)), way * stds[kind])) for kind, way in trials)
     as_said, *signals = predict(Replay(gripper, grasps, tier), [case, *moved])
     if PERIOD in stds:
         slower = [dataclasses.replace(g, time_s=g.time_s * (1 + stds[PERIOD])) for g in grasps]

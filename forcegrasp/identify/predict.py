@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 
@@ -21,6 +21,10 @@ class Case(ShortRepr):
 
     base: dict[str, np.ndarray]  #: name → ``(G,)``
     effects: tuple[EffectSetting, ...] = field(default=())  #: each with the same values on all grasps
+
+    def moved(self, by: Mapping[str, float]) -> Case:
+        """The same with base parameters that are larger by so much, by name."""
+        return Case(self.base | {name: self.base[name] + step for name, step in by.items()}, self.effects)
 
     def simulation_key(self) -> bytes:
         """Equal for cases that differ in nothing but sensors: they share one simulation."""

@@ -95,14 +95,18 @@ class Moved:
         return [name for name, move in sizes.items() if abs(move) >= _TOLD] if beyond else []
 
     @property
+    def _of_radii_m(self) -> list[float]:
+        return [by_m for name, by_m in self.moves.items() if name.startswith("radius_m")]
+
+    @property
     def radii_differ_by_m(self) -> float:
         """By how much more one radius was moved than another, metres."""
-        return float(np.ptp([by_m for name, by_m in self.moves.items() if name.startswith("radius_m")] or [0.0]))
+        return float(np.ptp(self._of_radii_m or [0.0]))
 
     @property
     def most_of_radii_m(self) -> float:
         """By how much the radius that was moved most was moved, metres."""
-        return max((abs(by_m) for name, by_m in self.moves.items() if name.startswith("radius_m")), default=0.0)
+        return max(map(abs, self._of_radii_m), default=0.0)
 
     @property
     def smaller_m(self) -> float:

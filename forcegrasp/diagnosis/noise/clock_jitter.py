@@ -8,7 +8,7 @@ import numpy as np
 
 from forcegrasp.diagnosis.verdict import LEAST_SHARE
 from forcegrasp.identify.fit import Fit
-from forcegrasp.identify.predict import Case, predict
+from forcegrasp.identify.predict import predict
 from forcegrasp.identify.simulators import cheap_tier
 from forcegrasp.identify.target import Target
 from forcegrasp.physics.gripper import FORCE_SKEW, SKEW
@@ -70,9 +70,8 @@ def clock_jitter(residual: np.ndarray, target: Target, fit: Fit) -> ClockJitter 
 def _speeds(target: Target, fit: Fit) -> np.ndarray:
     """What signals ÷ noise change by within :data:`_LATER_S`, ``(G, S, C)``."""
     gripper, case = fit.problem.gripper, fit.problem.case(fit.vector)
-    late = [name for name in (SKEW, FORCE_SKEW) if name in case.base]
-    shifted = [Case(case.base | {n: case.base[n] + by for n in late}, case.effects) for by in (_LATER_S, -_LATER_S)]
-    later, earlier = predict(Replay(gripper, fit.problem.grasps, cheap_tier(gripper)), shifted)
+    read = [case.moved({SKEW: by, FORCE_SKEW: by}) for by in (_LATER_S, -_LATER_S)]
+    later, earlier = predict(Replay(gripper, fit.problem.grasps, cheap_tier(gripper)), read)
     return target.change(later, earlier) / 2
 
 
