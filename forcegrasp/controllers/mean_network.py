@@ -12,6 +12,7 @@ from torch import Tensor, nn
 from torchrl.modules import MLP
 
 from forcegrasp.config import AlgorithmConfig
+from forcegrasp.controllers.tanh import Tanh
 from forcegrasp.physics.gripper import Gripper
 
 #: Largest action that a squashed policy starts with: 1 is out of its reach.
@@ -35,7 +36,7 @@ class Mirror(nn.Module):
 
     def forward(self, observation: Tensor) -> Tensor:
         """``(*B, size) -> (*B, size)``."""
-        return observation[..., self.order]
+        return observation.index_select(-1, self.order)
 
 
 class Mirrored(nn.Module):
@@ -96,7 +97,7 @@ def make_mean(
       squashed: whether the action is the tangens hyperbolicus of what comes out.
     """
     actions = len(gripper.motors)
-    net = MLP(in_features=sum(sizes), out_features=actions, num_cells=list(config.hidden), activation_class=nn.Tanh)
+    net = MLP(in_features=sum(sizes), out_features=actions, num_cells=list(config.hidden), activation_class=Tanh)
     last = cast(nn.Linear, net[-1])
     nn.init.orthogonal_(last.weight, gain=0.01)
     initial = config.initial_action

@@ -60,7 +60,7 @@ class Frames:
 
     def __getitem__(self, ids: Tensor) -> dict[NestedKey, Tensor]:
         """Entries ``(len(ids), d)`` of these frames."""
-        return dict(zip(self.sizes, self.rows[ids].split(list(self.sizes.values()), -1), strict=True))
+        return dict(zip(self.sizes, self.rows.index_select(0, ids).split(list(self.sizes.values()), -1), strict=True))
 
 
 def entropy(scale: Tensor) -> Tensor:
@@ -95,7 +95,10 @@ class PPO(Algorithm):
         size = env.observation_spec["observation"].shape[-1]
         self.value = make_value(size, options, gripper).to(env.device)
         self.shuffle = torch.Generator(env.device).manual_seed(config.seed)
-        self.advantage = GAE(gamma=options.discount, lmbda=options.gae_lambda, value_network=self.value)
+        # vmap copies the states first, and takes twice as long
+        self.advantage = GAE(
+            gamma=options.discount, lmbda=options.gae_lambda, value_network=self.value, deactivate_vmap=True
+        )
         self.optimizer = torch.optim.Adam(
             [*self.policy.parameters(), *self.value.parameters()], lr=options.learning_rate, eps=1e-5, fused=True
         )

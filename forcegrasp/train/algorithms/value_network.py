@@ -10,6 +10,7 @@ from torch import Tensor, nn
 from torchrl.modules import MLP
 
 from forcegrasp.config import PPOConfig, SACConfig
+from forcegrasp.controllers.tanh import Tanh
 from forcegrasp.physics.gripper import Gripper
 from forcegrasp.physics.gripper_file import default_gripper
 
@@ -31,7 +32,7 @@ class Value(nn.Module):
         self.direct, self.stroke, self.force = gripper.is_direct, gripper.stroke, _large_force(gripper)
         extra = len(ranges) + 2 + len(gripper.motors) + 1 if privileged else 0
         self.net = MLP(
-            in_features=observation_size + extra, out_features=1, num_cells=list(hidden), activation_class=nn.Tanh
+            in_features=observation_size + extra, out_features=1, num_cells=list(hidden), activation_class=Tanh
         )
         self.horizon = 1 / max(1 - discount, 1e-3)
         self.register_buffer("middle", torch.tensor([(low + high) / 2 for low, high in ranges]), persistent=False)
