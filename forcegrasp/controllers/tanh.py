@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import torch
 from torch import Tensor, nn
-from torch.autograd.function import once_differentiable
 
 
 class Tanh(nn.Tanh):
@@ -15,7 +14,8 @@ class Tanh(nn.Tanh):
 
     def forward(self, input: Tensor) -> Tensor:
         """``(*B) -> (*B)``."""
-        if input.device.type != "cpu" or torch.compiler.is_compiling() or torch.jit.is_tracing():
+        recorded = torch.compiler.is_compiling() or torch.jit.is_tracing()  # pyright: ignore[reportPrivateImportUsage]
+        if recorded or input.device.type != "cpu":
             return super().forward(input)
         try:
             return _ByNumpy.apply(input) if torch.is_grad_enabled() and input.requires_grad else _tanh(input)
@@ -35,6 +35,5 @@ class _ByNumpy(torch.autograd.Function):
         return y
 
     @staticmethod
-    @once_differentiable
     def backward(ctx: Any, *gradients: Tensor) -> Tensor:
         return torch.ops.aten.tanh_backward(gradients[0], *ctx.saved_tensors)

@@ -27,6 +27,7 @@ def test_it_is_torchs_tanh(dtype, within):
 def test_its_gradient_is_that_of_tanh():
     x = values(torch.float64)[:, ::40].requires_grad_()
     assert torch.autograd.gradcheck(Tanh(), x)
+    assert torch.autograd.gradgradcheck(Tanh(), x)
 
 
 def test_no_gradient_is_kept_that_nobody_asks_for():
