@@ -24,7 +24,7 @@ WRITER = "tools/measured_robots.py"
 #: Of the half on which nothing was chosen.
 ROBOTS = (1, 3, 5, 7, 9, 11, 13, 15)
 #: Control steps of a retraining.
-FRAMES = 600_000
+FRAMES = 3_000_000
 #: Who is compared on the robot: policies of the package, the one retrained with what was found, and one retrained with
 #: all that is hidden, which no measurement tells: what a perfect diagnosis would bring.
 OTHERS, RETRAINED, PERFECT = ("ib", "catalogue", "force_pi"), "retrained", "perfect"
@@ -44,8 +44,8 @@ def commands(robot: int, folder: Path, frames: int) -> Iterator[tuple[str, list[
     yield "diagnosed", ["diagnose", f"data={measured}", f"out={why}"]
     runs = {folder / RETRAINED: why / "model.yaml", folder / PERFECT: model}
     for run, learnt_from in runs.items():
-        given = ["experiment=catalogue", "start=catalogue", "randomise=model", f"model={learnt_from}", "seed=1"]
-        given += ["reward.forces=measured", f"ppo.total_frames={frames}", "log.video_every=0", "log.figures_every=0"]
+        given = ["experiment=retrain", f"model={learnt_from}", "seed=1", f"ppo.total_frames={frames}"]
+        given += ["log.video_every=0", "log.figures_every=0"]
         begun = (run / "config.yaml").exists()
         yield run.name, ["train", *([f"resume={run}"] if begun else [*given, f"hydra.run.dir={run}"])]
     for where, who, more in zip(_WHERE, (["ib"], [*runs, *OTHERS]), ([], [f"model={model}"]), strict=True):

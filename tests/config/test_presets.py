@@ -218,6 +218,17 @@ def test_catalogue_differs_from_no_ib_in_what_its_file_says():
     }
 
 
+def test_retrain_differs_from_catalogue_in_what_its_file_says():
+    assert changed(train("experiment=catalogue"), train("experiment=retrain")) == {
+        "start": "catalogue",
+        "randomise": "auto",
+        "reward.forces": "measured",
+        "ppo.total_frames": 3_000_000,
+        "ppo.log_std": -1.2,
+        "ppo.learning_rate": 8e-4,
+    }
+
+
 @pytest.mark.parametrize(
     ("experiment", "without"),
     [
@@ -261,12 +272,19 @@ def test_what_is_given_explicitly_wins(overrides, name, value):
     assert options(train(*overrides))[name] == value
 
 
+def experiments_in(experiment: str) -> list[Path]:
+    """Files that an experiment is made of, itself last."""
+    path = CONF / "experiment" / f"{experiment}.yaml"
+    others = [name for name in yaml.safe_load(path.read_text()).get("defaults", []) if isinstance(name, str)]
+    return [file for name in others if name != "_self_" for file in experiments_in(name)] + [path]
+
+
 @pytest.mark.parametrize("experiment", EXPERIMENTS)
 def test_experiments_mix_with_every_other_preset(experiment):
     others = {"budget": "quick", "physics": "reference", "reward": "goal_normalised", "sensors": "authors"}
     others["collector"] = "ray"
     assert {"experiment", "sweep", *others} == set(groups("train"))
-    own = named_options(CONF / "experiment" / f"{experiment}.yaml")
+    own = {name: value for made_of in experiments_in(experiment) for name, value in named_options(made_of).items()}
     mixed = options(train(f"experiment={experiment}", *(f"{group}={choice}" for group, choice in others.items())))
     for group, choice in others.items():
         # an ablation stays one: what it takes away, no other preset brings back
