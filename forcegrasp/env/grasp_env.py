@@ -122,7 +122,7 @@ class GraspEnv(EnvBase):
         ids = np.arange(self.simulator.n) if mask is None else np.flatnonzero(mask.cpu().numpy().reshape(-1))
         self.simulator.reset(self.sampler(self.rng, ids), ids, self.rng)
         self._drawn = self._column(self.simulator.parameters.as_array())
-        return self._state().update(self._done())
+        return self._state()
 
     def _step(self, tensordict: TensorDictBase) -> TensorDictBase:
         delta = tensordict.get("joint_delta")
@@ -136,7 +136,7 @@ class GraspEnv(EnvBase):
         form = judged["force_paper" if config.form == "paper" else "force_normalised"]
         reward = config.force_weight * form + config.object_weight * terms["object"]
         reward = reward + config.overshoot_weight * judged["overshoot"]
-        return state.set("reward", reward).update(self._done())
+        return state.set("reward", reward)
 
     def _column(self, values: Shaped[np.ndarray | Tensor, "{self.simulator.n} ..."]) -> Float[Tensor, "n k"]:
         """A simulator's values ``(n,)`` or ``(n, k)`` as a float32 tensor ``(n, k)`` on the env's device."""
@@ -168,17 +168,15 @@ class GraspEnv(EnvBase):
                 "object_speed": speed,
                 "grasp_parameters": parameters,
                 "reward_terms": TensorDict(terms, batch_size=self.batch_size),
+                **self._done(),
             },
             batch_size=self.batch_size,
         )
         return state.set(READING_VARIATION, column(self.robots.readings)) if self.robots else state
 
-    def _done(self) -> TensorDict:
-        truncated = torch.as_tensor(self.simulator.steps >= self.episode_steps).unsqueeze(-1)
-        return TensorDict(
-            {"done": truncated, "truncated": truncated.clone(), "terminated": torch.zeros_like(truncated)},
-            batch_size=self.batch_size,
-        )
+    def _done(self) -> dict[str, Tensor]:
+        truncated = torch.as_tensor(self.simulator.steps >= self.episode_steps, device=self.device).unsqueeze(-1)
+        return {"done": truncated, "truncated": truncated.clone(), "terminated": torch.zeros_like(truncated)}
 
 
 def _simulator(
