@@ -1,6 +1,6 @@
 """Measures robots of docs/robots.md one by one, diagnoses and retrains for each, and fills in a table of the page.
 
-    python tools/measured_robots.py                 eight robots of the test half: some two hours on one core
+    python tools/measured_robots.py                 eight robots of the test half: some three hours on one core
     python tools/measured_robots.py --robots 0 2    others
     python tools/measured_robots.py --report        writes what there is so far into the page; seconds
 
@@ -42,7 +42,7 @@ def commands(robot: int, folder: Path, frames: int) -> Iterator[tuple[str, list[
     yield "robot", ["robot", str(robot), f"out={model}"]
     yield "measured", ["record", f"model={model}", "objects=6", f"out={measured}"]
     yield "diagnosed", ["diagnose", f"data={measured}", f"out={why}"]
-    runs = {folder / RETRAINED: why / "model.yaml", folder / PERFECT: model}
+    runs = {folder / RETRAINED: diagnosed_model(why), folder / PERFECT: model}
     for run, learnt_from in runs.items():
         given = ["experiment=retrain", f"model={learnt_from}", "seed=1", f"ppo.total_frames={frames}"]
         given += ["log.video_every=0", "log.figures_every=0"]
@@ -51,6 +51,12 @@ def commands(robot: int, folder: Path, frames: int) -> Iterator[tuple[str, list[
     for where, who, more in zip(_WHERE, (["ib"], [*runs, *OTHERS]), ([], [f"model={model}"]), strict=True):
         policies = f"policies=[{','.join(map(str, who))}]"
         yield f"evaluated on {where}", ["evaluate", policies, *more, *_GRASPS, f"out={folder / where}"]
+
+
+def diagnosed_model(why: Path) -> Path:
+    """What a diagnosis made of a robot: a model with what it found, or the base model where it can't name anything."""
+    found = why / "model.yaml"
+    return found if found.exists() else why / "base_model.yaml"
 
 
 def work_through(robots: Sequence[int], out: Path, frames: int) -> None:
@@ -82,7 +88,7 @@ def judged(folder: Path) -> Row:
     from forcegrasp.models.model_file import read_model
     from forcegrasp.models.object_body import ObjectBody
 
-    robot, found = read_model(folder / "robot.yaml"), read_model(folder / "why" / "model.yaml")
+    robot, found = read_model(folder / "robot.yaml"), read_model(diagnosed_model(folder / "why"))
     diagnosis = json.loads((folder / "why" / "diagnosis.json").read_text("utf-8"))
     home, away = (json.loads((folder / where / "evaluation.json").read_text("utf-8")) for where in _WHERE)
     home, away = home["policies"], away["policies"]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from forcegrasp.models.model_file import read_model
@@ -12,11 +14,15 @@ from tools.results import execute
 
 @pytest.fixture
 def ran(monkeypatch) -> list[list[str]]:
-    """What is run; evaluations fail."""
+    """What is run; diagnoses find something, evaluations fail."""
     words = []
 
     def run(command: list[str]) -> int:
         words.append(command[1:])
+        if command[1] == "diagnose":
+            out = next(Path(word.removeprefix("out=")) for word in command if word.startswith("out="))
+            out.mkdir()
+            (out / "model.yaml").touch()
         return 3 if command[1] == "evaluate" else 0
 
     monkeypatch.setattr(execute, "run_command", run)
@@ -43,7 +49,16 @@ def test_a_training_that_was_begun_is_resumed(tmp_path):
     (begun / "config.yaml").touch()
     steps = dict(measured_robots.commands(7, tmp_path, 1000))
     assert steps["retrained"] == ["train", f"resume={begun}"]
-    assert steps["perfect"][1] == "experiment=catalogue"
+    assert steps["perfect"][1] == "experiment=retrain"
+
+
+@pytest.mark.parametrize("named", [True, False], ids=["effects", "unknown"])
+def test_it_learns_on_the_base_model_where_nothing_was_named(tmp_path, named):
+    learnt_from = tmp_path / "why" / ("model.yaml" if named else "base_model.yaml")
+    learnt_from.parent.mkdir()
+    (tmp_path / "why" / "base_model.yaml").touch()
+    learnt_from.touch()
+    assert f"model={learnt_from}" in dict(measured_robots.commands(7, tmp_path, 1000))["retrained"]
 
 
 def test_every_command_is_one_that_the_verbs_take(tmp_path, monkeypatch):

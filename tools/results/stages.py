@@ -238,7 +238,7 @@ def _other_programs(settings: Settings) -> Iterator[Stage]:
     yield stage("compare-page", "docs/compare-your-data.md", 0.3, ("python", "tools/tutorial_figures.py"))
     yield stage("effect-pages", "docs/effects", 0.3, ("python", "tools/effect_pages.py"))
     measured = ("python", "tools/measured_robots.py", "--out", settings.shown("measured-robots"))
-    yield stage("measured-robots", "a table of docs/robots.md", 2, measured, needs=("ship-ib",))
+    yield stage("measured-robots", "a table of docs/robots.md", 3, measured, needs=("ship-ib",))
     yield stage("grippers", "docs/grippers.md", 6, *grippers)
     yield stage("hidden-effects", "docs/hidden-effects.md", 17, *hidden)
     if settings.real_data:
