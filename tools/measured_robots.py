@@ -38,11 +38,13 @@ Row = dict[str, Any]
 
 def commands(robot: int, folder: Path, frames: int) -> Iterator[tuple[str, list[str]]]:
     """Names of the steps for a robot, in turn, and what is run for each."""
+    from tools.real_data.judge import best_model
+
     model, measured, why = (folder / name for name in ("robot.yaml", "set", "why"))
     yield "robot", ["robot", str(robot), f"out={model}"]
     yield "measured", ["record", f"model={model}", "objects=6", f"out={measured}"]
     yield "diagnosed", ["diagnose", f"data={measured}", f"out={why}"]
-    runs = {folder / RETRAINED: diagnosed_model(why), folder / PERFECT: model}
+    runs = {folder / RETRAINED: best_model(why), folder / PERFECT: model}
     for run, learnt_from in runs.items():
         given = ["experiment=retrain", f"model={learnt_from}", "seed=1", f"ppo.total_frames={frames}"]
         given += ["log.video_every=0", "log.figures_every=0"]
@@ -51,12 +53,6 @@ def commands(robot: int, folder: Path, frames: int) -> Iterator[tuple[str, list[
     for where, who, more in zip(_WHERE, (["ib"], [*runs, *OTHERS]), ([], [f"model={model}"]), strict=True):
         policies = f"policies=[{','.join(map(str, who))}]"
         yield f"evaluated on {where}", ["evaluate", policies, *more, *_GRASPS, f"out={folder / where}"]
-
-
-def diagnosed_model(why: Path) -> Path:
-    """What a diagnosis made of a robot: a model with what it found, or the base model where it can't name anything."""
-    found = why / "model.yaml"
-    return found if found.exists() else why / "base_model.yaml"
 
 
 def work_through(robots: Sequence[int], out: Path, frames: int) -> None:
@@ -87,8 +83,9 @@ def judged(folder: Path) -> Row:
     """What came out for one robot."""
     from forcegrasp.models.model_file import read_model
     from forcegrasp.models.object_body import ObjectBody
+    from tools.real_data.judge import best_model
 
-    robot, found = read_model(folder / "robot.yaml"), read_model(diagnosed_model(folder / "why"))
+    robot, found = read_model(folder / "robot.yaml"), read_model(best_model(folder / "why"))
     diagnosis = json.loads((folder / "why" / "diagnosis.json").read_text("utf-8"))
     home, away = (json.loads((folder / where / "evaluation.json").read_text("utf-8")) for where in _WHERE)
     home, away = home["policies"], away["policies"]

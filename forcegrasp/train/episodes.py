@@ -46,7 +46,10 @@ def collect(env: TransformedEnv, policy: ProbabilisticActor, steps: int) -> Tens
     chosen, states = [], [state.clone(False)]
     with set_exploration_type(ExplorationType.RANDOM):
         for _ in range(steps):
-            _act(policy, state) if gaussian else policy(state)
+            if gaussian:
+                _act(policy, state)
+            else:
+                policy(state)
             chosen.append(state)
             inward = state.clone(False)
             for transform in reversed(transforms):

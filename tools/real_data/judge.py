@@ -21,6 +21,7 @@ from forcegrasp.identify.simulators import Simulators
 from forcegrasp.measure import MeasurementSet
 from forcegrasp.models.model_file import Model, read_model, write_model
 from forcegrasp.replay.replay import Replay
+from forcegrasp.reports.results import BASE_MODEL, FOUND_MODEL
 from tools.real_data.study import Parameter, Study
 
 
@@ -101,7 +102,8 @@ def fit_with(data: Path, base: Path, names: Sequence[str], out: Path) -> Model:
 
 def best_model(diagnosis: Path) -> Path:
     """The model file of a diagnosis with what was found, or the base model's where nothing was."""
-    return next(f for name in ("model.yaml", "base_model.yaml") if (f := diagnosis / name).is_file())
+    found = diagnosis / FOUND_MODEL
+    return found if found.is_file() else diagnosis / BASE_MODEL
 
 
 def add_base(result: Study, model: Model, published: Mapping[str, float]) -> None:

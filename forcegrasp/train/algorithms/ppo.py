@@ -95,7 +95,7 @@ class PPO(Algorithm):
         size = env.observation_spec["observation"].shape[-1]
         self.value = make_value(size, options, gripper).to(env.device)
         self.shuffle = torch.Generator(env.device).manual_seed(config.seed)
-        # vmap copies the states first, and takes twice as long
+        # vmap would copy the states first
         self.advantage = GAE(
             gamma=options.discount, lmbda=options.gae_lambda, value_network=self.value, deactivate_vmap=True
         )
