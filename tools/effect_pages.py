@@ -190,6 +190,7 @@ _PLANS = {
     "quantisation": Show("a slow light squeeze and release", ((23.2, 0.0015, 0.2), (25, 0.002, 0.2)), start_m=0.025),
     "command_delay": _STEPS,
     "actuator_lag": _STEPS,
+    "second_order_lag": _STEPS,
     "force_lag": _STEPS,
     "force_delay": _STEPS,
 }  # fmt: skip

@@ -20,7 +20,7 @@ class ActuatorLag(Effect):
     symptom = "like a delay, but rounded: steps in the command arrive as exponentials"
     formula = "τ du'/dt = u − u'; τ² d²u'/dt² + √2 τ du'/dt = u − u' (butterworth)"
     source = "first-order lag; MuJoCo's `dyntype=filterexact` does the same for one value per model; Butterworth 1930"
-    look_alikes = ("command_delay", "rate_limited_lag", "rate_limit")
+    look_alikes = ("command_delay", "second_order_lag", "rate_limited_lag", "rate_limit")
     separates = "fast steps: a lagged response has no corner"
     parameters = (Parameter("time_constant_s", "time constant τ", "s", 0.0, 0.5, 0.05, trials=(0.01, 0.04, 0.12)),)
     variants = known_beforehand = ORDERS

@@ -64,6 +64,7 @@ _SHIPPED = (
     "readout_skew",
     "return_spring",
     "rounded_force_hysteresis",
+    "second_order_lag",
     "smooth_force_limit",
     "smooth_friction",
     "smooth_load_friction",

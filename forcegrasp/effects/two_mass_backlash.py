@@ -74,10 +74,8 @@ class TwoMassBacklash(Effect):
         if self.variant == "finger_encoder":
             return
         rows, more = self.rows[which], self["gap_m"][which] / 2 * (-1.0, 1.0)
-        joints = plant.model.dof_jntid[plant.motor_dofs]
-        for field, places in (("jnt_range", joints), ("actuator_ctrlrange", plant.actuators)):
-            for place in places:
-                plant.field(field)[rows, place] = plant.base(field)[rows, place] + more
+        for joint in plant.model.dof_jntid[plant.motor_dofs]:
+            plant.field("jnt_range")[rows, joint] = plant.base("jnt_range")[rows, joint] + more
 
     def motor_position(self, joint: np.ndarray) -> np.ndarray:
         return joint if self.variant == "finger_encoder" else self._motor_at(joint)

@@ -65,10 +65,13 @@ class AttachedEffects:
             for name, values in memory.items():
                 effect.state[name][which] = values
 
+    @property
+    def change_commands(self) -> bool:
+        """Whether any changes commands on their way to the motors."""
+        return bool(self._command)
+
     def command(self, command: np.ndarray, fresh: np.ndarray) -> np.ndarray:
         """Commanded positions ``(n, motors)`` on their way to the motors; which are new ones: ``fresh`` ``(n,)``."""
-        if not self._command:
-            return command
         command = np.array(command, float)
         for effect in self._command:
             command[effect.at] = effect.command(command[effect.at].copy(), fresh[effect.at])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import mujoco
 import numpy as np
@@ -191,6 +191,8 @@ class Plant(ContributedFields):
         """
         self.restore_fields(ids)
         self._forget_friction()
+        if self.effects.change_commands:  # what they make of a command is the drive's own, and has no such limit
+            self.field("actuator_ctrlrange")[ids[:, None], self.actuators] = (-mujoco.mjMAXVAL, mujoco.mjMAXVAL)
         self.effects.change_model(self, ids)
         self.derive_fields(ids)
         keyframe = {"keyframe": 0} if self.model.nkey else {}
@@ -247,7 +249,7 @@ class Plant(ContributedFields):
         fresh = fresh if isinstance(fresh, np.ndarray) else np.full(self.n, fresh)
         stale = np.zeros(self.n, bool) if steps > 1 else fresh
         for _ in range(steps):
-            self._send(self.effects.command(command, fresh))
+            self._send(self._after_effects(self.effects.command, command, fresh))
             self._apply_actions()
             self.batch.step(self._running, 1)
             self._at_start[:] = False
@@ -268,7 +270,7 @@ class Plant(ContributedFields):
             self.position = positions[rows, step]
             if step == 0:
                 self.effects.forget()
-            self.effects.recall(commands[rows, step], fresh[rows, step])
+            self.effects.recall(np.clip(commands[rows, step], *self._command_range), fresh[rows, step])
         self.position = now
 
     def disturb(self, load: np.ndarray, enabled: np.ndarray) -> None:
@@ -324,7 +326,7 @@ class Plant(ContributedFields):
         if self.acts_in_steps:
             raise RuntimeError("effects act in every step: advance step by step")
         control = np.repeat(self._ctrl[:, None], commands.shape[1], axis=1)
-        commands = self.effects.commands(commands, fresh)
+        commands = self._after_effects(self.effects.commands, commands, fresh)
         control[..., self._drives] = self._controls(commands)
         self._apply_actions()
         steps, scale = commands.shape[1], self.force_scale[:, None, None]
@@ -359,6 +361,14 @@ class Plant(ContributedFields):
 
     def _send(self, command: np.ndarray) -> None:
         self._ctrl[:, self._drives] = self._controls(command)
+
+    def _after_effects(
+        self, effects: Callable[[np.ndarray, np.ndarray], np.ndarray], command: np.ndarray, fresh: np.ndarray
+    ) -> np.ndarray:
+        """What effects make of commands, which drives take within their range: before all that happens to them."""
+        if not self.effects.change_commands:
+            return command
+        return effects(np.clip(command, *self._command_range), fresh)
 
     def _controls(self, command: np.ndarray) -> np.ndarray:
         """Control signals of the actuators for commands of the motors, ``(..., motors)``."""

@@ -44,6 +44,10 @@ class SceneLayout:
         if gripper.command == "position":
             self._command_scale, self._command_zero = command_law(gripper.motors, model)
             self._drive_signs = np.sign(self._command_scale)
+        limited = model.actuator_ctrllimited[self.actuators, None].astype(bool)
+        takes = np.where(limited, model.actuator_ctrlrange[self.actuators], (-np.inf, np.inf)).T
+        # least and greatest command that the actuators take, in the motors' units, ``(2, motors)``
+        self._command_range = np.sort((takes - self._command_zero) / self._command_scale, axis=0)
         movers = [finger.motor for finger in gripper.fingers] or [-1, -1]
         #: Which motor moves each side, and how far its pads go per unit of it; 0 for a side that stands still.
         self._mover = np.array([max(motor, 0) for motor in movers])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from types import SimpleNamespace
 
 import numpy as np
@@ -23,8 +24,13 @@ def make(name: str, *values: float, variant: str = "") -> Effect:
 
 def butterworth(signal: np.ndarray, tau: float) -> np.ndarray:
     """SciPy's filter of second order with the corner 1/(2πτ), of a signal that stays for a step; at rest at first."""
-    corner = lti(*butter(2, 1 / tau, analog=True)).to_ss()
-    held = cont2discrete((corner.A, corner.B, corner.C, corner.D), DT, method="zoh")
+    return filtered(signal, *butter(2, 1 / tau, analog=True))
+
+
+def filtered(signal: np.ndarray, over: Sequence[float], under: Sequence[float]) -> np.ndarray:
+    """What SciPy makes of a signal that stays for a step, by a transfer function; at rest at first."""
+    system = lti(over, under).to_ss()
+    held = cont2discrete((system.A, system.B, system.C, system.D), DT, method="zoh")
     _, out, _ = dlsim((*held[:4], DT), np.append(signal - signal[0], 0.0))
     return signal[0] + out[1:, 0]
 

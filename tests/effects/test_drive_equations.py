@@ -15,7 +15,7 @@ from forcegrasp.physics.gripper_file import load_gripper
 from forcegrasp.physics.plant import Plant
 
 from .rollouts import START_M, make_plant, path, rollout, start
-from .signals import DT, GAIN, T, butterworth, make, send, settle, wave
+from .signals import DT, GAIN, T, butterworth, filtered, make, send, settle, wave
 
 
 @pytest.mark.parametrize("steps", [1, 3, 12.25, 30.5])
@@ -124,6 +124,20 @@ def test_a_drives_filter_may_be_a_butterworth_of_second_order(tau):
     out = send(make("actuator_lag", tau, variant="butterworth"), command)
     assert out == pytest.approx(butterworth(command, tau), abs=1e-9)
     assert send(make("actuator_lag", 0.0, variant="butterworth"), wave()) == pytest.approx(wave(), abs=1e-12)
+
+
+@pytest.mark.parametrize(("tau", "quality"), [(0.02, 1.5), (0.06, 0.5), (0.2, 0.15), (0.003, 10.0), (0.05, 0.02)])
+def test_a_second_order_lag_is_that_of_control_theory(tau, quality):
+    """It rings, is damped just so that it does not, is two lags in a row, rings for long, or hardly has inertia."""
+    command = wave() - wave()[0]
+    out = send(make("second_order_lag", tau, quality), command)
+    assert out == pytest.approx(filtered(command, [1.0], [(quality * tau) ** 2, tau, 1.0]), abs=1e-8)
+
+
+def test_a_second_order_lag_without_inertia_is_of_first_order():
+    without = send(make("second_order_lag", 0.05, 0.0), wave())
+    np.testing.assert_allclose(without, send(make("actuator_lag", 0.05), wave()), rtol=1e-12)
+    np.testing.assert_array_equal(send(make("second_order_lag", 0.0, 1.0), wave()), wave())
 
 
 def test_actuator_lag_is_an_exponential():
