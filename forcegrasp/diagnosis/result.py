@@ -89,6 +89,8 @@ class Step(ShortRepr):
     error_before: float
     error_after: float
     of_many: bool = False  #: it explains little: one of several, or a look-alike of what is not known
+    #: It explains a part of what the forms of effects found before may be off by, and not all of it.
+    may_be_form: bool = False
 
     @property
     def replaces(self) -> str:

@@ -83,6 +83,7 @@ def _step_json(step: Step, diagnosis: Diagnosis) -> dict[str, Any]:
         "verdict": step.verdict or NOTHING,
         "effects": list(step.effects),
         "preferred_because": preference(step),
+        "may_be_form": step.may_be_form,
         "error_before": step.error_before,
         "error_after": step.error_after,
         "ranking": [candidate_json(c, diagnosis) for c in step.candidates],

@@ -110,6 +110,8 @@ def certainty(diagnosis: Diagnosis) -> str:
     if len(weakest.effects) > 1:
         step = "Its weakest step decides: " if several else ""
         return f"{step}Something is missing, but {listed(weakest.effects, 'and')} explain these data alike."
+    if weakest.may_be_form:
+        return f"Its weakest step decides: {name} lowers the error {judged}, but may not be there."
     noise = f"noise alone does as well with a probability of {p:.2g} at most, whichever effect is tried"
     which = f"{name}, the weakest, is clear" if several else "Clear"
     others = "no effect but those that contain it does" if _containing(weakest) else "no other effect does"
@@ -122,7 +124,9 @@ def weakest_step(diagnosis: Diagnosis) -> Step | None:
     """The step on which the verdict rests least firmly; None if none was fitted."""
     fitted = [step for step in kept_steps(diagnosis.steps) if step.candidates]
     return max(
-        fitted, key=lambda s: (len(s.effects) > 1, s.candidates[0].p_family, *_leads(s, diagnosis)), default=None
+        fitted,
+        key=lambda s: (len(s.effects) > 1, s.may_be_form, s.candidates[0].p_family, *_leads(s, diagnosis)),
+        default=None,
     )
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from forcegrasp.diagnosis.evidence import may_be_besides
@@ -53,7 +55,19 @@ def lacks(diagnosis: Diagnosis) -> str:
         names = listed([_with_rivals(step) for step in steps])
     much_left = diagnosis.left and diagnosis.error_after > MUCH * diagnosis.floor
     doubt = " With so much left, some of them may stand for others that they look like." if much_left else ""
-    return f"{_but(diagnosis)}The model lacks {names}.{doubt if len(steps) >= _MANY else ''}"
+    return f"{_but(diagnosis)}The model lacks {names}.{doubt if len(steps) >= _MANY else ''}{_may_be_forms(steps)}"
+
+
+def _may_be_forms(steps: Sequence[Step]) -> str:
+    """Which of the effects found may be no effects but the forms of others; empty if none."""
+    doubted = [step.effects[0] for step in steps if step.may_be_form]
+    if not doubted or len(doubted) == len(steps):
+        return ""
+    them, explain = ("it", "it explains") if len(doubted) == 1 else ("they", "they explain")
+    return (
+        f" But {listed(doubted)} may not be there: {explain} no more than {FORM_TOLERANCE:.0%} of what the others do,"
+        f" and not all that is left, so that {them} may stand for another form of those than the catalogue's."
+    )
 
 
 def stopped_words(diagnosis: Diagnosis) -> str:

@@ -15,6 +15,7 @@ from forcegrasp.diagnosis.faults.fault import Fault
 from forcegrasp.diagnosis.faults.felt_sizes import doubtful_radii
 from forcegrasp.diagnosis.faults.odd_grasps import odd_grasps
 from forcegrasp.diagnosis.faults.suspects import suspects
+from forcegrasp.diagnosis.faults.swapped_forces import grasps_with_swapped_forces
 from forcegrasp.diagnosis.faults.tolerance import move_given, wanted_moves
 from forcegrasp.diagnosis.givens import doubt
 from forcegrasp.diagnosis.givens.doubt import with_fault_beside
@@ -29,6 +30,7 @@ from forcegrasp.identify.fit_set import apply_model, fit_model
 from forcegrasp.identify.fitted_model import model_of
 from forcegrasp.identify.loading import Loaded
 from forcegrasp.identify.problem import Problem
+from forcegrasp.identify.target import make_target
 from forcegrasp.identify.verdict import Verdict
 from forcegrasp.models.model_file import Model
 from forcegrasp.reports.diagnosis import sections
@@ -263,6 +265,13 @@ def row_early(values: np.ndarray) -> np.ndarray:
     return np.concatenate([values[1:], values[-1:]])
 
 
+@pytest.mark.parametrize(("swapped", "told"), [({0, 1, 3}, (0, 1, 3)), ({0}, ()), (set(range(9)), ()), (set(), ())])
+def test_forces_are_swapped_in_some_grasps_if_others_show_that_they_are_not(sound, refitted, swapped, told):
+    """In one it may be where the object stands, and in all that tell it is an effect of the set."""
+    loaded = changed_by_place(sound[0], lambda i, g: {"force_n": g.force_n[:, :: -1 if i in swapped else 1]})
+    assert grasps_with_swapped_forces(make_target(loaded.measured, loaded.gripper), refitted[2].fit) == told
+
+
 @pytest.mark.parametrize(
     ("measured", "name", "told", "change"),
     [
@@ -310,6 +319,12 @@ def row_early(values: np.ndarray) -> np.ndarray:
             "swapped_positions",
             "q_l_m and q_r_m stand for one another",
             lambda i, g: {"position_m": g.position_m[:, ::-1]},
+        ),
+        (
+            "sound",
+            "some_forces_swapped",
+            "f_l_n and f_r_n stand for one another in",
+            lambda i, g: {"force_n": g.force_n[:, :: -1 if i < 4 else 1]},
         ),
         ("pressed_harder", "early_row", "positions and forces are", lambda i, g: {"command_m": row_late(g.command_m)}),
     ],

@@ -70,6 +70,19 @@ def test_many_effects_that_leave_much_may_be_others(made_up, error, count, doubt
     assert ("some of them may stand for others" in told) == doubtful
 
 
+@pytest.mark.parametrize("doubted", [False, True])
+def test_what_may_stand_for_the_form_of_another_is_told_as_that(made_up, doubted):
+    """Damping outside a motor's limit was called a lower limit, beside friction of a form of its own."""
+    diagnosis = two_effects(made_up)
+    first, second = diagnosis.steps
+    diagnosis = dataclasses.replace(diagnosis, steps=(first, dataclasses.replace(second, may_be_form=doubted)))
+    told, sure = diagnosis_answer.answer(diagnosis), dict(box(diagnosis).rows)["How sure"]
+    assert ("But force_drift may not be there: it explains no more than 15% of what the others do" in told) == doubted
+    assert ("force_drift lowers the error on grasps held out of the fit, but may not be there" in sure) == doubted
+    found = diagnosis_as_json.diagnosis_json(diagnosis, None, made_up.tried, "s")
+    assert [step["may_be_form"] for step in found["steps"]] == [False, doubted]
+
+
 @pytest.mark.parametrize("sought", [False, True])
 def test_a_law_that_was_sought_is_not_proposed_again(made_up, sought):
     diagnosis = dataclasses.replace(made_up.diagnosis("unknown"), left="in all", law_sought=sought)

@@ -9,6 +9,7 @@ from forcegrasp.diagnosis.faults.fault import ANY, Fault, with_each
 from forcegrasp.diagnosis.faults.felt_sizes import doubtful_radii
 from forcegrasp.diagnosis.faults.odd_grasps import odd_grasps
 from forcegrasp.diagnosis.faults.recording_faults import RecordingFault, recording_faults
+from forcegrasp.diagnosis.faults.swapped_forces import grasps_with_swapped_forces, with_forces_swapped
 from forcegrasp.diagnosis.faults.swapped_positions import positions_are_swapped, with_positions_swapped
 from forcegrasp.diagnosis.faults.tolerance import MOST, wanted_moves
 from forcegrasp.diagnosis.faults.wrong_radii import most_radii, moved_as_fault, wrong_radii
@@ -22,9 +23,12 @@ from forcegrasp.identify.target import Target
 from forcegrasp.measure.check_givens import clock_factor, times
 from forcegrasp.measure.force_units import find_odd_unit
 from forcegrasp.measure.schema import MeasuredGrasp, MeasurementSet
+from forcegrasp.short_repr import some
 
 # What a scale or a ruler says of a recording's setting is right if it differs by no more than this share.
 _SAME_SETTING = 0.02
+# So many grasps are named.
+_TOLD = 8
 # A set of which a fit leaves less than so many times the noise is not doubted.
 _NOTHING = 1.03
 
@@ -80,12 +84,22 @@ def _slower(grasp: MeasuredGrasp, factor: float) -> MeasuredGrasp:
 
 
 def _of_swapped(loaded: Loaded[MeasurementSet], target: Target, fit: Fit) -> list[Fault]:
-    """Columns of positions that stand for one another; whatever is estimated beside them would come out wrong."""
-    if not positions_are_swapped(target, fit):
-        return []
-    words = f"columns {listed(loaded.measured.columns.position)} stand for one another"
-    check = "which encoder each column is written from: move one finger by hand"
-    return [Fault("swapped_positions", words, check, with_each(loaded, lambda _, g: with_positions_swapped(g)))]
+    """Columns that stand for one another, of positions, or of forces in some of the grasps.
+
+    Whatever is estimated beside them would come out wrong.
+    """
+    measured = loaded.measured
+    if positions_are_swapped(target, fit):
+        words = f"columns {listed(measured.columns.position)} stand for one another"
+        check = "which encoder each column is written from: move one finger by hand"
+        return [Fault("swapped_positions", words, check, with_each(loaded, lambda _, g: with_positions_swapped(g)))]
+    if swapped := grasps_with_swapped_forces(target, fit):
+        names = some([measured.grasps[index].name for index in swapped], _TOLD)
+        words = f"columns {listed(measured.columns.force)} stand for one another in {names}, and not in all others"
+        check = "which sensor each column was written from, in grasps of centred objects too, which do not tell"
+        right = with_each(loaded, lambda index, g: with_forces_swapped(g) if index in swapped else g)
+        return [Fault("some_forces_swapped", words, check, right)]
+    return []
 
 
 def _of_units(loaded: Loaded[MeasurementSet]) -> list[Fault]:

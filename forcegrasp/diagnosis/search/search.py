@@ -231,10 +231,15 @@ def _may_be_another(study: Study, fit: Fit, screen: Screen, effects: Sequence[ty
 
 
 def _of_another(step: Step, study: Study) -> Step:
-    """A step from what may be forms: it found nothing if too much is left for it to be another effect's."""
+    """A step from what may be forms: it found nothing if too much is left for it to be another effect's.
+
+    If something is left at all, what was found may stand for a part of the forms.
+    """
     best = step.candidates[0] if step.effects else None
-    if best is None or best.replaces or best.share > _OF_ANOTHER or not left_over(study, best.fit)[0]:
+    if best is None or best.replaces or not left_over(study, best.fit)[0]:
         return step
+    if best.share > _OF_ANOTHER:
+        return dataclasses.replace(step, may_be_form=True)
     return dataclasses.replace(step, effects=(), error_after=step.error_before)
 
 
