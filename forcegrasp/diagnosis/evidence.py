@@ -131,8 +131,8 @@ def rivals_in(step: Step, fit: Fit) -> list[Candidate]:
 def add_nothing(candidates: Sequence[Candidate]) -> set[str]:
     """Names of effects that contain another one of which held-out grasps say that it is enough, or nearly so.
 
-    Or that have become it, or fit all grasps no better: what they gain then is a quirk of how they are simulated, or of
-    held-out predictions, which are linear.
+    Or that have become it, can't be told from it, or fit all grasps no better: what they gain then is a quirk of how
+    they are simulated, or of held-out predictions, which are linear.
     """
     found = {c.effect.name: c for c in candidates}
     return {
@@ -144,6 +144,7 @@ def add_nothing(candidates: Sequence[Candidate]) -> set[str]:
             not _leads(c, simple)
             or nearly_as_much(simple.heldout_gain, c.heldout_gain)
             or families.is_the_simpler(c.setting, nested)
+            or families.falls_back(c.fit, nested)
             or families.fits_as_well(simple.fit, c.fit)
         )
     }

@@ -27,12 +27,12 @@ def low_pass(effect: Effect, value: np.ndarray, held: np.ndarray) -> np.ndarray:
 
 
 def second_order_low_pass(
-    effect: Effect, value: np.ndarray, held: np.ndarray, lag: np.ndarray, inertia: np.ndarray
+    effect: Effect, value: np.ndarray, held: np.ndarray, lag: np.ndarray, ringing: np.ndarray
 ) -> np.ndarray:
-    """The same of any filter of second order, with times as of :func:`second_order_step`; of first without inertia."""
-    swings = inertia > 0
+    """The same of any filter of second order, with times as of :func:`second_order_step`; where T is 0, of first."""
+    swings = ringing > 0
     first = _closer(held, value, first_order_weight(effect.dt, lag))
-    off, rate = second_order_step(held - value, effect.state["rate"], lag, np.where(swings, inertia, 1.0), effect.dt)
+    off, rate = second_order_step(held - value, effect.state["rate"], lag, np.where(swings, ringing, 1.0), effect.dt)
     effect.state["rate"] = np.where(swings, rate, 0.0)
     return np.where(swings, value + off, first)
 
@@ -42,7 +42,7 @@ def _closer(held: np.ndarray, value: np.ndarray, weight: np.ndarray) -> np.ndarr
 
 
 def second_order_step(
-    off: np.ndarray, rate: np.ndarray, lag: np.ndarray, inertia: np.ndarray, dt: float
+    off: np.ndarray, rate: np.ndarray, lag: np.ndarray, ringing: np.ndarray, dt: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """How far what comes out is off what goes in after a step, and its rate; exactly: T² x'' + τ x' + x = 0.
 
@@ -50,10 +50,10 @@ def second_order_step(
       off: how far it is off before the step, of any shape.
       rate: by how much it grows in a second.
       lag: τ, seconds, of a shape that broadcasts to that.
-      inertia: T, 1/(2π) of the period in which it would ring without damping, seconds, more than 0, of such a shape.
+      ringing: T, 1/(2π) of the period in which it would ring without damping, seconds, more than 0, of such a shape.
       dt: the step, seconds.
     """
-    stiffness, decay = 1 / inertia**2, lag / (2 * inertia**2)
+    stiffness, decay = 1 / ringing**2, lag / (2 * ringing**2)
     apart = np.sqrt(decay**2 - stiffness + 0j)  # of the two rates, which are complex where it rings
     fast = -decay - apart
     slow = stiffness / fast

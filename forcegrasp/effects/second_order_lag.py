@@ -11,23 +11,26 @@ from forcegrasp.effects.low_pass import second_order_low_pass
 class SecondOrderLag(Effect):
     """A servo's own loop, or a filter of its set points, whose response is of second order.
 
-    Its natural frequency is 1/(2πQτ), its damping ratio 1/(2Q). With Q above 1/2 it overshoots, below it is two lags of
-    first order in a row, and with Q = 0 one.
+    Its natural frequency is 1/(2π √(τ T)), its damping ratio √(τ / T) / 2. With T above τ / 4 it overshoots, below that
+    it is two lags of first order in a row, and with T = 0 one.
     """
 
     name = "second_order_lag"
     stage = "actuator"
     family = "delay"
     symptom = "steps in the command arrive late and rounded, and overshoot, in free air too"
-    formula = "(Qτ)² d²u'/dt² + τ du'/dt = u − u'"
+    formula = "τ (T d²u'/dt² + du'/dt) = u − u'"
     source = "closed loop of a position servo of limited bandwidth, as control textbooks have it (Franklin et al.)"
     look_alikes = ("actuator_lag", "command_delay", "rate_limited_lag", "velocity_lag", "elastic_transmission")
     separates = "fast steps in free air: a lag of first order starts at its largest speed, and never overshoots"
     parameters = (
         Parameter("time_constant_s", "time constant τ", "s", 0.0, 0.5, 0.04, trials=(0.01, 0.03, 0.09)),
-        Parameter("quality_factor", "quality factor Q", "1", 0.0, 10.0, 1.0, null=1.0, trials=(0.4, 0.8, 1.6)),
-    )
-    contains = (Nested("actuator_lag", at={"quality_factor": 0.0}, same={"time_constant_s": "time_constant_s"}),)
+        Parameter(
+            "inertia_s", "time constant of its speed T, inertia ÷ damping", "s", 0.0, 0.5, 0.04, null=0.04,
+            trials=(0.005, 0.02, 0.06),
+        ),
+    )  # fmt: skip
+    contains = (Nested("actuator_lag", at={"inertia_s": 0.0}, same={"time_constant_s": "time_constant_s"}),)
     order = 1
     known_beforehand = ("",)
 
@@ -37,6 +40,6 @@ class SecondOrderLag(Effect):
 
     def command(self, command: np.ndarray, fresh: np.ndarray) -> np.ndarray:
         tau = self["time_constant_s"]
-        inertia = self["quality_factor"] * tau
-        self.state["held"] = held = second_order_low_pass(self, command, self.state["held"], tau, inertia)
+        ringing = np.sqrt(tau * self["inertia_s"])
+        self.state["held"] = held = second_order_low_pass(self, command, self.state["held"], tau, ringing)
         return held

@@ -66,15 +66,19 @@ def test_effects_that_contain_one_another_are_related():
 
 
 @pytest.mark.parametrize(
-    ("lead", "fits_better", "redundant"),
+    ("lead", "fits_better", "falls_back", "redundant"),
     [
-        (np.array([3.0, -3.0, 2.0, -2.0]), True, True),  # no lead
-        (np.full(4, 3.0), True, True),  # a sure one, of 3 % of what the simple one gains
-        (np.full(4, 30.0), True, False),
-        (np.full(4, 30.0), False, True),  # of held-out grasps alone, whose predictions are linear
+        (np.array([3.0, -3.0, 2.0, -2.0]), True, False, True),  # no lead
+        (np.full(4, 3.0), True, False, True),  # a sure one, of 3 % of what the simple one gains
+        (np.full(4, 30.0), True, False, False),
+        (np.full(4, 30.0), False, False, True),  # of held-out grasps alone, whose predictions are linear
+        (np.full(4, 30.0), True, True, True),  # of what it has besides, which can't be told from nothing
     ],
 )
-def test_an_effect_must_explain_more_than_the_one_it_contains(made_up, lead, fits_better, redundant):
+def test_an_effect_must_explain_more_than_the_one_it_contains(
+    made_up, monkeypatch, lead, fits_better, falls_back, redundant
+):
+    monkeypatch.setattr(families, "falls_back", lambda fit, nested: falls_back)
     good = made_up.diagnosis("effect").steps[0].candidates[0]
 
     def candidate(name: str, gains: np.ndarray, less: float = 1.0):
@@ -88,8 +92,11 @@ def test_an_effect_must_explain_more_than_the_one_it_contains(made_up, lead, fit
 
 
 @pytest.mark.parametrize(("creep", "redundant"), [(0.0, True), (1e-7, True), (5e-6, False)])
-def test_an_effect_that_has_become_the_one_it_contains_adds_nothing_whatever_it_gains(made_up, creep, redundant):
+def test_an_effect_that_has_become_the_one_it_contains_adds_nothing_whatever_it_gains(
+    made_up, monkeypatch, creep, redundant
+):
     """Friction that fell below 0.2 µm/s held the finger for some steps, as a delay does, and was taken for it."""
+    monkeypatch.setattr(families, "falls_back", lambda fit, nested: False)
     good = made_up.diagnosis("effect").steps[0].candidates[0]
     simple = dataclasses.replace(good, setting=EffectSetting.typical(get_effect("coulomb_friction")))
     smooth = EffectSetting(get_effect("smooth_friction"), "", np.array([0.03, creep]))
