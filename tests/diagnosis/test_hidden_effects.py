@@ -139,7 +139,7 @@ def test_adds_an_effect_that_the_base_model_has_made_up_for(tmp_path):
     firm = load(tmp_path / "set")
     target, _, base = fit_model(firm, 0, silent)
     added = add_effect(firm, model_of(base.fit, target, firm, []), get_effect("contact_onset"), silent)
-    # from the base model's place alone, which is that of other gains, it ends at 2
+    # from the base model's place alone, which is that of other gains, it may end at 2, by processor
     assert rms_error(added.after, added.target) < 1.1
     assert added.error_after < 1.5  # of grasps that hit as hard as these, what is held out differs by processor
     assert added.model.effects[0].parameters["share"].value == pytest.approx(0.505, abs=0.02)
