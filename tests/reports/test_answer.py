@@ -72,7 +72,6 @@ def test_many_effects_that_leave_much_may_be_others(made_up, error, count, doubt
 
 @pytest.mark.parametrize("doubted", [False, True])
 def test_what_may_stand_for_the_form_of_another_is_told_as_that(made_up, doubted):
-    """Damping outside a motor's limit was called a lower limit, beside friction of a form of its own."""
     diagnosis = two_effects(made_up)
     first, second = diagnosis.steps
     diagnosis = dataclasses.replace(diagnosis, steps=(first, dataclasses.replace(second, may_be_form=doubted)))
