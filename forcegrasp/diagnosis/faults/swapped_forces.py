@@ -6,6 +6,7 @@ import dataclasses
 
 import numpy as np
 
+from forcegrasp.diagnosis.faults.swapped_positions import with_columns_exchanged
 from forcegrasp.identify.fit import Fit
 from forcegrasp.identify.target import Target
 from forcegrasp.measure.schema import MeasuredGrasp
@@ -24,10 +25,8 @@ def grasps_with_swapped_forces(target: Target, fit: Fit) -> tuple[int, ...]:
     forces = target.axis.forces
     if forces.stop - forces.start != 2:
         return ()
-    signals = target.signals.copy()
-    signals[..., forces] = target.signals[..., forces][..., ::-1]
-    exchanged = dataclasses.replace(target, signals=signals)
-    left, left_so = (one.residual(fit.predicted) for one in (target, exchanged))
+    both_ways = target, with_columns_exchanged(target, forces)
+    left, left_so = (one.residual(fit.predicted) for one in both_ways)
     felt, felt_so = (np.sum(one[..., forces] ** 2, axis=(1, 2)) for one in (left, left_so))
     swapped = np.flatnonzero(felt > _TELLS * felt_so)
     return tuple(swapped.tolist()) if len(swapped) >= _FEWEST and np.any(felt_so > _TELLS * felt) else ()

@@ -18,10 +18,15 @@ def positions_are_swapped(target: Target, fit: Fit) -> bool:
     positions = target.axis.positions
     if positions.stop - positions.start != 2:
         return False
-    signals = target.signals.copy()
-    signals[..., positions] = target.signals[..., positions][..., ::-1]
-    exchanged = dataclasses.replace(target, signals=signals).residual(fit.predicted)
+    exchanged = with_columns_exchanged(target, positions).residual(fit.predicted)
     return target.beyond_noise(exchanged) < (1 - WORTH_A_FIT) * target.beyond_noise(fit.residual)
+
+
+def with_columns_exchanged(target: Target, columns: slice) -> Target:
+    """The measurements with the left and the right one of two channels, such as both positions, exchanged."""
+    signals = target.signals.copy()
+    signals[..., columns] = target.signals[..., columns][..., ::-1]
+    return dataclasses.replace(target, signals=signals)
 
 
 def with_positions_swapped(grasp: MeasuredGrasp) -> MeasuredGrasp:
