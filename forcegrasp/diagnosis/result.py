@@ -12,10 +12,11 @@ import numpy as np
 from forcegrasp.diagnosis.faults.fault import Fault
 from forcegrasp.diagnosis.faults.odd_grasps import OddGrasp
 from forcegrasp.diagnosis.found_law import FoundLaw
+from forcegrasp.diagnosis.leads import Lead
 from forcegrasp.diagnosis.noise.clock_jitter import ClockJitter, clock_jitter
 from forcegrasp.diagnosis.noise.noise_check import Noise, is_uneven_noise
 from forcegrasp.diagnosis.signatures import Score
-from forcegrasp.diagnosis.verdict import MUCH, explained_share
+from forcegrasp.diagnosis.verdict import LITTLE, MUCH, explained_share
 from forcegrasp.effects import Effect
 from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.identify.base_fit import BaseFit
@@ -89,8 +90,6 @@ class Step(ShortRepr):
     error_before: float
     error_after: float
     of_many: bool = False  #: it explains little: one of several, or a look-alike of what is not known
-    #: It explains a part of what the forms of effects found before may be off by, and not all of it.
-    may_be_form: bool = False
 
     @property
     def replaces(self) -> str:
@@ -163,6 +162,7 @@ class Diagnosis(ShortRepr):
     #: them out.
     bolder: Diagnosis | None = None
     stopped: str = ""  #: why the search was cut short, in words; empty if it was not
+    leads: tuple[Lead, ...] = ()  #: what promised most by then, which was not judged yet, best first
     left_out: tuple[OddGrasp, ...] = ()  #: grasps of which the rest does not speak, with what the final model leaves
     alone: str = ""  #: the one grasp that shows more than noise, in words, where all others show none; empty if none
     may_be_forms: bool = False  #: whether what is left is no more than the forms of what was found may be off by
@@ -232,6 +232,18 @@ class Diagnosis(ShortRepr):
         most, total = 1.0 - max(0.0, self.error_after**2 - 1.0) / beyond, sum(shares.values())
         factor = min(1.0, most / total) if total > 0 else 1.0
         return {name: factor * share for name, share in shares.items()}
+
+    @property
+    def doubted(self) -> tuple[str, ...]:
+        """Effects that were found, but may stand for another form of the largest of them than the catalogue's.
+
+        They explain little beside it, and not all that it leaves. Of a servo none is: motions that are held out as
+        wholes show what of the largest one's form another effect explains.
+        """
+        shares = self.shares()
+        if not self.left or self.target.gripper.is_servo:
+            return ()
+        return tuple(name for name, share in shares.items() if share < LITTLE * max(shares.values()))
 
     def summary(self) -> str:
         change = f"error {self.error_before:.2f} → {self.error_after:.2f} × noise, floor {self.floor:.2f}"

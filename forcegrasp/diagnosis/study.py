@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
+from forcegrasp.diagnosis.leads import Leads
 from forcegrasp.diagnosis.verdict import explained_share
 from forcegrasp.identify.cross_validation import (
     heldout_residual,
@@ -49,17 +50,26 @@ class Study:
     rough: Replay | None = None  #: simulates what only ranks; the cheap one by default
     #: whether what the set gives, moved within its tolerance, explains what a fit leaves; not asked by default
     given_explains: Callable[[Target, Fit], bool] = lambda _target, _fit: False
+    leads: Leads = field(default_factory=Leads)  #: fits with one more effect, until they are judged
 
     def heldout(self, fit: Fit) -> np.ndarray:
         """Residuals of held-out grasps, ``(G, S, C)``."""
         return heldout_residual(fit, self.target, self.folds)
 
-    def telling(self, words: str, task: Callable[[], Fit]) -> Callable[[], Fit]:
-        """A task that ends by telling how much error its fit leaves."""
+    def telling(self, words: str, task: Callable[[], Fit], without: Fit) -> Callable[[], Fit]:
+        """A task that ends by telling how much error its fit leaves, and by taking it down as a lead.
+
+        Args:
+          words: what is fitted.
+          task: fits with one more effect.
+          without: the fit without it.
+        """
 
         def told() -> Fit:
             fit = task()
-            self.progress(f"{words}: {rms(fit.residual, self.target):.2f} × noise")
+            before, after = (rms(one.residual, self.target) for one in (without, fit))
+            self.progress(f"{words}: {before:.2f} → {after:.2f} × noise")
+            self.leads.add(fit, without, self.target)
             return fit
 
         return told
@@ -70,7 +80,7 @@ class Study:
             return self, fit
         keep, target = self.few.keep, self.target.subset(self.few.keep)
         numerical = tuple(one[keep][:, : target.mask.shape[1]] for one in self.numerical)
-        few = Study(target, self.few.simulators, (), numerical, self.progress, rough=self.few.rough)
+        few = Study(target, self.few.simulators, (), numerical, self.progress, rough=self.few.rough, leads=self.leads)
         return few, fit.subset(keep)
 
     def error(self, residual: np.ndarray) -> float:

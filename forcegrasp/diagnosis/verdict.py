@@ -12,6 +12,8 @@ LEAST_SHARE = 0.25
 EXPLAINED = 0.5
 #: Where more than so many times the floor is left, they must explain this share of it: a look-alike takes half.
 FAR, EXPLAINED_FAR = 2.0, 0.9
+#: An effect that explains less than this share of what another does, and not all that is left, may be that one's form.
+LITTLE = 0.05
 #: Where an answer leaves more than so many times the floor, what is still missing may have decided between rivals.
 MUCH = 1.5
 

@@ -110,7 +110,7 @@ def certainty(diagnosis: Diagnosis) -> str:
     if len(weakest.effects) > 1:
         step = "Its weakest step decides: " if several else ""
         return f"{step}Something is missing, but {listed(weakest.effects, 'and')} explain these data alike."
-    if weakest.may_be_form:
+    if name in d.doubted:
         return f"Its weakest step decides: {name} lowers the error {judged}, but may not be there."
     noise = f"noise alone does as well with a probability of {p:.2g} at most, whichever effect is tried"
     which = f"{name}, the weakest, is clear" if several else "Clear"
@@ -122,10 +122,10 @@ def certainty(diagnosis: Diagnosis) -> str:
 
 def weakest_step(diagnosis: Diagnosis) -> Step | None:
     """The step on which the verdict rests least firmly; None if none was fitted."""
-    fitted = [step for step in kept_steps(diagnosis.steps) if step.candidates]
+    fitted, doubted = [step for step in kept_steps(diagnosis.steps) if step.candidates], diagnosis.doubted
     return max(
         fitted,
-        key=lambda s: (len(s.effects) > 1, s.may_be_form, s.candidates[0].p_family, *_leads(s, diagnosis)),
+        key=lambda s: (len(s.effects) > 1, s.effects[0] in doubted, s.candidates[0].p_family, *_leads(s, diagnosis)),
         default=None,
     )
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from forcegrasp.diagnosis.evidence import may_be_besides
@@ -55,18 +53,18 @@ def lacks(diagnosis: Diagnosis) -> str:
         names = listed([_with_rivals(step) for step in steps])
     much_left = diagnosis.left and diagnosis.error_after > MUCH * diagnosis.floor
     doubt = " With so much left, some of them may stand for others that they look like." if much_left else ""
-    return f"{_but(diagnosis)}The model lacks {names}.{doubt if len(steps) >= _MANY else ''}{_may_be_forms(steps)}"
+    return f"{_but(diagnosis)}The model lacks {names}.{doubt if len(steps) >= _MANY else ''}{_doubts(diagnosis)}"
 
 
-def _may_be_forms(steps: Sequence[Step]) -> str:
-    """Which of the effects found may be no effects but the forms of others; empty if none."""
-    doubted = [step.effects[0] for step in steps if step.may_be_form]
-    if not doubted or len(doubted) == len(steps):
+def _doubts(diagnosis: Diagnosis) -> str:
+    """Which of the effects found may be no effects but the form of the largest; empty if none."""
+    if not (doubted := diagnosis.doubted):
         return ""
-    them, explain = ("it", "it explains") if len(doubted) == 1 else ("they", "they explain")
+    shares = diagnosis.shares()
+    largest, they = max(shares, key=lambda name: shares[name]), "it explains" if len(doubted) == 1 else "they explain"
     return (
-        f" But {listed(doubted)} may not be there: {explain} no more than {FORM_TOLERANCE:.0%} of what the others do,"
-        f" and not all that is left, so that {them} may stand for another form of those than the catalogue's."
+        f" But {listed(doubted)} may not be there: beside {largest} {they} little, and not all that is left, and may"
+        f" stand for another form of {largest} than the catalogue's."
     )
 
 
@@ -76,7 +74,18 @@ def stopped_words(diagnosis: Diagnosis) -> str:
         return ""
     named = diagnosis.verdict.names_effects or diagnosis.fault is not None
     found = "what is named here was found by then" if named else "nothing was found by then"
-    return f"The search did not end, for {diagnosis.stopped}: {found}, and not all effects were tried."
+    told = f"The search did not end, for {diagnosis.stopped}: {found}, and not all effects were tried."
+    return " ".join(filter(None, (told, _leads_words(diagnosis, "besides " if named else ""))))
+
+
+def _leads_words(diagnosis: Diagnosis, besides: str) -> str:
+    """What promised most when a search was cut short; empty if nothing did."""
+    part = diagnosis.target.part
+    leads = [
+        f"{lead.effect} (error of {lead.grasps} {part}s {lead.error_before:.2f} → {lead.error_after:.2f} × noise)"
+        for lead in diagnosis.leads
+    ]
+    return f"What promised most {besides}by then, but may not be there, is {listed(leads)}." if leads else ""
 
 
 def left_out_words(diagnosis: Diagnosis) -> str:

@@ -44,7 +44,12 @@ def after_diagnosis(
     if d.stopped and d.verdict.lacks_effects:
         return [Command("go on from what was found", _line("diagnose", f"data={data}", f"model={found}"))]
     if d.stopped:
-        return [Command("give it more time", again)]
+        leads = [
+            Command(f"see what {lead.effect} does",
+                    _line("add", f"data={data}", f"model={known}", f"effect={lead.effect}", "out=better.yaml"))
+            for lead in d.leads[:1]
+        ]  # fmt: skip
+        return [Command("give it more time", again), *leads]
     shorter = shorter_step(d)
     finer = [] if shorter is None else [Command(f"make the scene's timestep {shorter:g} s, and diagnose again", again)]
     if d.verdict is Verdict.NOT_FITTED:

@@ -135,8 +135,7 @@ def test_one_that_leaves_something_must_explain_half_of_it(monkeypatch, share, l
     step = Step(("force_lag",), (best,), (), 1.5, 1.2)
     monkeypatch.setattr(search, "left_over", lambda study, fit: (left, None))
     found = search._of_another(step, cast(Any, None))
-    doubted = bool(left) and not replaces
-    assert found == (dataclasses.replace(step, may_be_form=doubted) if is_found else Step((), (best,), (), 1.5, 1.5))
+    assert found == (step if is_found else Step((), (best,), (), 1.5, 1.5))
 
 
 def test_nor_is_one_of_the_same_family(small, monkeypatch):

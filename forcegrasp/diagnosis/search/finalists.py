@@ -237,7 +237,9 @@ class Finalists:
         fitted = [c for c in candidates if not c.replaces]  # the others were fitted to the end already
         every = [one for c in fitted for one in (c, *alike[c.effect.name])]
         tasks = [
-            self._study.telling(f"{one.setting.title}, to the end", partial(to_the_end, one.fit, self._study))
+            self._study.telling(
+                f"{one.setting.title}, to the end", partial(to_the_end, one.fit, self._study), self._fit
+            )
             for one in every
         ]
         ends = list(zip(side_by_side(tasks), every, strict=True))

@@ -62,7 +62,7 @@ def refine(scores: Sequence[Score], study: Study, fit: Fit, background: Backgrou
         study.progress(f"fitting each of {len(settings)} effects and variants, {where}")
     tasks = [partial(fit_with, [setting], part.vector, some, part) for setting in settings]
     fits = side_by_side(
-        [some.telling(f"{one.title}, {where}", task) for one, task in zip(settings, tasks, strict=True)]
+        [some.telling(f"{one.title}, {where}", task, part) for one, task in zip(settings, tasks, strict=True)]
     )
     stalled = [i for i, one in enumerate(fits) if one.cost > part.cost]  # a size too far off for slopes to lead back
     tasks = [partial(roughly_as, trials_of(*settings[i].kind), part, (), some) for i in stalled]
@@ -77,7 +77,7 @@ def refine(scores: Sequence[Score], study: Study, fit: Fit, background: Backgrou
         setting = few.effects[-1]
         start = fit.moved(part.problem, few.vector[: len(part.problem)])
         task = partial(fit_with, [setting], start, study, fit)
-        tasks.append(study.telling(f"{setting.title}, on all grasps", task))
+        tasks.append(study.telling(f"{setting.title}, on all grasps", task, fit))
     return [Refined(pairs[i][1], refitted) for i, refitted in zip(left, side_by_side(tasks), strict=True)]
 
 
@@ -98,7 +98,8 @@ def refine_anyway(
     """
     some, part = study.on_few(fit)
     rough = partial(roughly_as, fit=part, without=without, study=some, at_the_end=some is study)
-    few = side_by_side([partial(rough, trials([effect])) for effect in effects])
+    where = "on all grasps" if some is study else f"on {len(some.target.grasps)} grasps"
+    few = side_by_side([some.telling(f"{e.name}, {where}", partial(rough, trials([e])), part) for e in effects])
     elsewhere: list[Fit] = []
     if not without and rms_error(part, some.target) > _MADE_UP:
         elsewhere = side_by_side([partial(rough, trials([effect]), begin=as_given(part)) for effect in effects])
@@ -111,7 +112,7 @@ def refine_anyway(
         one, setting = few[index], few[index].effects[-1]
         begin = fit.moved(part.problem, one.vector[: len(part.problem)]) if one in elsewhere else None
         task = partial(roughly_as, [setting], fit, without, study, begin=begin)
-        tasks.append(study.telling(f"{setting.title}, on all grasps", task))
+        tasks.append(study.telling(f"{setting.title}, on all grasps", task, fit))
     return side_by_side(tasks)
 
 

@@ -53,6 +53,7 @@ class RoughFits:
             self._study.telling(
                 f"{effect.name} in place of {name}",
                 partial(families.refit_as_richer, effect, self._fit, name, self._study),
+                self._fit,
             )
             for name, effect in pairs
         ]
@@ -76,6 +77,5 @@ class RoughFits:
         # what takes the place of the scene's own law has no small size, and a signature that says little
         effects = [e for place, e in enumerate(ordered) if place < _FITTED_ANYWAY or e.instead_of]
         effects += [e for e in best_as_given(ordered, self._study, self._fit, _AS_GIVEN) if e not in effects]
-        for effect in effects:
-            self._study.progress(f"fitting {effect.name} to few grasps, though it promises little")
+        self._study.progress(f"fitting {len(effects)} effects, though their signatures promise little")
         return [self._start.judge_by_gain(fit, self._null) for fit in refine_anyway(effects, self._study, self._fit)]

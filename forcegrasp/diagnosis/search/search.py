@@ -129,7 +129,9 @@ def diagnose(
         return found
     except REASONS as reason:
         stopped = cut_short(reason, progress)
-        return dataclasses.replace(concluded(begun, *so_far.sure, in_a_hurry=True), stopped=stopped)
+        study, steps, fit = so_far.sure
+        found = concluded(begun, study, steps, fit, in_a_hurry=True)
+        return dataclasses.replace(found, stopped=stopped, leads=study.leads.beside(fit))
 
 
 def _add_effects(so_far: SoFar, begun: Begun, rng: np.random.Generator, stop_when: StopWhen) -> Fit | None:
@@ -231,15 +233,10 @@ def _may_be_another(study: Study, fit: Fit, screen: Screen, effects: Sequence[ty
 
 
 def _of_another(step: Step, study: Study) -> Step:
-    """A step from what may be forms: it found nothing if too much is left for it to be another effect's.
-
-    If something is left at all, what was found may stand for a part of the forms.
-    """
+    """A step from what may be forms: it found nothing if too much is left for it to be another effect's."""
     best = step.candidates[0] if step.effects else None
-    if best is None or best.replaces or not left_over(study, best.fit)[0]:
+    if best is None or best.replaces or best.share > _OF_ANOTHER or not left_over(study, best.fit)[0]:
         return step
-    if best.share > _OF_ANOTHER:
-        return dataclasses.replace(step, may_be_form=True)
     return dataclasses.replace(step, effects=(), error_after=step.error_before)
 
 
