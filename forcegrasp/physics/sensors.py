@@ -57,6 +57,10 @@ class ReadingEffects:
 
     def apply_to_all(self, position: np.ndarray, force: np.ndarray) -> None:
         """The same of all instants of grasps, ``(n, steps, motors)`` and ``(n, steps, channels)``."""
+        if set(self._position) & set(self._force):  # what knows both, as a law does, is to see them of one instant
+            for step in range(position.shape[1]):
+                self.apply(position[:, step], force[:, step])
+            return
         for effect in self._position:
             position[effect.rows] = effect.read_positions(position[effect.rows].swapaxes(0, 1)).swapaxes(0, 1)
         for effect in self._force:

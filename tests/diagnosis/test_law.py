@@ -40,6 +40,26 @@ def test_the_right_term_is_found(bent):
     assert law.share > 0.8
 
 
+def test_a_curve_whose_turning_point_is_on_the_way_is_found():
+    """A cable that pulls at a sensor, most where the gripper is half open: with a line or a square much was left."""
+    loaded = light_set(seed=15, grasps=6)
+    pulled = [
+        dataclasses.replace(g, force_n=g.force_n + 120 * g.position_m * (g.position_m - 0.045))
+        for g in loaded.measured.grasps
+    ]
+    loaded = dataclasses.replace(loaded, measured=dataclasses.replace(loaded.measured, grasps=tuple(pulled)))
+    found, _ = diagnose_set(loaded, None, ["force_saturation"], 0, silent, law=True)
+    law = found.law
+    assert law is not None
+    assert (law.law.formula_of.place, law.law.formula_of.expression) == (
+        "force",
+        "c1 * position * (position - centre1)",
+    )
+    assert law.parameters["c1"].value == pytest.approx(120, rel=0.2)
+    assert law.parameters["centre1"].value == pytest.approx(0.045, abs=2e-3)
+    assert law.error_after < 1.1 * found.floor < law.error_before
+
+
 def test_it_is_told_in_words_and_as_data(bent):
     told = law_json(bent.law)
     assert told is not None

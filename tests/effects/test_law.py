@@ -13,6 +13,7 @@ from forcegrasp.effects.law import read_law, write_law
 from forcegrasp.errors import ConfigError, PhysicsError
 from forcegrasp.physics.gripper_file import load_gripper
 from forcegrasp.physics.plant import Plant
+from forcegrasp.physics.sensors import ReadingEffects
 
 SIGNALS = ("position", "velocity", "force")
 
@@ -91,6 +92,25 @@ def test_a_law_acts_and_at_zero_changes_no_bit(tmp_path, place, expression, size
     write_law(law, tmp_path / "again.yaml")
     again = read_law(tmp_path / "again.yaml", load_gripper("tiago"))
     assert (again.name, again.formula, again.parameters) == (law.name, law.formula, law.parameters)
+
+
+@pytest.mark.parametrize(
+    ("place", "expression"),
+    [("force", "c * position"), ("force", "c * acceleration"), ("position", "c * force"), ("force", "c * force**2")],
+)
+def test_a_law_of_readings_sees_position_and_force_of_one_instant(tmp_path, place, expression):
+    """A whole grasp was read position after position, and then force after force: each with the last position."""
+    law = read_law(written(tmp_path, place, expression, c=0.5), load_gripper("tiago"))
+    positions, forces = np.random.default_rng(0).random((2, 1, 6, 2))
+    whole, by_instant = (ReadingEffects([law(law.typical_values()[None], 0.002)]) for _ in range(2))
+    read = positions.copy(), forces.copy()
+    whole.apply_to_all(*read)
+    expected = positions.copy(), forces.copy()
+    for step in range(6):
+        by_instant.apply(expected[0][:, step], expected[1][:, step])
+    np.testing.assert_array_equal(read, expected)
+    if expression == "c * position":
+        np.testing.assert_allclose(read[1], forces + 0.5 * positions)
 
 
 @pytest.mark.parametrize(

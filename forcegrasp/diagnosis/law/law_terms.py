@@ -22,8 +22,10 @@ from forcegrasp.identify.target import Target
 # how much the phases of two fingers' waves are apart, if there are two.
 # Units: L of a position, T of time, F of a force, E of {e}.
 _WAVE = ("sin(6.28319 * position / period + phase{side})", "")
+# Neither a line nor a square alone comes near a curve whose turning point is on the way.
+_CURVE = ("position * (position - centre)", "L²")
 _MOTOR = (
-    ("1", ""), ("position", "L"), ("position**2", "L²"),
+    ("1", ""), ("position", "L"), ("position**2", "L²"), _CURVE,
     ("velocity", "L/T"), ("abs(velocity) * velocity", "L²/T²"), ("velocity**2", "L²/T²"), ("tanh(velocity / {v})", ""),
     ("position * velocity", "L²/T"), ("position**2 * velocity", "L³/T"), ("force * velocity", "F·L/T"),
     ("sign(force) * velocity", "L/T"), ("{e} * velocity", "E·L/T"),
@@ -37,11 +39,11 @@ _MOTOR = (
 _FORCE = (
     ("sign(force)", ""), ("force * abs(force)", "F²"), ("force**3", "F³"), ("force * position", "F·L"),
     ("force * time", "F·T"), ("force * velocity", "F·L/T"), ("memory(force, tau)", "F"), ("position", "L"),
-    ("position**2", "L²"), ("velocity", "L/T"), ("abs(velocity) * velocity", "L²/T²"), ("acceleration", "L/T²"),
+    ("position**2", "L²"), _CURVE, ("velocity", "L/T"), ("abs(velocity) * velocity", "L²/T²"), ("acceleration", "L/T²"),
     ("time", "T"), ("time**2", "T²"),
 )  # fmt: skip
 _POSITION = (
-    ("position", "L"), ("position**2", "L²"), ("position**3", "L³"), ("velocity", "L/T"), ("force", "F"),
+    ("position", "L"), ("position**2", "L²"), _CURVE, ("position**3", "L³"), ("velocity", "L/T"), ("force", "F"),
     ("force * abs(force)", "F²"), ("sign(force)", ""), ("force * position", "F·L"), ("memory(force, tau)", "F"),
     ("time", "T"), ("time**2", "T²"), ("time_since_contact", "T"),
     _WAVE,
