@@ -75,17 +75,17 @@ def stopped_words(diagnosis: Diagnosis) -> str:
     named = diagnosis.verdict.names_effects or diagnosis.fault is not None
     found = "what is named here was found by then" if named else "nothing was found by then"
     told = f"The search did not end, for {diagnosis.stopped}: {found}, and not all effects were tried."
-    return " ".join(filter(None, (told, _leads_words(diagnosis, "besides " if named else ""))))
+    return " ".join(filter(None, (told, _leads_words(diagnosis, "What else" if named else "What"))))
 
 
-def _leads_words(diagnosis: Diagnosis, besides: str) -> str:
+def _leads_words(diagnosis: Diagnosis, what: str) -> str:
     """What promised most when a search was cut short; empty if nothing did."""
     part = diagnosis.target.part
     leads = [
         f"{lead.effect} (error of {lead.grasps} {part}s {lead.error_before:.2f} → {lead.error_after:.2f} × noise)"
         for lead in diagnosis.leads
     ]
-    return f"What promised most {besides}by then, but may not be there, is {listed(leads)}." if leads else ""
+    return f"{what} promised most by then, but may not be there, is {listed(leads)}." if leads else ""
 
 
 def left_out_words(diagnosis: Diagnosis) -> str:

@@ -103,5 +103,5 @@ def test_what_was_found_is_told_apart_from_what_promised_most(made_up, verdict):
     take_down(leads, 4, 1.5, "backlash", grasps=3)
     (lead,) = leads.beside(leaving(3, grasps=12)[0])
     found = dataclasses.replace(made_up.diagnosis(verdict), stopped="its 3 min were over", leads=(lead,))
-    besides = "besides " if verdict == "effect" else ""
-    assert f"What promised most {besides}by then, but may not be there, is backlash" in answer(found)
+    what = "What else" if verdict == "effect" else "What"
+    assert f"{what} promised most by then, but may not be there, is backlash" in answer(found)
