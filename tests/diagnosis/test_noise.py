@@ -231,10 +231,17 @@ def test_chance_gains_more_where_noise_is_slow():
     assert as_is.mean() / white.mean() == pytest.approx(1.6 / 0.4, rel=0.05)
 
 
+def kicked_where_motion_begins_and_ends(residual: np.ndarray) -> np.ndarray:
+    """As by the mass of a fingertip, which its sensor feels: of a few readings, and no larger than tails are."""
+    kicks = np.diff(MOVING.astype(float), prepend=0.0)[:, None] * [0, 0, 3.5, 3.5]
+    return residual + kicks
+
+
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize(
     "spoil",
     [
+        kicked_where_motion_begins_and_ends,
         level,
         louder_in_one_phase,
         louder_when_pressed,

@@ -40,6 +40,8 @@ _MOST_SLOW = 4.0
 _LEVELLED = 3
 # Random features, what a unit of their weights costs, and folds of grasps.
 _FEATURES, _RIDGE, _FOLDS = 100, 1.0, 4
+# Below this quantile of how fast motion changes it is steady: a mass that is moved along shows beyond it alone.
+_JERKED = 0.9
 # Half of a normal distribution lies within so many σ.
 _MEDIAN = float(ndtri(0.75))
 
@@ -177,7 +179,9 @@ def _normal_scores(values: np.ndarray, there: np.ndarray) -> np.ndarray:
 
 
 def _partitions(target: Target, predicted: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Phases, slow and fast, lightly and strongly pressed: where most errors of a model would differ, each ``(G, S)``.
+    """Phases, slow and fast, steady and jerked, lightly and strongly pressed, each ``(G, S)``.
+
+    That is where most errors of a model would differ.
 
     Args:
       target: the measurements.
@@ -186,8 +190,10 @@ def _partitions(target: Target, predicted: np.ndarray) -> tuple[np.ndarray, ...]
     position = predicted[..., 0]
     motion = np.abs(np.diff(position, axis=1, prepend=position[:, :1]))
     sizes = (motion, *np.moveaxis(predicted[..., 1:], -1, 0))
-    halves = (np.where(x > np.median(x[target.mask]), 1, 0) for x in sizes)
-    return target.phase, *(np.where(target.mask, half, -1) for half in halves)
+    change = np.abs(np.diff(motion, axis=1, prepend=motion[:, :1]))
+    split = [(x, 0.5) for x in sizes] + [(change, _JERKED)]
+    parts = (np.where(x > np.quantile(x[target.mask], share), 1, 0) for x, share in split)
+    return target.phase, *(np.where(target.mask, part, -1) for part in parts)
 
 
 def _grouped(values: np.ndarray, partition: np.ndarray) -> list[np.ndarray]:
