@@ -116,10 +116,11 @@ def improved(
 ) -> Iterator[np.ndarray]:
     """After each round the best rewards so far, ``(n,)``, of smooth changes of actions ``(n, steps, motors)``."""
     n, steps, motors = actions.shape
-    shapes = _shapes(_first_touch(grasping, grasps, actions), steps, grasping.gripper.period_s)
+    begun = grasping.playback(actions, grasps)
+    shapes = _shapes(_first_touch(begun), steps, grasping.gripper.period_s)
     rng, elite = np.random.default_rng(seed), max(2, round(_ELITE * tries))
     mean, std = np.zeros((n, len(KNOTS_S), motors)), np.full((n, len(KNOTS_S), motors), _LARGE)
-    best, most = mean.copy(), grasping.played(actions, grasps)
+    best, most = mean.copy(), rewards(begun)
     each = np.repeat(np.arange(n), tries)
     for _ in range(rounds):
         tried = mean[:, None] + std[:, None] * rng.standard_normal((n, tries, *mean.shape[1:]))
@@ -136,11 +137,10 @@ def improved(
         yield most
 
 
-def _first_touch(grasping: Grasping, grasps: GraspParameters, actions: np.ndarray) -> np.ndarray:
+def _first_touch(episodes: TensorDictBase) -> np.ndarray:
     """The step in which something is touched first, ``(n,)``; the last one if nothing is."""
-    played = grasping.playback(actions, grasps)
-    touched = _values(played, "force").max(axis=-1) > 0
-    return np.where(touched.any(axis=-1), touched.argmax(axis=1), actions.shape[1] - 1)
+    touched = _values(episodes, "force").max(axis=-1) > 0
+    return np.where(touched.any(axis=-1), touched.argmax(axis=1), touched.shape[1] - 1)
 
 
 def _shapes(touch: np.ndarray, steps: int, period_s: float) -> np.ndarray:

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from forcegrasp.diagnosis.verdict import LEAST_SHARE, explained_share
-from forcegrasp.identify.cross_validation import rms
 from forcegrasp.identify.fit import Fit
-from forcegrasp.identify.target import Target
 
 # So many are told.
 _TOLD = 3
@@ -35,17 +32,17 @@ class Leads:
 
     _all: list[tuple[frozenset[str], Lead]] = field(default_factory=list)
 
-    def add(self, fit: Fit, without: Fit, target: Target) -> None:
+    def add(self, fit: Fit, without: Fit, before: float, after: float, grasps: int) -> None:
         """Takes down a fit.
 
         Args:
           fit: with one more effect.
           without: of the same grasps, without it.
-          target: the grasps.
+          before, after: rms residual ÷ noise without it, and with it.
+          grasps: how many they are.
         """
-        before, after = (rms(one.residual, target) for one in (without, fit))
         for name in _names(fit) - _names(without):
-            self._all.append((_names(without), Lead(name, len(target.grasps), before, after)))
+            self._all.append((_names(without), Lead(name, grasps, before, after)))
 
     def beside(self, fit: Fit) -> tuple[Lead, ...]:
         """The best of those that go on from this fit, what explains most first; each effect once.
@@ -53,15 +50,13 @@ class Leads:
         Of an effect the fit to most grasps counts, and of those the last, which was brought nearest to its end.
         """
         furthest: dict[str, Lead] = {}
-        for one in self._on(_names(fit)):
+        known_effects = _names(fit)
+        for one in (lead for beside, lead in self._all if beside == known_effects):
             known = furthest.get(one.effect)
             if known is None or one.grasps >= known.grasps:
                 furthest[one.effect] = one
         worth_telling = [one for one in furthest.values() if one.share >= LEAST_SHARE]
         return tuple(sorted(worth_telling, key=lambda one: -one.share)[:_TOLD])
-
-    def _on(self, effects: frozenset[str]) -> Iterator[Lead]:
-        return (lead for beside, lead in self._all if beside == effects)
 
 
 def _names(fit: Fit) -> frozenset[str]:

@@ -69,7 +69,7 @@ class Study:
             fit = task()
             before, after = (rms(one.residual, self.target) for one in (without, fit))
             self.progress(f"{words}: {before:.2f} → {after:.2f} × noise")
-            self.leads.add(fit, without, self.target)
+            self.leads.add(fit, without, before, after, len(self.target.grasps))
             return fit
 
         return told

@@ -45,10 +45,8 @@ def after_diagnosis(
         return [Command("go on from what was found", _line("diagnose", f"data={data}", f"model={found}"))]
     if d.stopped:
         leads = [
-            Command(f"see what {lead.effect} does",
-                    _line("add", f"data={data}", f"model={known}", f"effect={lead.effect}", "out=better.yaml"))
-            for lead in d.leads[:1]
-        ]  # fmt: skip
+            Command(f"see what {lead.effect} does", line_that_adds(data, known, lead.effect)) for lead in d.leads[:1]
+        ]
         return [Command("give it more time", again), *leads]
     shorter = shorter_step(d)
     finer = [] if shorter is None else [Command(f"make the scene's timestep {shorter:g} s, and diagnose again", again)]
@@ -70,7 +68,7 @@ def after_diagnosis(
     first = next(iter(d.shares()), d.effects[0])  # rounding is in the noise already
     added = Command(
         f"add {first} alone" if len(d.shares()) > 1 else "add it",
-        _line("add", f"data={data}", f"model={known}", f"effect={first}", "out=better.yaml"),
+        line_that_adds(data, known, first),
     )
     with_all = f"the model that has {listed(d.preferred)}"
     if d.verdict is Verdict.ONE_OF:
@@ -89,8 +87,7 @@ def after_diagnosis(
         look = Command(f"look at what {with_all} leaves", _line("compare", f"data={data}", f"model={found}"))
         more = besides(d)
         tried = [] if more is None else [
-            Command(f"see what {more.effect.name} does besides",
-                    _line("add", f"data={data}", f"model={found}", f"effect={more.effect.name}", "out=better.yaml"))
+            Command(f"see what {more.effect.name} does besides", line_that_adds(data, found, more.effect.name))
         ]  # fmt: skip
         return [*right, *finer, look, *tried, *([] if d.law_sought else [_for_a_law(data)]), added]
     return [*right, _use(with_all, found, data, gripper), added]
@@ -124,9 +121,9 @@ def _to_tell_apart(diagnosis: Diagnosis, tied: Sequence[str], advice: Advice | N
     return f"{faults}record what tells them apart ({telling}), and diagnose again"
 
 
-def added_law(data: str | Path, model: str | Path, law: str | Path) -> str:
-    """The command that adds a law to the model that it was found with."""
-    return _line("add", f"data={data}", f"model={model}", f"effect={law}", "out=better.yaml")
+def line_that_adds(data: str | Path, model: str | Path, effect: str | Path) -> str:
+    """The command that adds an effect, or the file of a law, to a model."""
+    return _line("add", f"data={data}", f"model={model}", f"effect={effect}", "out=better.yaml")
 
 
 def after_comparison(comparison: Comparison, data: str | Path, model: str | Path) -> list[Command]:

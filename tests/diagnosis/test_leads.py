@@ -24,16 +24,13 @@ from tests.diagnosis.test_exchange import rubbing as rubbing  # a fixture
 REFINE = importlib.import_module("forcegrasp.diagnosis.search.refine")
 
 
-def leaving(error: float, *effects: str, grasps: int) -> tuple[Any, Any]:
-    """A fit of so many grasps with these effects that leaves such an error, and the grasps."""
-    named = [SimpleNamespace(effect=SimpleNamespace(name=name)) for name in effects]
-    fit = SimpleNamespace(residual=np.full((grasps, 1, 1), error), effects=named)
-    return fit, SimpleNamespace(recordings={}, mask=np.ones((grasps, 1), bool), grasps=[None] * grasps)
+def having(*effects: str) -> Any:
+    """A fit with these effects."""
+    return SimpleNamespace(effects=[SimpleNamespace(effect=SimpleNamespace(name=name)) for name in effects])
 
 
 def take_down(leads: Leads, before: float, after: float, *effects: str, grasps: int) -> None:
-    fit, target = leaving(after, *effects, grasps=grasps)
-    leads.add(fit, leaving(before, *effects[:-1], grasps=grasps)[0], target)
+    leads.add(having(*effects), having(*effects[:-1]), before, after, grasps)
 
 
 def test_what_explains_most_comes_first_and_the_furthest_fit_of_each_effect_counts():
@@ -45,7 +42,7 @@ def test_what_explains_most_comes_first_and_the_furthest_fit_of_each_effect_coun
     take_down(leads, 4, 1.5, "backlash", grasps=3)
     take_down(leads, 3, 2.9, "force_lag", grasps=12)  # explains too little
     take_down(leads, 1.8, 1.0, "stiction", "force_bias", grasps=12)
-    nothing, stiction = (leaving(3, *names, grasps=12)[0] for names in ((), ("stiction",)))
+    nothing, stiction = having(), having("stiction")
     best, second = leads.beside(nothing)
     assert (best.effect, best.grasps, second.effect, second.grasps) == ("backlash", 3, "stiction", 12)
     assert (second.error_before, second.error_after) == pytest.approx((3, 1.8))
@@ -101,7 +98,7 @@ def test_a_search_that_ended_has_none(made_up):
 def test_what_was_found_is_told_apart_from_what_promised_most(made_up, verdict):
     leads = Leads()
     take_down(leads, 4, 1.5, "backlash", grasps=3)
-    (lead,) = leads.beside(leaving(3, grasps=12)[0])
+    (lead,) = leads.beside(having())
     found = dataclasses.replace(made_up.diagnosis(verdict), stopped="its 3 min were over", leads=(lead,))
     what = "What else" if verdict == "effect" else "What"
     assert f"{what} promised most by then, but may not be there, is backlash" in answer(found)
