@@ -136,6 +136,16 @@ def test_what_is_left_may_be_the_form_only_of_what_is_named(made_up, found_by, m
     assert diagnosis.may_be_forms == told
 
 
+def test_a_verdict_asks_for_the_share_of_the_largest_effect(made_up, found_by, monkeypatch):
+    bias, drift = made_up.diagnosis("one_of").steps[0].candidates
+    half = dataclasses.replace(bias, fit=drift.fit)
+    asked = []
+    monkeypatch.setattr(conclusion, "conclude", lambda *_, largest, **__: asked.append(largest) or Verdict.UNKNOWN)
+    steps = Step(("force_bias",), (half,), (), 2.0, 1.8), Step(("force_drift",), (half,), (), 1.8, 1.5)
+    diagnosis = found_by(*steps)
+    assert asked == [pytest.approx((1.8**2 - 1.5**2) / (diagnosis.error_before**2 - 1))]
+
+
 def test_intervals_are_those_of_the_final_fit(made_up, found_by):
     (bias, _) = made_up.diagnosis("effect").steps[0].candidates
     diagnosis = found_by(Step(("force_bias",), (bias,), (), 2.0, 1.0))

@@ -9,7 +9,13 @@ import numpy as np
 import pytest
 
 from forcegrasp.diagnosis.noise.noise_check import Noise, is_uneven_noise, unexpected_noise
-from forcegrasp.diagnosis.search.left_over import has_tails_alone, is_worth_looking, left_by_many, left_over
+from forcegrasp.diagnosis.search.left_over import (
+    has_tails_alone,
+    is_worth_looking,
+    left_by_many,
+    left_over,
+    may_lack_something,
+)
 from forcegrasp.diagnosis.signatures import Score, null_gains
 from forcegrasp.effects import get_effect
 from forcegrasp.effects.setting import EffectSetting
@@ -416,6 +422,18 @@ def test_heavy_tails_of_noise_as_large_as_said_are_no_reason_to_look_for_an_effe
     assert noise.has_tails_alone
     assert has_tails_alone(study, fit, noise) is alone
     assert is_worth_looking(study, fit) is not alone
+
+
+@pytest.mark.parametrize(("off", "worth_it"), [(0.1, False), (0.0, True)])
+def test_below_the_error_of_the_simulation_no_effect_is_looked_for(off, worth_it):
+    """On a rig of another hand, with noise that leans on the reading before, a limit of force took 1.04 to 1.02."""
+    held = normal(0)
+    study = SimpleNamespace(
+        target=make(), numerical=(0 * held + off,) * 2, heldout=lambda _: held, error=lambda _: 1.02
+    )
+    fit = SimpleNamespace(residual=held, predicted=GRASPS)
+    assert left_over(study, fit) == ("", None)
+    assert may_lack_something(study, fit) is worth_it
 
 
 def test_noise_of_another_size_is_no_matter_of_tails():

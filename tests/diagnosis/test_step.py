@@ -235,6 +235,22 @@ def test_what_promises_too_little_is_fitted_where_it_is_asked_for(creeping, fitt
     assert fitted_anyway.candidates[0].parameters()["force_n"] == pytest.approx(0.1, rel=0.1)
 
 
+@pytest.mark.parametrize(
+    ("share", "least_together", "found"),
+    [(0.4, 9.0, ()), (0.6, 9.0, ("smooth_friction",)), (0.4, 0.0, ("smooth_friction",))],
+)
+def test_where_all_promise_little_together_and_none_explains_half_nothing_is_fitted_to_the_end(
+    creeping, fitted_anyway, monkeypatch, share, least_together, found
+):
+    """A late velocity, which no effect is, was backlash between two masses and damped contacts after 20 minutes."""
+    rough = [dataclasses.replace(c, share=share) for c in fitted_anyway.candidates]
+    monkeypatch.setattr(RoughFits, "anyway", lambda *_: rough)
+    monkeypatch.setattr(Finalists, "fitted", lambda *_: (fitted_anyway.candidates, set()))
+    step = looked(creeping, [SMOOTH, DELAY], anyway=True, least_together=least_together)
+    assert step.effects == found
+    assert [c.effect for c in step.candidates] == [c.effect for c in fitted_anyway.candidates]
+
+
 @pytest.mark.long
 def test_of_rough_fits_those_that_gain_much_less_than_the_best_one_are_left_out(creeping):
     study, base = creeping
@@ -281,10 +297,11 @@ def test_a_search_begins_anew_from_a_better_base(creeping, alike, monkeypatch):
 def test_a_search_fits_anyway_once_and_judges_odd_grasps_again(creeping, fitted_anyway, monkeypatch, error):
     """With a hundred times the noise left, a real drive got a force limit that no signature had promised."""
     study, base = creeping
-    nothing, asked, screens = Step((), (), (), error, error), [], []
+    nothing, asked, screens, together = Step((), (), (), error, error), [], [], []
 
-    def step(study, fit, screen, *_, anyway=False, **__):
+    def step(study, fit, screen, *_, anyway=False, least_together=0.0, **__):
         asked.append(anyway)
+        together.append(least_together > 0)
         screens.append(screen)
         return fitted_anyway if anyway and asked.count(True) == 1 else nothing
 
@@ -304,6 +321,7 @@ def test_a_search_fits_anyway_once_and_judges_odd_grasps_again(creeping, fitted_
     diagnosis = search.diagnose(study.target, base, study.simulators, [SMOOTH, DELAY], np.random.default_rng(0))
     # beside what was found, signatures are others
     assert asked == ([False, True, False, False] if error < 30 else [False])
+    assert together == [True, True, False, False][: len(asked)]  # of the base model alone
     assert [screen is screens[0] for screen in screens] == [True, True, True, False][: len(screens)]
     assert diagnosis.preferred == (("smooth_friction",) if error < 30 else ())
     assert len(diagnosis.odd) == (error > 30)

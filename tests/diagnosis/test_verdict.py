@@ -19,7 +19,7 @@ from forcegrasp.diagnosis.result import Diagnosis, Step, settle_ties
 from forcegrasp.diagnosis.search import search
 from forcegrasp.diagnosis.search.start import Start
 from forcegrasp.diagnosis.signatures import Score, _single, of_best_effects, share_together
-from forcegrasp.diagnosis.verdict import conclude, explained_share
+from forcegrasp.diagnosis.verdict import conclude, explained_share, explains_enough
 from forcegrasp.effects import get_effect
 from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.identify.verdict import Verdict
@@ -266,6 +266,15 @@ def test_of_motions_held_out_as_wholes_half_of_the_error_is_enough():
     assert conclude(found, 0.75, 5.0, 1.0, left=True) is Verdict.UNKNOWN
     assert conclude(found, 0.75, 5.0, 1.0, left=True, whole_recordings=True) is Verdict.EFFECT
     assert conclude(found, 0.4, 8.0, 1.0, left=True, whole_recordings=True) is Verdict.UNKNOWN
+
+
+def test_where_no_effect_explains_half_all_together_must_explain_more():
+    assert explains_enough(0.7, 1.4, 1.0, False, largest=0.6)
+    assert not explains_enough(0.7, 1.4, 1.0, False, largest=0.4)
+    assert explains_enough(0.85, 1.4, 1.0, False, largest=0.4)
+    assert explains_enough(0.7, 1.4, 1.0, True, largest=0.4)
+    assert conclude([Verdict.EFFECT] * 2, 0.7, 1.4, 1.0, left=True, largest=0.4) is Verdict.UNKNOWN
+    assert conclude([Verdict.EFFECT] * 2, 0.7, 1.4, 1.0, left=False, largest=0.4) is Verdict.EFFECT
 
 
 def test_shares_are_of_the_mean_square_beyond_the_noise():

@@ -91,6 +91,7 @@ def concluded(begun: Begun, study: Study, steps: Sequence[Step], fit: Fit, in_a_
         bool(left),
         only_of_set,
         whole_recordings=len(target.recordings) > 1,
+        largest=None if in_a_hurry else _largest(found, error_before),
     )
     names = [s.effects[0] for s in found] if verdict.names_effects else []
     if verdict is Verdict.ONE_OF:
@@ -103,6 +104,12 @@ def concluded(begun: Begun, study: Study, steps: Sequence[Step], fit: Fit, in_a_
         verdict, tuple(dict.fromkeys(names)), tuple(steps), base, fit, target, begun.folds, error_before, error_after,
         numerical, floor=floor, left=left, odd=odd, noise=noise, alone=alone, may_be_forms=forms,
     )  # fmt: skip
+
+
+def _largest(steps: Sequence[Step], error: float) -> float:
+    """Share of the mean square beyond the noise, with that error, by which it falls most in one of the steps."""
+    falls = [step.error_before**2 - step.error_after**2 for step in steps]
+    return max(falls, default=0.0) / max(error**2 - 1.0, 1e-9)
 
 
 def _finished(base: BaseFit, study: Study) -> BaseFit:

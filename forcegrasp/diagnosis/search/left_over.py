@@ -62,6 +62,17 @@ def is_worth_looking(study: Study, fit: Fit) -> bool:
     return bool(left) or (noise is not None and noise.stronger and not has_tails_alone(study, fit, noise))
 
 
+def may_lack_something(study: Study, fit: Fit) -> bool:
+    """Whether a model without effects leaves anything to look for: more than the floor anywhere, or in all.
+
+    What explains a part of less than that makes up for the simulation's own error.
+    """
+    left, noise = left_over(study, fit)
+    if noise is not None:
+        return not has_tails_alone(study, fit, noise)
+    return bool(left) or study.error(study.heldout(fit)) > numerical_floor(study.numerical, study.target)
+
+
 def has_tails_alone(study: Study, fit: Fit, noise: Noise | None) -> bool:
     """Whether all that is odd are heavy tails of noise that is no larger than it was said to be.
 

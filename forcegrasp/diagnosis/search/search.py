@@ -18,12 +18,12 @@ from forcegrasp.diagnosis.search.conclusion import Begun, concluded
 from forcegrasp.diagnosis.search.exchange import exchange
 from forcegrasp.diagnosis.search.left_over import (
     AS_GOOD_AS_NOTHING,
-    has_tails_alone,
     is_worth_looking,
     leaves_forms,
     leaves_little,
     leaves_more_than_noise,
     left_over,
+    may_lack_something,
 )
 from forcegrasp.diagnosis.search.look_beside import look_beside
 from forcegrasp.diagnosis.search.merge import merge
@@ -56,6 +56,9 @@ _OF_ANOTHER = 0.5
 # Beyond so many times the noise effects whose signatures promise little are not fitted; contacts, with which a base fit
 # makes up for them, bring it much further off than a servo is.
 _FAR_OF_CONTACTS = 3 * FAR
+# Of what none of the effects is all their signatures together promise less than this share, and none of them explains
+# half: then it is not known, and what several look-alikes take of it says nothing.
+_OF_KNOWN = 0.65
 #: Largest number of effects that are looked for one by one.
 MOST_EFFECTS = 8
 
@@ -106,11 +109,7 @@ def diagnose(
         steps.append(Step((rounding.effect.name,), (), (), error_before, study.error(study.heldout(first))))
     so_far = SoFar((study, steps, first))
     try:
-        if start is None:
-            worth_looking = not has_tails_alone(study, first, left_over(study, first)[1])
-        else:
-            worth_looking = is_worth_looking(study, first)
-        if worth_looking:
+        if (may_lack_something if start is None else is_worth_looking)(study, first):
             better = _add_effects(so_far, begun, rng, stop_when)
             if better is not None:
                 progress(f"without it the model fits as well from there: {rms_error(better, target):.2f} × noise")
@@ -165,9 +164,10 @@ def _add_effects(so_far: SoFar, begun: Begun, rng: np.random.Generator, stop_whe
             continue
         alone, several.alone = several.alone, ()
         step = look_further(study, fit, screen, alone, rng, anyway=True) if alone else None
+        least_together = 0.0 if fit.problem.effects or study.target.gripper.is_servo else _OF_KNOWN
         if step is None or not step.effects:
             most = stop_when.most if fit is begun.fit else np.inf
-            step = look_further(study, fit, screen, untried, rng, richer, most)
+            step = look_further(study, fit, screen, untried, rng, richer, most, least_together=least_together)
         step = _of_another(step, study) if forms else step
         # what is on trial has no look-alikes that are worth the time, and what was found together takes too long
         much = (step.of_many or not step.effects) and so_far.believed is None and not several.done
@@ -183,7 +183,7 @@ def _add_effects(so_far: SoFar, begun: Begun, rng: np.random.Generator, stop_whe
         if much:
             far = FAR if study.target.gripper.is_servo else _FAR_OF_CONTACTS
             worth_it = untried and not tried_anyway and step.error_before < far
-            found = _fitted_anyway(study, fit, screen, untried, rng) if worth_it else None
+            found = _fitted_anyway(study, fit, screen, untried, rng, least_together) if worth_it else None
             found = found or exchange(study, fit, screen, others, steps, rng)
             two = None if found or forms else split(study, fit, screen, untried, steps, rng)
             steps, step = two or (steps, found or step)
@@ -266,10 +266,11 @@ def _believed(so_far: SoFar, begun: Begun) -> Diagnosis:
 
 
 def _fitted_anyway(
-    study: Study, fit: Fit, screen: Screen, effects: Sequence[type[Effect]], rng: np.random.Generator
-) -> Step | None:
+    study: Study, fit: Fit, screen: Screen, effects: Sequence[type[Effect]], rng: np.random.Generator,
+    least_together: float,
+) -> Step | None:  # fmt: skip
     """A step with an effect whose signature promised too little; None if there is none."""
-    step = look_further(study, fit, screen, effects, rng, anyway=True)
+    step = look_further(study, fit, screen, effects, rng, anyway=True, least_together=least_together)
     return step if step.effects else None
 
 

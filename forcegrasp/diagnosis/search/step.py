@@ -14,6 +14,7 @@ from forcegrasp.diagnosis.search.screen import Screen
 from forcegrasp.diagnosis.search.start import Start, least_cost
 from forcegrasp.diagnosis.signatures import of_best_effects
 from forcegrasp.diagnosis.study import Study
+from forcegrasp.diagnosis.verdict import EXPLAINED
 from forcegrasp.effects import Effect
 from forcegrasp.identify.fit import Fit
 
@@ -36,6 +37,7 @@ def look_further(
     anyway: bool = False,
     least_promise: float = _WORTH_A_TRIAL,
     before: Sequence[Candidate] = (),
+    least_together: float = 0.0,
 ) -> Step:
     """Looks for one more effect.
 
@@ -51,6 +53,8 @@ def look_further(
         effect would have them, slopes tell little of what it gains.
       least_promise: share that all signatures together must promise for an effect that explains little to be tried.
       before: what was fitted for another screen of this fit, best first: it is not fitted again.
+      least_together: share that all signatures together must promise where no rough fit explains half: what promises
+        less is not known, and none of those that stand for a part of it is fitted to the end.
     """
     start = Start(study, fit)
     if effects:
@@ -68,6 +72,8 @@ def look_further(
         candidates = rough.of([score for score in best if score.setting.effect not in fitted])
     candidates = [one for one in candidates if least_cost(one.fit, fit) < most]
     candidates += rough.of_richer(richer)
+    if look.share_together < least_together and max((c.share for c in candidates), default=0.0) < EXPLAINED:
+        return Step((), tuple(sorted(candidates, key=start.place)), look.scores, start.error, start.error)
     variants: dict[str, list[Candidate]] = {}
     for candidate in sorted(candidates, key=start.place):
         variants.setdefault(candidate.effect.name, []).append(candidate)
