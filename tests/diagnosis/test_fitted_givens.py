@@ -288,3 +288,5 @@ def test_radii_that_a_ruler_seems_to_have_measured_are_fitted_as_if_it_had(truly
     assert {grasp.fitted_m[0] for grasp in fitted[0].measured.grasps} == {fitted[0].measured.radius_std_m} == {RULER_M}
     larger = with_calliper(light_set(grasps=9, samples=54), [3e-4, 5e-4, 7e-4])
     assert with_fitted_givens(larger, fit_model(larger, 0, silent, hasty=True), silent) is None
+    one = with_calliper(light_set(grasps=9, samples=54), [0.0, 7e-4, 0.0])
+    assert with_fitted_givens(one, fit_model(one, 0, silent, hasty=True), silent) is not None

@@ -96,7 +96,14 @@ def test_a_move_that_lowers_no_error_alone_is_not_said_to(made_up, fault, error_
 
 
 @pytest.mark.parametrize(
-    ("moves", "told"), [((-1.9, 0.0, -2.0), True), ((-1.9,), False), ((1.9, 2.0), False), ((-1.9, 1.7, 0.1), False)]
+    ("moves", "told"),
+    [
+        ((-1.9, 0.0, -2.0), True),
+        ((-1.9,), False),
+        ((1.9, 2.0), False),
+        ((-1.9, 1.7, 0.1), False),
+        ((-3.5, -0.3, -0.2), False),  # one alone is wrong
+    ],
 )
 def test_radii_that_are_smaller_on_average_may_be_backlash(made_up, fault, moves, told):
     """A gap lets fingers come nearer before they press, on every object alike; other errors of radii do not."""

@@ -110,10 +110,16 @@ class Moved:
 
     @property
     def smaller_m(self) -> float:
-        """By how much radii were moved down on average, metres, where chance would hardly do it to all; else 0."""
+        """By how much radii were moved down on average, metres, where chance would hardly do it to all; else 0.
+
+        Of three or more the one that was moved furthest down does not count: it alone may be wrong.
+        """
         radii = [(n.std, move) for n, move in zip(self.numbers, self.deviations, strict=True) if n.kind == "radius_m"]
         stds, moves = np.array(radii).reshape(-1, 2).T
-        alike = len(radii) > 1 and moves.sum() < -_ALIKE * np.sqrt(len(radii))
+        if len(radii) < 2:
+            return 0.0
+        others = np.sort(moves)[1:] if len(radii) > 2 else moves
+        alike = max(moves.mean(), others.mean()) < -_ALIKE / np.sqrt(len(radii))
         return float(-np.mean(stds * moves)) if alike else 0.0
 
     def with_radii_raised(self, by_m: float) -> Moved:
