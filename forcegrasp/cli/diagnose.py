@@ -49,7 +49,7 @@ def run(config: DiagnoseConfig) -> int:
     from forcegrasp.identify import loading
     from forcegrasp.replay.time_limit import time_limit
     from forcegrasp.reports import diagnosis as diagnosis_report
-    from forcegrasp.reports.next_step import line_that_adds, next_grasp_words
+    from forcegrasp.reports.next_step import next_grasp_words
     from forcegrasp.reports.results import BASE_MODEL, FOUND_MODEL, NEXT_GRASP, PROPOSED_LAW, DiagnoseResult
 
     check_effects("effects", config.effects)
@@ -78,9 +78,7 @@ def run(config: DiagnoseConfig) -> int:
     if advice is not None:
         print(f"wrote {out / NEXT_GRASP}: {next_grasp_words(loaded.measured, out / 'diagnosis.json')}")
     if diagnosis.law is not None:
-        law, with_it = out / PROPOSED_LAW, found if diagnosis.verdict.lacks_effects else known
-        told = line_that_adds(loaded.measured.path, with_it, law)
-        print(f"wrote {law}: the law, to name, edit and add: {told}")
+        print(f"wrote {out / PROPOSED_LAW}: the law, to name, edit and add")
     print("\n".join(f"{'or' if k else 'next'}: {command}" for k, command in enumerate(result.commands(out))))
     write_results(out, result)
     return 130 if diagnosis.stopped == INTERRUPTED else 0

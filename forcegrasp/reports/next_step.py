@@ -28,7 +28,12 @@ def train_command(model: str | Path, gripper: str) -> str:
 
 
 def after_diagnosis(
-    diagnosis: Diagnosis, advice: Advice | None, data: str | Path, known: str | Path, found: str | Path
+    diagnosis: Diagnosis,
+    advice: Advice | None,
+    data: str | Path,
+    known: str | Path,
+    found: str | Path,
+    law: str | Path = "law.yaml",
 ) -> list[Command]:
     """What to do after a diagnosis, the best first.
 
@@ -38,6 +43,7 @@ def after_diagnosis(
       data: the set.
       known: file of the model that was diagnosed.
       found: file of the model with the effects that were found.
+      law: file of the law, if one was found.
     """
     d, again = diagnosis, _line("diagnose", f"data={data}")
     gripper, compared = d.target.gripper, _line("compare", f"data={data}", f"model={known}")
@@ -58,9 +64,11 @@ def after_diagnosis(
         return [Command("put the set right, and diagnose again", again)]
     is_wrong = d.fault is not None and d.fault.moved is None and not d.fault_is_rival
     right = [Command("put the set right first, and diagnose again", again)] if is_wrong else []
+    with_it = found if d.verdict.names_effects else known
+    by_law = [] if d.law is None else [Command("add the law that was found", line_that_adds(data, with_it, law))]
     if d.verdict is Verdict.UNKNOWN:
         look = Command("look at where the model fails", compared)
-        return [*right, *finer, look, *([] if d.law_sought else [_for_a_law(data)])]
+        return [*right, *finer, *by_law, look, *([] if d.law_sought else [_for_a_law(data)])]
     if d.verdict is Verdict.EXPLAINED:
         misstated = d.noise is not None and not d.noise.has_tails_alone and d.clock_jitter is None
         noise = [Command("give the noise as it is, and diagnose again", again)] if misstated else []
@@ -82,6 +90,7 @@ def after_diagnosis(
             *finer,
             Command(_to_tell_apart(d, tied, advice), joined),
             *([] if effect_of(first, gripper).of_set else [preferred]),
+            *by_law,
         ]
     if is_not_all(d):
         look = Command(f"look at what {with_all} leaves", _line("compare", f"data={data}", f"model={found}"))
@@ -89,8 +98,8 @@ def after_diagnosis(
         tried = [] if more is None else [
             Command(f"see what {more.effect.name} does besides", line_that_adds(data, found, more.effect.name))
         ]  # fmt: skip
-        return [*right, *finer, look, *tried, *([] if d.law_sought else [_for_a_law(data)]), added]
-    return [*right, _use(with_all, found, data, gripper), added]
+        return [*right, *finer, *by_law, look, *tried, *([] if d.law_sought else [_for_a_law(data)]), added]
+    return [*right, *by_law, _use(with_all, found, data, gripper), added]
 
 
 def _for_a_law(data: str | Path) -> Command:

@@ -277,8 +277,8 @@ class DiagnoseResult(Result):
         return diagnosis_report.sections(self.diagnosis, self.advice, self.tried)
 
     def commands(self, folder: Path) -> list[Command]:
-        known, found = self.given_file or folder / BASE_MODEL, folder / FOUND_MODEL
-        return next_step.after_diagnosis(self.diagnosis, self.advice, self.data.measured.path, known, found)
+        known, found, law = self.given_file or folder / BASE_MODEL, folder / FOUND_MODEL, folder / PROPOSED_LAW
+        return next_step.after_diagnosis(self.diagnosis, self.advice, self.data.measured.path, known, found, law)
 
     def box(self, folder: Path) -> Answer:
         return answer_box(self.diagnosis, self.advice, self.commands(folder), self._note)

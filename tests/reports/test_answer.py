@@ -106,6 +106,17 @@ def test_a_law_that_was_sought_is_not_proposed_again(made_up, sought):
     assert len(told) == sought
 
 
+@pytest.mark.parametrize(
+    ("verdict", "model", "place"),
+    [("unknown", "base.yaml", 0), ("effect", "model.yaml", 0), ("one_of", "model.yaml", -1)],
+)
+def test_a_law_that_was_found_is_to_be_added(made_up, verdict, model, place):
+    diagnosis = dataclasses.replace(made_up.diagnosis(verdict), left="in all", law=object(), law_sought=True)
+    command = after_diagnosis(diagnosis, None, "my set", "base.yaml", "model.yaml", "out/law.yaml")[place]
+    assert command.purpose == "add the law that was found"
+    assert f"model={model} effect=out/law.yaml" in command.line
+
+
 def test_what_is_no_more_than_noise_is_not_given_a_place(made_up):
     effect = made_up.diagnosis("effect")
     assert shares_sentence(effect).endswith("; no more than noise is left.")
