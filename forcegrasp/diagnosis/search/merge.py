@@ -78,15 +78,21 @@ def _one_for_two(
 
 
 def _like_both(pair: Collection[str], fit: Fit, effects: Sequence[type[Effect]]) -> Iterator[type[Effect]]:
-    """Effects that look like both of two, and may stand beside all others of the model."""
+    """Effects that look like both of two, and may stand beside all others of the model.
+
+    So may each of the two, if they look alike: a part of it may have been explained by the other, found first, and no
+    slope leads from there to where it explains all.
+    """
     known = [one.effect for one in fit.problem.effects]
     two, others = [e for e in known if e.name in pair], [e for e in known if e.name not in pair]
     for effect in effects:
+        both = [one for one in two if one is not effect]
+        alike = all(are_alike(effect, one) for one in both)
         if (
-            may_join(effect, others)
-            and effect not in two
+            alike
+            and may_join(effect, others)
             and not effect.of_set
-            and all(are_alike(effect, one) for one in two)
+            and (len(both) == 2 or effect.family == both[0].family)
         ):
             yield effect
 
@@ -117,8 +123,13 @@ def promising(
 
 
 def _roughly_as_good(study: Study, fit: Fit, pair: Collection[str], effect: type[Effect]) -> EffectSetting | None:
-    """The effect as a rough fit has it, unless that leaves something, and says clearly that the others are needed."""
+    """The effect as a rough fit has it, unless that leaves something, and says clearly that the others are needed.
+
+    One of the two itself whose cost has valleys, as lost motion, may have ended in another one: then all grasps decide.
+    """
     less = roughly_as(trials([effect]), fit, pair, study, at_the_end=False)
+    if effect.name in pair and effect.in_valleys:
+        return less.effects[-1]
     if asks_for_more(study, less.residual, fit.residual, SURELY * LEAST_RISE):
         return None
     without = roughly_without(pair, fit, study, at_the_end=False)
