@@ -64,7 +64,7 @@ def after_diagnosis(
         return [Command("put the set right, and diagnose again", again)]
     is_wrong = d.fault is not None and d.fault.moved is None and not d.fault_is_rival
     right = [Command("put the set right first, and diagnose again", again)] if is_wrong else []
-    with_it = found if d.verdict.names_effects else known
+    with_it = found if d.verdict.lacks_effects else known
     by_law = [] if d.law is None else [Command("add the law that was found", line_that_adds(data, with_it, law))]
     if d.verdict is Verdict.UNKNOWN:
         look = Command("look at where the model fails", compared)

@@ -56,8 +56,8 @@ _OF_ANOTHER = 0.5
 # Beyond so many times the noise effects whose signatures promise little are not fitted; contacts, with which a base fit
 # makes up for them, bring it much further off than a servo is.
 _FAR_OF_CONTACTS = 3 * FAR
-# Of what none of the effects is all their signatures together promise less than this share, and none of them explains
-# half: then it is not known, and what several look-alikes take of it says nothing.
+# Where no effect explains half, and all signatures together promise less than this share, what is missing is in no
+# catalogue: what several look-alikes take of it says nothing.
 _OF_KNOWN = 0.65
 #: Largest number of effects that are looked for one by one.
 MOST_EFFECTS = 8
