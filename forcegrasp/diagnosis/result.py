@@ -126,6 +126,16 @@ def taken_over_by(step: Step, steps: Sequence[Step]) -> str:
     return next((later.effects[0] for later in steps[place + 1 :] if later.replaces == step.effects[0]), "")
 
 
+def falls_by_effect(steps: Sequence[Step]) -> dict[str, float]:
+    """By how much the mean square falls with each effect that was found, and with the one whose place it took."""
+    falls: dict[str, float] = {}
+    for step in steps:
+        if step.effects:
+            fall = step.error_before**2 - step.error_after**2
+            falls[step.effects[0]] = float(fall) + falls.pop(step.replaces, 0.0)
+    return falls
+
+
 def settle_ties(steps: Sequence[Step]) -> list[Step]:
     """The steps less rivals that a later step has found besides: what is there as well is not there instead."""
     found = {step.effects[0] for step in kept_steps(steps)}
@@ -222,12 +232,9 @@ class Diagnosis(ShortRepr):
 
         An effect that took the place of one that it contains has that one's share, too. Rounding is part of the noise.
         """
-        shares: dict[str, float] = {}
         found = [step for step in self.steps if step.effects and not step.is_counted]
         beyond = max(found[0].error_before ** 2 - 1.0, 1e-9) if found else 1.0
-        for step in found:
-            fall = (step.error_before**2 - step.error_after**2) / beyond
-            shares[step.effects[0]] = float(fall) + shares.pop(step.replaces, 0.0)
+        shares = {name: fall / beyond for name, fall in falls_by_effect(found).items()}
         # recordings are weighed anew after each step, and what one starts from is then not what the last one left
         most, total = 1.0 - max(0.0, self.error_after**2 - 1.0) / beyond, sum(shares.values())
         factor = min(1.0, most / total) if total > 0 else 1.0

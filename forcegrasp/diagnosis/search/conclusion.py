@@ -10,7 +10,7 @@ import numpy as np
 
 from forcegrasp.diagnosis.evidence import with_close_rivals
 from forcegrasp.diagnosis.faults.odd_grasps import OddGrasp, odd_grasps
-from forcegrasp.diagnosis.result import Diagnosis, Step, kept_steps, settle_ties
+from forcegrasp.diagnosis.result import Diagnosis, Step, falls_by_effect, kept_steps, settle_ties
 from forcegrasp.diagnosis.search.ask_again import ask_again
 from forcegrasp.diagnosis.search.forms import may_be_forms
 from forcegrasp.diagnosis.search.left_over import AS_GOOD_AS_NOTHING, left_by_many
@@ -91,7 +91,7 @@ def concluded(begun: Begun, study: Study, steps: Sequence[Step], fit: Fit, in_a_
         bool(left),
         only_of_set,
         whole_recordings=len(target.recordings) > 1,
-        largest=None if in_a_hurry else _largest(found, error_before),
+        largest=None if in_a_hurry else _largest(steps, error_before),
     )
     names = [s.effects[0] for s in found] if verdict.names_effects else []
     if verdict is Verdict.ONE_OF:
@@ -107,9 +107,8 @@ def concluded(begun: Begun, study: Study, steps: Sequence[Step], fit: Fit, in_a_
 
 
 def _largest(steps: Sequence[Step], error: float) -> float:
-    """Share of the mean square beyond the noise, with that error, by which it falls most in one of the steps."""
-    falls = [step.error_before**2 - step.error_after**2 for step in steps]
-    return max(falls, default=0.0) / max(error**2 - 1.0, 1e-9)
+    """Share of the mean square beyond the noise, with that error, by which it falls most with one effect."""
+    return max(falls_by_effect(steps).values(), default=0.0) / max(error**2 - 1.0, 1e-9)
 
 
 def _finished(base: BaseFit, study: Study) -> BaseFit:
