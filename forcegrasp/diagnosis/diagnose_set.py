@@ -192,7 +192,8 @@ class _Ways:
                 if rest[0].stopped and not is_answer(rest[0]):
                     return dataclasses.replace(found, stopped=rest[0].stopped), None
                 further = rest if is_answer(rest[0]) else None
-            if further is None and (leave_out.names or (moves is not None and moves.asked)):  # it was neither
+            something_else = leave_out.names or (moves is not None and moves.asked)
+            if further is None and something_else and not found.is_of_none:  # it was neither
                 again = self.search(*fitted, start=(found.fit, kept_steps(found.steps)))
                 if again.stopped:
                     return dataclasses.replace(found, stopped=again.stopped), None

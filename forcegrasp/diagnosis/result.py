@@ -90,6 +90,8 @@ class Step(ShortRepr):
     error_before: float
     error_after: float
     of_many: bool = False  #: it explains little: one of several, or a look-alike of what is not known
+    #: whether all effects together promise so little of what is left that it is in no catalogue
+    of_none: bool = False
 
     @property
     def replaces(self) -> str:
@@ -181,6 +183,11 @@ class Diagnosis(ShortRepr):
     def preferred(self) -> tuple[str, ...]:
         """The effects that were found and are in the final model: of those that can't be told apart the first."""
         return tuple(step.effects[0] for step in kept_steps(self.steps))
+
+    @property
+    def is_of_none(self) -> bool:
+        """Whether what is missing seems to be in no catalogue, however its effects are put together."""
+        return any(step.of_none for step in self.steps)
 
     @property
     def inexact(self) -> tuple[np.ndarray, ...]:

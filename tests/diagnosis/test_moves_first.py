@@ -13,7 +13,7 @@ from forcegrasp.diagnosis import diagnose_set
 from forcegrasp.diagnosis.diagnose_set import _Ways
 from forcegrasp.diagnosis.givens import moved_set
 from forcegrasp.diagnosis.givens.moved_set import MovesFirst
-from forcegrasp.diagnosis.result import kept_steps
+from forcegrasp.diagnosis.result import Step, kept_steps
 from forcegrasp.diagnosis.search.refine import fit_with
 from forcegrasp.diagnosis.search.stop_when import never
 from forcegrasp.diagnosis.study import Study
@@ -55,12 +55,16 @@ def test_moves_that_leave_much_do_not_come_first(monkeypatch, left, first):
     assert not moves.beyond
 
 
-def test_a_search_that_ended_for_a_move_that_was_none_goes_on_where_it_stood(made_up, monkeypatch):
+@pytest.mark.parametrize("of_none", [False, True])
+def test_a_search_that_ended_for_a_move_that_was_none_goes_on_where_it_stood(made_up, monkeypatch, of_none):
+    """Unless what is missing is in no catalogue, which is no other when it is asked again."""
     found, begun = made_up.diagnosis("effect"), []
+    found = dataclasses.replace(found, steps=(*found.steps, Step((), (), (), 2.0, 2.0, of_none=of_none)))
     first = SimpleNamespace(asked=True, beyond=False, before_more=never, explain=never)
     monkeypatch.setattr(diagnose_set, "MovesFirst", lambda _: first)
     monkeypatch.setattr(_Ways, "moved", lambda *_, **__: None)
     monkeypatch.setattr(_Ways, "search", lambda *_, start=None, stop_when=None: begun.append(start) or found)
     loaded = SimpleNamespace(gripper=found.target.gripper)
     assert _Ways(None, [], 0, silent).search_as_it_is(loaded, (found.target, None, found.base)) == (found, None)
-    assert begun == [None, (found.fit, kept_steps(found.steps))]
+    again = [] if of_none else [(found.fit, kept_steps(found.steps))]
+    assert begun == [None, *again]

@@ -248,6 +248,7 @@ def test_where_all_promise_little_together_and_none_explains_half_nothing_is_fit
     monkeypatch.setattr(Finalists, "fitted", lambda *_: (fitted_anyway.candidates, set()))
     step = looked(creeping, [SMOOTH, DELAY], anyway=True, least_together=least_together)
     assert step.effects == found
+    assert step.of_none == (not found)
     assert [c.effect for c in step.candidates] == [c.effect for c in fitted_anyway.candidates]
 
 

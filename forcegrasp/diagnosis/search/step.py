@@ -73,7 +73,8 @@ def look_further(
     candidates = [one for one in candidates if least_cost(one.fit, fit) < most]
     candidates += rough.of_richer(richer)
     if look.share_together < least_together and max((c.share for c in candidates), default=0.0) < EXPLAINED:
-        return Step((), tuple(sorted(candidates, key=start.place)), look.scores, start.error, start.error)
+        promising = tuple(sorted(candidates, key=start.place))
+        return Step((), promising, look.scores, start.error, start.error, of_none=True)
     variants: dict[str, list[Candidate]] = {}
     for candidate in sorted(candidates, key=start.place):
         variants.setdefault(candidate.effect.name, []).append(candidate)
