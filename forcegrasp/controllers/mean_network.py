@@ -80,8 +80,11 @@ class SqueezeTogether(nn.Module):
     def forward(self, observation: Tensor) -> Tensor:
         """All actions, ``(*B, motors)``."""
         action = self.net(observation)
-        grasped = (observation[..., self.contact] > 0.5).all(-1, keepdim=True)
-        return torch.where(grasped, action.mean(-1, keepdim=True), action)
+        return torch.where(self.grasped(observation), action.mean(-1, keepdim=True), action)
+
+    def grasped(self, observation: Tensor) -> Tensor:
+        """Whether every reading has shown contact, ``(*B, 1)``."""
+        return (observation[..., self.contact] > 0.5).all(-1, keepdim=True)
 
 
 def make_mean(

@@ -7,7 +7,8 @@ import pytest
 import torch
 from scipy.stats import multivariate_normal
 
-from forcegrasp.train.algorithms.ppo import Frames, entropy
+from forcegrasp.train.algorithms.ppo import Frames
+from forcegrasp.train.algorithms.ppo_objective import entropy
 from forcegrasp.train.loop import Trainer
 
 HORIZON_OF = {0.9: 10.0, 0.97: 100 / 3}

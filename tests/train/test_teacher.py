@@ -86,4 +86,4 @@ def test_a_student_comes_near_its_teacher(tiny):
 def test_its_weight_falls_linearly(tiny, share):
     ppo = Trainer(tiny(ppo={"teacher_weight": 4.0, "teacher_weight_end": 0.5})).algorithm
     ppo.set_progress(share)
-    assert ppo.teacher_weight == pytest.approx(np.interp(share, [0, 1], [4.0, 2.0]))
+    assert ppo.objective.teacher_weight == pytest.approx(np.interp(share, [0, 1], [4.0, 2.0]))

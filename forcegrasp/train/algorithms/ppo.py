@@ -1,9 +1,8 @@
-"""Proximal policy optimisation (Schulman et al. 2017): the loss, and one pass of updates over a batch."""
+"""Proximal policy optimisation (Schulman et al. 2017): updates of the policy and the value network on a batch."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any, ClassVar, cast
 
 import torch
@@ -18,27 +17,10 @@ from forcegrasp.config import TrainConfig
 from forcegrasp.controllers.policy import log_prob
 from forcegrasp.physics.gripper import Gripper
 from forcegrasp.train.algorithms.base import Algorithm, part_of
-from forcegrasp.train.algorithms.teacher import Teacher, imitation_loss
+from forcegrasp.train.algorithms.ppo_objective import Objective, entropy
+from forcegrasp.train.algorithms.teacher import Teacher
 from forcegrasp.train.algorithms.value_network import Value, make_value
-
-
-def clipped_loss(log_ratio: Tensor, advantage: Tensor, clip: float) -> dict[str, Tensor]:
-    """The clipped surrogate (Schulman et al. 2017, eq. 7) and its diagnostics, as torchrl's ``ClipPPOLoss`` has them.
-
-    Its tensordicts, and modules with parameters put into them, would take longer than these few numbers.
-
-    Args:
-      log_ratio: logarithm of the probability of each action now over that when it was taken, ``(n,)``.
-      advantage: of each action, ``(n,)``.
-      clip: ε.
-    """
-    clipped = log_ratio.clamp(math.log1p(-clip), math.log1p(clip))
-    gain = torch.minimum(log_ratio.exp() * advantage, clipped.exp() * advantage)
-    with torch.no_grad():
-        effective = (2 * log_ratio.logsumexp(0) - (2 * log_ratio).logsumexp(0)).exp() / len(log_ratio)
-        share = (clipped != log_ratio).float().mean()
-        divergence = -log_ratio.mean()
-    return {"loss_objective": -gain.mean(), "kl_approx": divergence, "clip_fraction": share, "ESS": effective}
+from forcegrasp.train.algorithms.written_gradient import WrittenGradient, can_be_written
 
 
 class Frames:
@@ -63,9 +45,14 @@ class Frames:
         return dict(zip(self.sizes, self.rows.index_select(0, ids).split(list(self.sizes.values()), -1), strict=True))
 
 
-def entropy(scale: Tensor) -> Tensor:
-    """Mean differential entropy of the policy's Gaussian, in nats, from its standard deviations ``(*B, motors)``."""
-    return (scale.log() + 0.5 * math.log(2 * math.pi * math.e)).sum(-1).mean()
+def one_gradient(parameters: Iterable[nn.Parameter]) -> Tensor:
+    """A vector of which each parameter's ``grad`` is a part from now on: all are scaled by one operation."""
+    parameters = list(parameters)
+    sizes = [parameter.numel() for parameter in parameters]
+    whole = torch.zeros(sum(sizes), device=parameters[0].device, dtype=parameters[0].dtype)
+    for parameter, part in zip(parameters, whole.split(sizes), strict=True):
+        parameter.grad = part.view_as(parameter)
+    return whole
 
 
 class PPO(Algorithm):
@@ -95,20 +82,17 @@ class PPO(Algorithm):
         size = env.observation_spec["observation"].shape[-1]
         self.value = make_value(size, options, gripper).to(env.device)
         self.shuffle = torch.Generator(env.device).manual_seed(config.seed)
-        # vmap would copy the states first
-        self.advantage = GAE(
-            gamma=options.discount, lmbda=options.gae_lambda, value_network=self.value, deactivate_vmap=True
-        )
+        self.advantage = GAE(gamma=options.discount, lmbda=options.gae_lambda, value_network=None)
         self.optimizer = torch.optim.Adam(
             [*self.policy.parameters(), *self.value.parameters()], lr=options.learning_rate, eps=1e-5, fused=True
         )
+        self.objective = Objective(options, self.critic.horizon)
         self.teacher = Teacher(gripper, options.teacher_feedback) if options.teacher_weight else None
-        self.teacher_weight = options.teacher_weight
 
     def set_progress(self, share: float) -> None:
         """Lowers the learning rate and the teacher's weight linearly; ``share`` of the training is over."""
         left = 1 - (1 - self.config.teacher_weight_end) * min(max(share, 0.0), 1.0)
-        self.teacher_weight = self.config.teacher_weight * left
+        self.objective.teacher_weight = self.config.teacher_weight * left
         rate = self.config.learning_rate * (1 - (1 - self.config.learning_rate_end) * min(max(share, 0.0), 1.0))
         for group in self.optimizer.param_groups:
             group["lr"] = rate
@@ -122,12 +106,14 @@ class PPO(Algorithm):
 
     @torch.no_grad()
     def prepare(self, batch: TensorDictBase) -> None:
-        """Writes what is learned from: ``advantage``, ``value_target``, the teacher's answers, ``action_log_prob``.
+        """Writes what is learned from: ``advantage``, ``value_target``, ``true_state`` for a privileged critic, the
+        teacher's answers, ``action_log_prob``.
 
         Of a batch that was collected ahead the policy has moved on since. So the ratio that is clipped is that to the
         policy as it is now, and an advantage counts by how much likelier its action is now than it was then (decoupled
         objective, Hilton et al. 2022).
         """
+        self._value(batch)
         self.advantage(batch)
         if self.teacher:
             self.teacher.label(batch)
@@ -136,23 +122,35 @@ class PPO(Algorithm):
         normal = (advantage - advantage.mean()) / (advantage.std() + 1e-8)
         batch["advantage"], batch["action_log_prob"] = normal * (now - then).exp().unsqueeze(-1), now
 
+    def _value(self, batch: TensorDictBase) -> None:
+        """Writes the values of all states, and ``true_state``: within an episode each step leads to the next state."""
+        after, keys = cast(TensorDictBase, batch["next"]), cast("list[str]", self.value.in_keys)
+        observation, *state = (torch.cat([batch[key], after[key][:, -1:]], 1) for key in keys)
+        true_state = self.critic.true_state(*state) if state else None
+        value = self.critic.of_seen(observation, true_state)
+        batch["state_value"], batch["next", "state_value"] = value[:, :-1], value[:, 1:]
+        if true_state is not None:
+            batch["true_state"] = true_state[:, :-1]
+
     def learn(self, batch: TensorDictBase) -> dict[str, float]:
         """The passes over a batch that is prepared, minibatch by minibatch; returns what :meth:`update` does."""
         frames, size = self.samples(batch)
-        nets = [list(net.parameters()) for net in (self.policy, self.value)]
+        slopes = [one_gradient(net.parameters()) for net in (self.policy, self.value)]
+        written = can_be_written(self.policy, self.critic)
+        gradient = WrittenGradient(self.policy, self.critic, self.objective) if written else self.gradient
         sums: dict[str, Tensor] = {}
         updates = 0
         for _ in range(self.config.epochs):
             order = torch.randperm(len(frames), generator=self.shuffle, device=self.shuffle.device)
             for ids in order.split(size):
-                objective, told = self._losses(frames[ids])
-                self.optimizer.zero_grad(set_to_none=True)
-                objective.backward()
-                for parameters in nets:
-                    nn.utils.clip_grad_norm_(parameters, self.config.max_grad_norm)
+                for slope in slopes:
+                    slope.zero_()
+                told = gradient(frames[ids])
+                for slope in slopes:
+                    slope *= (self.config.max_grad_norm / (torch.linalg.vector_norm(slope) + 1e-6)).clamp_max(1.0)
                 self.optimizer.step()
                 updates += 1
-                sums = {name: sums.get(name, 0) + value.detach() for name, value in told.items()}
+                sums = {name: sums.get(name, 0) + value for name, value in told.items()}
         return {
             **{name: float(total) / updates for name, total in sums.items()},
             "learning_rate": self.optimizer.param_groups[0]["lr"],
@@ -173,24 +171,17 @@ class PPO(Algorithm):
         """The entries of a prepared batch that are learned from."""
         learned = ("action", "action_log_prob", "advantage", "value_target")
         taught = ("taught_action", "taught_unit") if self.teacher else ()
-        return list(dict.fromkeys((*self.policy.in_keys, *self.value.in_keys, *learned, *taught)))
+        valued = ("observation", "true_state") if self.critic.is_privileged else ("observation",)
+        return list(dict.fromkeys((*self.policy.in_keys, *valued, *learned, *taught)))
 
-    def _losses(self, frames: Mapping[NestedKey, Tensor]) -> tuple[Tensor, dict[str, Tensor]]:
-        """What a gradient step lowers on a minibatch, and its parts and diagnostics."""
-        options = self.config
+    def gradient(self, frames: Any) -> dict[str, Tensor]:
+        """Adds to each parameter's ``grad`` that of a minibatch, by autograd; returns the objective's parts."""
         loc, scale = self.gaussian(frames)
-        value = self.value.module(*(frames[key] for key in self.value.in_keys))
         log_ratio = log_prob(frames["action"], loc, scale).flatten() - frames["action_log_prob"].flatten()
-        told = clipped_loss(log_ratio, frames["advantage"].flatten(), options.clip)
-        told["loss_critic"] = options.value_weight * (value - frames["value_target"]).square().mean()
-        # value errors in units of the horizon: in units of reward they would drown the policy's
-        objective = told["loss_objective"] + told["loss_critic"] / self.horizon**2
-        if options.entropy_weight:
-            objective = objective - options.entropy_weight * entropy(scale)
-        if self.teacher:
-            told["loss_teacher"] = imitation_loss(loc, frames, options.teacher_caution)
-            objective = objective + self.teacher_weight * told["loss_teacher"]
-        return objective, told
+        value = self.critic.of_seen(frames["observation"], frames.get("true_state"))
+        objective, told = self.objective(frames, loc, scale, log_ratio, value)
+        objective.backward()
+        return {name: part.detach() for name, part in told.items()}
 
     def state_dict(self) -> dict[str, Tensor]:
         tensors = super().state_dict() | {f"value.{k}": v for k, v in self.value.state_dict().items()}
@@ -202,5 +193,6 @@ class PPO(Algorithm):
         self.shuffle.set_state(tensors["rng.shuffle"])
 
     @property
-    def horizon(self) -> float:
-        return cast(Value, self.value.module).horizon
+    def critic(self) -> Value:
+        """The value network itself."""
+        return cast(Value, self.value.module)

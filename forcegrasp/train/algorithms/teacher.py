@@ -57,3 +57,9 @@ def imitation_loss(action: Tensor, frames: Mapping[Any, Tensor] | TensorDictBase
     """
     error = (action - frames["taught_action"]) / frames["taught_unit"]
     return (error.square() + caution * (-error - FREE).clamp_min(0).square()).sum(-1).mean()
+
+
+def imitation_slope(action: Tensor, frames: Mapping[Any, Tensor] | TensorDictBase, caution: float = 0.0) -> Tensor:
+    """The gradient of :func:`imitation_loss` with respect to the student's mean, ``(n, motors)``."""
+    error = (action - frames["taught_action"]) / frames["taught_unit"]
+    return (error - caution * (-error - FREE).clamp_min(0)) * (2 / len(action)) / frames["taught_unit"]

@@ -19,7 +19,12 @@ PRIVILEGED = ["grasp_parameters", "force", "joint_position", "object_position"]
 
 
 class Value(nn.Module):
-    """State value. Its output is scaled by the horizon 1 / (1 − γ), so that the network's own stays about 1."""
+    """State value. Its output is scaled by the horizon 1 / (1 − γ), so that the network's own stays about 1.
+
+    Attributes:
+      horizon: that.
+      is_privileged: whether it sees the true state.
+    """
 
     middle: Tensor
     half_width: Tensor
@@ -29,6 +34,7 @@ class Value(nn.Module):
     ) -> None:
         super().__init__()
         ranges = _parameter_ranges(gripper)
+        self.is_privileged = privileged
         self.direct, self.stroke, self.force = gripper.is_direct, gripper.stroke, _large_force(gripper)
         extra = len(ranges) + 2 + len(gripper.motors) + 1 if privileged else 0
         self.net = MLP(
@@ -40,13 +46,20 @@ class Value(nn.Module):
         self.register_buffer("half_width", torch.tensor(half), persistent=False)
 
     def forward(self, observation: Tensor, *state: Tensor) -> Tensor:
-        if state:
-            parameters, force, position, object_position = state
-            true = (parameters - self.middle) / self.half_width
-            moved = (object_position - parameters[..., 3:4]) * 1000
-            features = [true, force / self.force, self._gap(position, object_position, parameters[..., 2:3]), moved]
-            observation = torch.cat([observation, *features], dim=-1)
-        return self.horizon * self.net(observation)
+        """Of each state ``(*B, 1)``; ``state`` are the entries named ``PRIVILEGED``, if the network is privileged."""
+        return self.of_seen(observation, self.true_state(*state) if state else None)
+
+    def of_seen(self, observation: Tensor, true_state: Tensor | None = None) -> Tensor:
+        """The same, of a :meth:`true_state` that is known."""
+        seen = observation if true_state is None else torch.cat([observation, true_state], dim=-1)
+        return self.horizon * self.net(seen)
+
+    def true_state(self, parameters: Tensor, force: Tensor, position: Tensor, object_position: Tensor) -> Tensor:
+        """What a privileged network sees beside the observation, ``(*B, extra)``: each about in [-1, 1]."""
+        true = (parameters - self.middle) / self.half_width
+        moved = (object_position - parameters[..., 3:4]) * 1000
+        gap = self._gap(position, object_position, parameters[..., 2:3])
+        return torch.cat([true, force / self.force, gap, moved], dim=-1)
 
     def _gap(self, position: Tensor, object_position: Tensor, radius: Tensor) -> Tensor:
         """True gap between each finger and the object's surface, in centimetres; else where the motors are."""
