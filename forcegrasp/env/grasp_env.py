@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 import torch
 from jaxtyping import Float, Shaped
 from tensordict import TensorDict, TensorDictBase
+from tensordict.utils import NestedKey
 from torch import Tensor
 from torchrl.data import Bounded, Categorical, Composite, Unbounded
 from torchrl.envs import EnvBase
@@ -40,6 +40,10 @@ OBSERVATIONS = {
     ("reward_terms", "object"): (1, "r_obj, unweighted"),
     ("reward_terms", "overshoot"): (1, "r_over, unweighted"),
 }
+#: Tensors by key; of nested ones by their path.
+State = dict[NestedKey, Tensor]
+#: The terms of the reward that follow from forces.
+FORCE_TERMS = ("force_paper", "force_normalised", "overshoot")
 #: The entry that robots add: factors of the noise of positions and forces, and steps that they are rounded to.
 READING_VARIATION = "reading_variation"
 
@@ -122,21 +126,26 @@ class GraspEnv(EnvBase):
         ids = np.arange(self.simulator.n) if mask is None else np.flatnonzero(mask.cpu().numpy().reshape(-1))
         self.simulator.reset(self.sampler(self.rng, ids), ids, self.rng)
         self._drawn = self._column(self.simulator.parameters.as_array())
-        return self._state()
+        return TensorDict(self._state(), batch_size=self.batch_size)
 
     def _step(self, tensordict: TensorDictBase) -> TensorDictBase:
-        delta = tensordict.get("joint_delta")
+        return TensorDict(self.advance(tensordict.get("joint_delta")), batch_size=self.batch_size)
+
+    def advance(self, delta: Float[Tensor, "n motors"]) -> State:
+        """Takes a step; returns all entries that it leads to, by key, nested ones by their path."""
         if isinstance(self.simulator, WarpGraspSimulator):
             self.simulator.step(delta)
         else:
             self.simulator.step(delta.numpy().astype(np.float64))
         state, config = self._state(), self.reward_config
-        terms: Any = state.get("reward_terms")
-        judged = terms if config.forces == "actual" else self._force_terms(state["measured_force"], state["goal_force"])
+        if config.forces == "actual":
+            judged = {name: state["reward_terms", name] for name in FORCE_TERMS}
+        else:
+            judged = self._force_terms(state["measured_force"], state["goal_force"])
         form = judged["force_paper" if config.form == "paper" else "force_normalised"]
-        reward = config.force_weight * form + config.object_weight * terms["object"]
-        reward = reward + config.overshoot_weight * judged["overshoot"]
-        return state.set("reward", reward)
+        reward = config.force_weight * form + config.object_weight * state["reward_terms", "object"]
+        state["reward"] = reward + config.overshoot_weight * judged["overshoot"]
+        return state
 
     def _column(self, values: Shaped[np.ndarray | Tensor, "{self.simulator.n} ..."]) -> Float[Tensor, "n k"]:
         """A simulator's values ``(n,)`` or ``(n, k)`` as a float32 tensor ``(n, k)`` on the env's device."""
@@ -151,28 +160,27 @@ class GraspEnv(EnvBase):
             "overshoot": overshoot_penalty(force, goal, self.reward_config.overshoot_margin),
         }
 
-    def _state(self) -> TensorDict:
+    def _state(self) -> State:
         simulator, column, parameters = self.simulator, self._column, self._drawn.clone()
         force, goal, speed = column(simulator.force), parameters[:, -1:], column(simulator.object_speed)
         terms = self._force_terms(force, goal)
         terms["object"] = object_penalty(speed, self.reward_config.speed_threshold_m)
-        state = TensorDict(
-            {
-                "joint_position": column(simulator.joint_position),
-                "measured_position": column(simulator.measured_position),
-                "commanded_position": column(simulator.commanded_position),
-                "force": force,
-                "measured_force": column(simulator.measured_force),
-                "goal_force": goal.clone(),
-                "object_position": column(simulator.object_position),
-                "object_speed": speed,
-                "grasp_parameters": parameters,
-                "reward_terms": TensorDict(terms, batch_size=self.batch_size),
-                **self._done(),
-            },
-            batch_size=self.batch_size,
-        )
-        return state.set(READING_VARIATION, column(self.robots.readings)) if self.robots else state
+        state: State = {
+            "joint_position": column(simulator.joint_position),
+            "measured_position": column(simulator.measured_position),
+            "commanded_position": column(simulator.commanded_position),
+            "force": force,
+            "measured_force": column(simulator.measured_force),
+            "goal_force": goal.clone(),
+            "object_position": column(simulator.object_position),
+            "object_speed": speed,
+            "grasp_parameters": parameters,
+            **{("reward_terms", name): term for name, term in terms.items()},
+            **self._done(),
+        }
+        if self.robots:
+            state[READING_VARIATION] = column(self.robots.readings)
+        return state
 
     def _done(self) -> dict[str, Tensor]:
         truncated = torch.as_tensor(self.simulator.steps >= self.episode_steps, device=self.device).unsqueeze(-1)

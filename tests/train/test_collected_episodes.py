@@ -62,6 +62,34 @@ def test_same_batch_as_torchrl(overrides):
     assert batch["force"].any() or "so101" in " ".join(overrides), "the fingers must arrive"
 
 
+class OfAUser(Transform):
+    """Asks more of a tensordict than the package's own transforms do."""
+
+    def _call(self, next_tensordict):
+        total = next_tensordict.select("force", "measured_force").apply(lambda value: value.sum(-1, keepdim=True))
+        return next_tensordict.update({"total": total["force"], "nested": {"total": total["measured_force"]}})
+
+    def _reset(self, tensordict, tensordict_reset):
+        return self._call(tensordict_reset)
+
+    def transform_observation_spec(self, observation_spec):
+        observation_spec["total"] = observation_spec["goal_force"].clone()
+        observation_spec["nested", "total"] = observation_spec["goal_force"].clone()
+        return observation_spec
+
+
+def test_transforms_of_a_user_get_tensordicts():
+    made = trainer()
+    made.env.append_transform(OfAUser())
+    expected = by_torchrl(made)
+    made = trainer()
+    made.env.append_transform(OfAUser())
+    batch = collect(seeded(made).env, made.policy, 12)
+    assert set(batch.keys(True, True)) == set(expected.keys(True, True))
+    for key in ("total", ("nested", "total"), "observation", ("next", "nested", "total"), ("next", "reward")):
+        assert torch.equal(batch.get(key), expected.get(key)), key
+
+
 def test_a_training_collects_so(monkeypatch):
     monkeypatch.setattr(Collector, "rollout", None)
     assert next(iter(trainer().collector)).shape == (3, 12)

@@ -25,15 +25,16 @@ from forcegrasp.train.algorithms.value_network import Value
 
 
 def can_be_written(policy: ProbabilisticActor, critic: Value) -> bool:
-    """Whether :class:`WrittenGradient` has the gradient of these networks: no memory, and on the CPU in float32."""
+    """Whether :class:`WrittenGradient` has the gradient of these networks: without memory."""
     networks = policy[0].module
-    if not isinstance(networks, nn.Sequential):
-        return False
-    plain = all(
-        type(net) is MLP and {type(module) for module in net} <= {nn.Linear, Tanh}
-        for net in (_layers_of(networks[0]), critic.net)
-    )
-    return plain and all(p.device.type == "cpu" and p.dtype is torch.float32 for p in policy.parameters())
+    return isinstance(networks, nn.Sequential) and is_plain(networks[0]) and is_plain(critic.net)
+
+
+def is_plain(net: nn.Module) -> bool:
+    """Whether it is what :class:`Mean` is made for: tanh layers, and what may be around them, on the CPU in float32."""
+    layers = _layers_of(net)
+    plain = type(layers) is MLP and {type(module) for module in layers} <= {nn.Linear, Tanh}
+    return plain and all(p.device.type == "cpu" and p.dtype is torch.float32 for p in net.parameters())
 
 
 class WrittenGradient:
