@@ -194,10 +194,12 @@ class _Ways:
                 further = rest if is_answer(rest[0]) else None
             something_else = leave_out.names or (moves is not None and moves.asked)
             if further is None and something_else and not found.is_of_none:  # it was neither
-                again = self.search(*fitted, start=(found.fit, kept_steps(found.steps)))
+                trial = found.bolder or found  # what was not believed need not be looked for anew
+                again = self.search(*fitted, start=(trial.fit, kept_steps(trial.steps)))
                 if again.stopped:
                     return dataclasses.replace(found, stopped=again.stopped), None
-                found, further = again, self.moved(again, loaded, briefly=True)
+                if trial is found or again.verdict.lacks_effects:
+                    found, further = again, self.moved(again, loaded, briefly=True)
         except REASONS as reason:
             return dataclasses.replace(found, stopped=cut_short(reason, self.progress)), None
         return found, further

@@ -68,3 +68,23 @@ def test_a_search_that_ended_for_a_move_that_was_none_goes_on_where_it_stood(mad
     assert _Ways(None, [], 0, silent).search_as_it_is(loaded, (found.target, None, found.base)) == (found, None)
     again = [] if of_none else [(found.fit, kept_steps(found.steps))]
     assert begun == [None, *again]
+
+
+@pytest.mark.parametrize("verdict", ["effect", "unknown"])
+def test_it_goes_on_with_what_was_not_believed_and_keeps_what_it_adds_up_to(made_up, monkeypatch, verdict):
+    """A motor that fades was load friction for twelve minutes, and again when it was asked for a third time."""
+    bolder, again, begun = made_up.diagnosis("effect"), made_up.diagnosis(verdict), []
+    first = dataclasses.replace(made_up.diagnosis("unknown"), bolder=bolder)
+    asked = SimpleNamespace(asked=True, beyond=False, before_more=never, explain=never)
+    monkeypatch.setattr(diagnose_set, "MovesFirst", lambda _: asked)
+    monkeypatch.setattr(_Ways, "moved", lambda *_, **__: None)
+
+    def search(*_, start=None, stop_when=None):
+        begun.append(start)
+        return again if start else first
+
+    monkeypatch.setattr(_Ways, "search", search)
+    loaded = SimpleNamespace(gripper=first.target.gripper)
+    found = _Ways(None, [], 0, silent).search_as_it_is(loaded, (first.target, None, first.base))
+    assert begun == [None, (bolder.fit, kept_steps(bolder.steps))]
+    assert found == (again if verdict == "effect" else first, None)
