@@ -133,6 +133,26 @@ def test_a_rough_fit_that_gained_nearly_as_much_is_held_against_what_leaves_more
     assert finalists._rivals(simple, [rough], set()) == []
 
 
+@pytest.mark.parametrize(
+    ("name", "times", "as_far"), [("object_size", 1.3, True), ("object_size", 9.0, False), ("backlash", 1.3, False)]
+)
+def test_a_mistake_of_the_set_that_gained_nearly_as_much_is_fitted_as_far_as_the_effect(
+    creeping, alike, monkeypatch, name, times, as_far
+):
+    """Radii that were 2 mm too large left 1.28 roughly, and backlash 1.01 at its end: it was named without a doubt."""
+    study, base = creeping
+    best, fitted = alike.candidates[0], []
+    setting = EffectSetting.typical(effect_of(name, light_gripper()))
+    fit = dataclasses.replace(best.fit, residual=times * best.fit.residual)
+    rough = dataclasses.replace(best, setting=setting, fit=fit, share=0.8 * best.share, gains=0.8 * best.gains)
+    monkeypatch.setattr(
+        Finalists, "_at_the_end", lambda _, some, __: fitted.extend(c.effect.name for c in some) or some
+    )
+    monkeypatch.setattr(Finalists, "_better_look_alikes", lambda *_: [])
+    Finalists(Start(study, base.fit), [], np.zeros(1)).fitted([[best], [rough]])
+    assert (name in fitted) == as_far
+
+
 @pytest.mark.parametrize(("known", "times", "errors"), [(False, 1.3, 1.0), (True, 1.3, 2.0), (True, 1.6, 1.0)])
 def test_where_effects_leave_little_a_gain_is_to_be_two_standard_errors(creeping, alike, known, times, errors):
     """Of a backlash's 24 grasps two held what was left, whose contacts had gone another way: a compliance was found."""

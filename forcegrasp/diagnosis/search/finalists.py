@@ -87,6 +87,10 @@ class Finalists:
                 # fitted to the end the others are no better than this rough one: it is to be fitted, too
                 names.add(first.effect.name)
                 (every[0],) = self._at_the_end([first], alike)
+            elif of_set := self._mistakes_instead(first, every, names):
+                names.update(c.effect.name for c in of_set)
+                fitted = {c.effect.name: c for c in self._at_the_end(of_set, alike)}
+                every = [fitted.get(c.effect.name, c) for c in every]
             elif self._may_be_a_look_alike(first) and (rivals := self._rivals(first, every, names)):
                 names.update(c.effect.name for c in rivals)
                 nearer = self._at_the_end(
@@ -137,6 +141,18 @@ class Finalists:
         """Whether an effect that was found leaves more than noise."""
         leaves_more = rms_error(best.fit, self._study.target) > ALL_FITTED
         return leaves_more and not (self._start.place(best)[0] or best.replaces or best.effect.of_set)
+
+    def _mistakes_instead(
+        self, best: Candidate, candidates: Sequence[Candidate], at_the_end: Collection[str]
+    ) -> list[Candidate]:
+        """Rough fits with mistakes of the set that gained nearly as much as an effect at its end.
+
+        Radii that are too large do as well as backlash, once other parameters have followed: neither is to be named
+        because the other was not fitted as far. Arguments as for :meth:`_rivals`.
+        """
+        if best.replaces or best.effect.of_set or self._start.place(best)[0]:
+            return []
+        return [c for c in self._rivals(best, candidates, at_the_end) if c.effect.of_set]
 
     def _rivals(self, best: Candidate, candidates: Sequence[Candidate], at_the_end: Collection[str]) -> list[Candidate]:
         """Rough fits that gained nearly as much as one that leaves more than noise at the end.
