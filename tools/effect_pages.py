@@ -66,6 +66,11 @@ _SQUEEZES = Show(
     "squeezes of growing strength, and a slow release",
     ((23.8, 0.02, 0.4), (22, 0.02, 0.4), (20, 0.02, 0.4), (18, 0.02, 0.4), (26.5, 0.01, 0.2)),
 )
+_LIGHT_TOUCHES = Show(
+    "a light touch, a squeeze, partial releases",
+    ((24.2, 0.01, 0.3), (23.7, 0.01, 0.3), (22, 0.006, 0.2),
+     (24, 0.006, 0.3), (22.8, 0.006, 0.2), (26.5, 0.01, 0.2)),
+)  # fmt: skip
 _PLANS = {
     "command_deadband": Show(
         "steps of 0.2 mm and of 0.4 mm in free air, a squeeze, a release in increments of 0.1 mm",
@@ -177,11 +182,8 @@ _PLANS = {
     "force_gain_asymmetry": Show(
         "a squeeze, a hold, a release", ((25, 0.02, 0.1), (21, 0.01, 1.0), (26.5, 0.01, 0.2))
     ),
-    "force_deadzone": Show(
-        "a light touch, a squeeze, partial releases",
-        ((24.2, 0.01, 0.3), (23.7, 0.01, 0.3), (22, 0.006, 0.2),
-         (24, 0.006, 0.3), (22.8, 0.006, 0.2), (26.5, 0.01, 0.2)),
-    ),
+    "force_deadzone": _LIGHT_TOUCHES,
+    "deadzone_asymmetry": _LIGHT_TOUCHES,
     "force_drift": Show(
         "free air, a squeeze with a long hold, free air again",
         ((26, 0.02, 0.8), (21.5, 0.01, 3.0), (27, 0.02, 1.6)),
@@ -189,6 +191,7 @@ _PLANS = {
     "force_bias": Show("free air, a squeeze, free air", ((26, 0.02, 0.4), (21.5, 0.01, 0.6), (27, 0.02, 0.6))),
     "quantisation": Show("a slow light squeeze and release", ((23.2, 0.0015, 0.2), (25, 0.002, 0.2)), start_m=0.025),
     "command_delay": _STEPS,
+    "delay_asymmetry": _STEPS,
     "actuator_lag": _STEPS,
     "second_order_lag": _STEPS,
     "force_lag": _STEPS,

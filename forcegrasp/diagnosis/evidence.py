@@ -32,6 +32,8 @@ _HALF = 0.5
 # Nor is one whose fit of all grasps leaves so many times what the other's leaves: where few grasps hold an object,
 # held-out ones say little. Rough fits end far nearer.
 _FITS_WORSE = 1.5
+# Where held-out grasps do not tell, one of as many parameters that leaves so many times less of all is the better one.
+_FITS_BETTER = 1.2
 # So many grasps at least may show an effect without the one that gains most.
 _AGREE = 6
 #: Between an effect and a fault of the set a lead below this decides nothing: to take one for the other costs most.
@@ -71,9 +73,13 @@ def _is_shown_by_all(gains: np.ndarray, errors: float) -> bool:
 
     One that gains far more than the others makes these scatter so much that nothing seems sure, though they agree.
     """
+    return any(is_beyond_chance(some, LEAST_RISE, errors) for some in (gains, _but_for_one(gains)))
+
+
+def _but_for_one(gains: np.ndarray) -> np.ndarray:
+    """Gains without the largest, if there are enough of them."""
     gains = gains[np.isfinite(gains)]
-    others = np.delete(gains, np.argmax(gains)) if len(gains) > _AGREE else gains
-    return any(is_beyond_chance(some, LEAST_RISE, errors) for some in (gains, others))
+    return np.delete(gains, np.argmax(gains)) if len(gains) > _AGREE else gains
 
 
 def _shows_in_some(candidate: Candidate, errors: float) -> bool:
@@ -128,11 +134,15 @@ def rivals_in(step: Step, fit: Fit) -> list[Candidate]:
     return [c for c in step.candidates[1:] if c.effect.name in names and families.may_join(c.effect, others)]
 
 
-def add_nothing(candidates: Sequence[Candidate]) -> set[str]:
+def add_nothing(candidates: Sequence[Candidate], enough: float = 0.0) -> set[str]:
     """Names of effects that contain another one of which held-out grasps say that it is enough, or nearly so.
 
     Or that have become it, can't be told from it, or fit all grasps no better: what they gain then is a quirk of how
     they are simulated, or of held-out predictions, which are linear.
+
+    Args:
+      candidates: of which some contain others.
+      enough: sum of squares that only noise leaves; of much error a simpler one that leaves more gains nearly as much.
     """
     found = {c.effect.name: c for c in candidates}
     return {
@@ -142,7 +152,7 @@ def add_nothing(candidates: Sequence[Candidate]) -> set[str]:
         if (simple := found.get(nested.effect)) is not None
         and (
             not _leads(c, simple)
-            or nearly_as_much(simple.heldout_gain, c.heldout_gain)
+            or (nearly_as_much(simple.heldout_gain, c.heldout_gain) and not _leaves_less(c, simple, enough))
             or families.is_the_simpler(c.setting, nested)
             or families.falls_back(c.fit, nested)
             or families.fits_as_well(simple.fit, c.fit)
@@ -150,9 +160,29 @@ def add_nothing(candidates: Sequence[Candidate]) -> set[str]:
     }
 
 
+def outdone(candidates: Sequence[Candidate]) -> list[Candidate]:
+    """Those that leave more of all grasps than another with no more parameters, and gain more of one at most.
+
+    One grasp may hold an object's stiffness alone, and the other grasps of that object ask for another one as long as
+    an effect is missing: what is held out then tells of that grasp, and the effect that fits all best gains least.
+    """
+
+    def better(other: Candidate, one: Candidate) -> bool:
+        no_richer = other.replaces == one.replaces and len(other.fit.problem) <= len(one.fit.problem)
+        leads = is_beyond_chance(_but_for_one(one.evidence - other.evidence), 0.0)
+        return no_richer and one.fit.cost > _FITS_BETTER * other.fit.cost and not leads
+
+    return [one for one in candidates if any(better(other, one) for other in candidates)]
+
+
 def nearly_as_much(gain: float, other: float) -> bool:
     """Whether an effect gains so nearly what a richer one gains that what that has besides is not worth naming."""
     return gain > _NEARLY * other
+
+
+def _leaves_less(richer: Candidate, simple: Candidate, enough: float) -> bool:
+    """Whether one leaves only noise, and the other far more."""
+    return richer.fit.cost < enough and simple.fit.cost > _FITS_WORSE * richer.fit.cost
 
 
 def _leads(winner: Candidate, other: Candidate, least: float = 0.0) -> bool:

@@ -333,7 +333,7 @@ def delay_line(past: np.ndarray, steps: np.ndarray, longest: float) -> State:
 
     Args:
       past: what came before the first value, ``(rows, width)``; NaN stands for that value itself.
-      steps: real number of steps by which each row is delayed, ``(rows,)``.
+      steps: real number of steps by which each row is delayed, ``(rows, 1)``, or each of its values, ``(rows, width)``.
       longest: the longest delay that any row will have, in steps.
     """
     whole = np.floor(steps)
@@ -341,32 +341,33 @@ def delay_line(past: np.ndarray, steps: np.ndarray, longest: float) -> State:
         "past": np.repeat(past[:, None], int(longest) + 2, axis=1),  # a ring, ``(rows, length, width)``
         "newest": np.zeros(len(past), int),
         "whole": whole.astype(int),
-        "part": (steps - whole)[:, None],
+        "part": steps - whole,
     }
 
 
 def all_delayed(line: State, signals: np.ndarray) -> np.ndarray:
     """What :func:`delayed` would return of the last steps' values ``(steps, rows, width)``, bit for bit."""
     past, part, whole = line["past"], line["part"], line["whole"]
-    rows, length = np.arange(len(past)), past.shape[1]
-    before = past[rows[:, None], (line["newest"][:, None] + 1 + np.arange(length)) % length].swapaxes(0, 1)
+    rows, (length, width) = np.arange(len(past))[:, None], past.shape[1:]
+    before = past[rows, (line["newest"][:, None] + 1 + np.arange(length)) % length].swapaxes(0, 1)
     unknown = np.isnan(past[:, 0, 0])
     before[:, unknown] = signals[0, unknown]
     every = np.concatenate([before, signals])
-    at = length + np.arange(len(signals))[:, None] - whole
-    near, far = every[at, rows], every[at - 1, rows]
+    at = length + np.arange(len(signals))[:, None, None] - whole
+    near, far = every[at, rows, np.arange(width)], every[at - 1, rows, np.arange(width)]
     return np.where(part == 0, near, (1 - part) * near + part * far)
 
 
 def delayed(line: State, signal: np.ndarray) -> np.ndarray:
     """Takes a step's value ``(rows, width)`` and returns the delayed one, between the two nearest steps."""
     past, part = line["past"], line["part"]
-    rows, length = np.arange(len(past)), past.shape[1]
+    rows, (length, width) = np.arange(len(past)), past.shape[1:]
     unknown = np.isnan(past[:, 0, 0])
     if unknown.any():
         past[unknown] = signal[unknown, None]
     line["newest"] = newest = (line["newest"] + 1) % length
     past[rows, newest] = signal
-    near = past[rows, (newest - line["whole"]) % length]
-    far = past[rows, (newest - line["whole"] - 1) % length]
+    at = newest[:, None] - line["whole"]
+    near = past[rows[:, None], at % length, np.arange(width)]
+    far = past[rows[:, None], (at - 1) % length, np.arange(width)]
     return np.where(part == 0, near, (1 - part) * near + part * far)

@@ -16,7 +16,7 @@ class CommandDelay(Effect):
     symptom = "all motion is shifted in time alike, in free air and in contact"
     formula = "u'(t) = u(t − d)"
     source = "dead time; MuJoCo's actuator `delay` does the same for one value per model"
-    look_alikes = ("actuator_lag", "force_delay", "readout_skew")
+    look_alikes = ("actuator_lag", "force_delay", "readout_skew", "delay_asymmetry")
     separates = "fast steps: a delayed response keeps its corner, a lagged one is rounded"
     parameters = (Parameter("delay_s", "time until a command acts", "s", 0.0, 0.4, 0.06, trials=(0.015, 0.05, 0.12)),)
     order = 1  # after a dead band, which is the driver's
@@ -24,7 +24,7 @@ class CommandDelay(Effect):
     known_beforehand = ("",)
 
     def init(self, which: np.ndarray) -> State:
-        steps = self["delay_s"][which, 0] / self.dt
+        steps = self["delay_s"][which] / self.dt
         return delay_line(self.resting_command[which], steps, self.longest("delay_s") / self.dt)
 
     @classmethod

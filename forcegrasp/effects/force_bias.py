@@ -22,7 +22,7 @@ class ForceBias(Effect):
         Parameter("left_n", "offset of the left sensor", "N", -2.0, 2.0, 0.06, follows="force"),
         Parameter("right_n", "offset of the right sensor", "N", -2.0, 2.0, 0.04, follows="force"),
     )
-    order = 7
+    order = 8
     per, alone = "channel", "offset"
     least_channels = 1
 

@@ -19,7 +19,7 @@ class ForceDeadzone(Effect):
     symptom = "force stays 0 at a light touch"
     formula = "f' = sign(f) max(|f| − z, 0) (subtract), or f if |f| ≥ z else 0 (gate)"
     source = "preloaded tactile skins, thresholded drivers"
-    look_alikes = ("backlash", "adhesion")
+    look_alikes = ("backlash", "adhesion", "deadzone_asymmetry")
     separates = "partial releases: the zone is crossed at one force, a gap at one travel"
     parameters = (
         Parameter(
@@ -30,8 +30,13 @@ class ForceDeadzone(Effect):
     order = 5
     least_channels = 1
 
+    @property
+    def threshold(self) -> np.ndarray:
+        """Of each channel, or of all alike, newtons, ``(rows, channels)`` or ``(rows, 1)``."""
+        return self["threshold_n"]
+
     def read_force(self, force: np.ndarray) -> np.ndarray:
-        threshold = self["threshold_n"]
+        threshold = self.threshold
         if self.variant == "gate":
             return np.where(np.abs(force) < threshold, 0.0, force)
         return np.where(threshold == 0, force, np.sign(force) * np.maximum(np.abs(force) - threshold, 0.0))

@@ -25,7 +25,7 @@ class ForceDelay(Effect):
 
     def init(self, which: np.ndarray) -> State:
         unknown = np.full((len(which), self.channels), np.nan)
-        return delay_line(unknown, self["delay_s"][which, 0] / self.dt, self.longest("delay_s") / self.dt)
+        return delay_line(unknown, self["delay_s"][which] / self.dt, self.longest("delay_s") / self.dt)
 
     def read_force(self, force: np.ndarray) -> np.ndarray:
         return delayed(self.state, force)

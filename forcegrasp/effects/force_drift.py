@@ -22,7 +22,7 @@ class ForceDrift(Effect):
         Parameter("left_n_s", "slope of the left sensor", "N/s", -1.0, 1.0, 0.02, follows="force"),
         Parameter("right_n_s", "slope of the right sensor", "N/s", -1.0, 1.0, -0.015, follows="force"),
     )
-    order = 6
+    order = 7
     per, alone = "channel", "slope"
     least_channels = 1
 

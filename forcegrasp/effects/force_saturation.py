@@ -39,7 +39,7 @@ class ForceSaturation(Effect):
         ),
         dataclasses.replace(KNEE, trials=(0.0, 0.4), if_missing=0.0),
     )
-    order = 8
+    order = 9
     least_channels = 1
 
     def read_force(self, force: np.ndarray) -> np.ndarray:

@@ -22,7 +22,7 @@ class Quantisation(Effect):
         Parameter("position_step_m", "step of the positions, if any", "m", 0.0, 0.005, 1e-4, follows="position"),
         Parameter("force_step_n", "step of the forces, if any", "N", 0.0, 1.0, 0.04, follows="force"),
     )
-    order = 10
+    order = 11
     after_noise = True
 
     @classmethod

@@ -33,7 +33,7 @@ class RateLimit(Effect):
             follows="position",
         ),
     )
-    order = 2
+    order = 3
     known_beforehand = ("",)
 
     def init(self, which: np.ndarray) -> State:

@@ -30,7 +30,7 @@ class RateLimitedLag(Effect):
         Parameter("time_constant_s", "time constant τ", "s", 0.0, 0.5, 0.05, trials=(0.02, 0.06)),
     )  # fmt: skip
     contains = (Nested("rate_limit", at={"time_constant_s": 0.0}, same={"rate_m_s": "rate_m_s"}),)
-    order = 3
+    order = 4
     known_beforehand = ("",)
 
     def init(self, which: np.ndarray) -> State:

@@ -28,7 +28,7 @@ class ReadoutSkew(Effect):
     least_steps = 1.0
 
     def init(self, which: np.ndarray) -> State:
-        steps = self["delay_s"][which, 0] / self.dt
+        steps = self["delay_s"][which] / self.dt
         past = np.full((len(which), self.motors), np.nan)
         return delay_line(past, steps, self.longest("delay_s") / self.dt)
 

@@ -28,6 +28,8 @@ _SHIPPED = (
     "contact_friction",
     "contact_onset",
     "coulomb_friction",
+    "deadzone_asymmetry",
+    "delay_asymmetry",
     "direction_friction",
     "elastic_transmission",
     "elastic_joint",

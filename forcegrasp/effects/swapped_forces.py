@@ -23,7 +23,7 @@ class SwappedForces(Effect):
     # in part they can't be: a small share is crosstalk, which is the same but for a gain
     least_size = 0.7
     least_channels = 2
-    order = 9  # columns are exchanged after all that happens to a force
+    order = 10  # columns are exchanged after all that happens to a force
 
     def read_force(self, force: np.ndarray) -> np.ndarray:
         return np.where(self["share"] == 0, force, force + self["share"] * (force[:, ::-1] - force))

@@ -38,7 +38,7 @@ class VelocityLag(Effect):
         velocity = self.velocity[which]
         if self.variant == "filter":
             return {"late": velocity}
-        windows, longest = 2 * self["lag_s"][which, 0] / self.dt, 2 * self.longest("lag_s") / self.dt
+        windows, longest = 2 * self["lag_s"][which] / self.dt, 2 * self.longest("lag_s") / self.dt
         line = delay_line(self.position[which], windows, longest)
         return line | {"at_first": velocity, "time": np.zeros((len(which), 1))}
 

@@ -57,6 +57,7 @@ _ONSETS = {
     "force_deadzone": Cause(
         "the sensor hides a force of that size (its `subtract` form)", lambda o: {"threshold_n": o.reading_n}
     ),
+    "deadzone_asymmetry": Cause("each sensor hides a force of its own, as with force_deadzone", _none),
     "force_drift": Cause("a zero that has fallen by the end of each hold; free-air readings would be negative", _none),
     "force_bias": Cause(
         "a zero that is too low; free-air readings would be negative unless they are cut",

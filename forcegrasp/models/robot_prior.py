@@ -36,8 +36,8 @@ class Prior:
 #: contact_friction, table_friction and object_mass, which object_body stands for, hunt_crossley_contact, for robots
 #: keep the scene's contact and stiffen it, and rounded_force_hysteresis, which force_hysteresis stands for. Nor has one
 #: an effect that came later (encoder_scale, return_spring, contact_damping, contact_onset, two_mass_backlash,
-#: viscous_friction, object_pull, the asymmetries of motors, friction, lost motion and compliance), or such a variant:
-#: policies were compared on robots as they are.
+#: viscous_friction, object_pull, the asymmetries of motors, friction, lost motion, compliance, delay and dead zone), or
+#: such a variant: policies were compared on robots as they are.
 EFFECTS = {
     "command_deadband": Prior(0.3, 1 / 3, 3, "the paper's robot: its driver sends no command below 0.3 mm"),
     "command_delay": Prior(0.6, 0.1, 0.7, "assumed: from a bus cycle to one control step of 40 ms"),

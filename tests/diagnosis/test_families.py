@@ -8,10 +8,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from forcegrasp.diagnosis import families
+from forcegrasp.diagnosis import evidence, families
 from forcegrasp.diagnosis.add_effect import add_effect
 from forcegrasp.diagnosis.diagnose_set import diagnose_set
-from forcegrasp.diagnosis.evidence import add_nothing
+from forcegrasp.diagnosis.evidence import add_nothing, outdone
 from forcegrasp.diagnosis.result import kept_steps
 from forcegrasp.diagnosis.search import finalists as finalists_module
 from forcegrasp.diagnosis.search.finalists import Finalists
@@ -89,6 +89,46 @@ def test_an_effect_must_explain_more_than_the_one_it_contains(
     rich = candidate("stiction", 100.0 + lead, 0.9 if fits_better else 1.0)
     assert add_nothing([simple, rich]) == ({"stiction"} if redundant else set())
     assert add_nothing([rich, candidate("backlash", np.full(4, 100.0))]) == set()
+
+
+@pytest.mark.parametrize(
+    ("less", "leaves_noise", "redundant"), [(0.5, True, False), (0.9, True, True), (0.5, False, True)]
+)
+def test_of_much_error_what_leaves_only_noise_is_more_than_what_gains_nearly_as_much(
+    made_up, monkeypatch, less, leaves_noise, redundant
+):
+    """Coulomb's friction gained 95 % of what presliding did, 7.5 × noise, and left 1.7; presliding left 1.02."""
+    monkeypatch.setattr(families, "falls_back", lambda fit, nested: False)
+    good = made_up.diagnosis("effect").steps[0].candidates[0]
+    simple = dataclasses.replace(good, setting=EffectSetting.typical(get_effect("coulomb_friction")))
+    fit = dataclasses.replace(good.fit, residual=less * good.fit.residual)
+    rich = dataclasses.replace(
+        good, setting=EffectSetting.typical(get_effect("presliding")), gains=1.03 * good.gains, fit=fit
+    )
+    enough = (1.1 if leaves_noise else 0.9) * fit.cost
+    assert add_nothing([simple, rich], enough) == ({"presliding"} if redundant else set())
+    assert add_nothing([simple, rich]) == {"presliding"}
+
+
+@pytest.mark.parametrize(
+    ("times", "one_grasp", "replaces", "is_behind"),
+    [(1.2, True, "", True), (1.05, True, "", False), (1.2, False, "", False), (1.2, True, "it", False)],
+)
+def test_what_leaves_more_of_all_grasps_is_no_better_for_what_one_grasp_gains(
+    made_up, times, one_grasp, replaces, is_behind
+):
+    """Late readings left 2.9 × noise and a delay 2.1, which gained less: one grasp held an object's stiffness."""
+    good = made_up.diagnosis("effect").steps[0].candidates[0]
+    fit = dataclasses.replace(good.fit, residual=times * good.fit.residual)
+    more = np.full(len(good.gains), 10.0)
+    if one_grasp:
+        more = np.resize([3.0, -2.0], len(more))
+        more[0] = 100.0
+        assert evidence.is_beyond_chance(more, 0.0)
+    setting = EffectSetting.typical(get_effect("readout_skew"))
+    worse = dataclasses.replace(good, setting=setting, fit=fit, gains=good.gains + more, replaces=replaces)
+    assert worse.heldout_gain > good.heldout_gain
+    assert outdone([worse, good]) == ([worse] if is_behind else [])
 
 
 @pytest.mark.parametrize(("creep", "redundant"), [(0.0, True), (1e-7, True), (5e-6, False)])

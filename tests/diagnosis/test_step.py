@@ -133,6 +133,21 @@ def test_a_rough_fit_that_gained_nearly_as_much_is_held_against_what_leaves_more
     assert finalists._rivals(simple, [rough], set()) == []
 
 
+@pytest.mark.parametrize("one_grasp", [True, False])
+def test_what_leaves_more_of_all_grasps_is_not_the_best_for_what_one_grasp_gains(
+    creeping, alike, monkeypatch, one_grasp
+):
+    study, base = creeping
+    best = alike.candidates[0]
+    fit = dataclasses.replace(best.fit, residual=1.2 * best.fit.residual)
+    gains = best.gains + (best.heldout_gain * (np.arange(len(best.gains)) == 0) if one_grasp else 0.2 * best.gains)
+    other = dataclasses.replace(best, setting=EffectSetting.typical(OFFSET), fit=fit, gains=gains - 0.1)
+    monkeypatch.setattr(Finalists, "_at_the_end", lambda _, some, __: some)
+    monkeypatch.setattr(Finalists, "_better_look_alikes", lambda *_: [])
+    ordered, _ = Finalists(Start(study, base.fit), [], np.zeros(1)).fitted([[other], [best]])
+    assert ordered[0].effect is (SMOOTH if one_grasp else OFFSET)
+
+
 @pytest.mark.parametrize(
     ("name", "times", "as_far"), [("object_size", 1.3, True), ("object_size", 9.0, False), ("backlash", 1.3, False)]
 )

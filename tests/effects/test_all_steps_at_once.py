@@ -25,7 +25,8 @@ class Delayed:
 
 
 def test_some_do():
-    assert {effect.name for effect, _ in OVERRIDDEN} == {"command_delay", "force_delay", "readout_skew"}
+    by_time = {"command_delay", "delay_asymmetry", "force_delay", "readout_skew"}
+    assert {effect.name for effect, _ in OVERRIDDEN} == by_time
 
 
 @pytest.mark.parametrize("seen_before", [0, 1, 25])
@@ -34,9 +35,10 @@ def test_they_are_those_of_step_by_step(effect, hook, seen_before):
     rng = np.random.default_rng(seen_before)
     signals, fresh = rng.normal(size=(STEPS, ROWS, 2)), np.ones((STEPS, ROWS), bool)
     more = (fresh,) if hook == "commands" else ()
+    times, others = np.array([[0.0], [0.0073], [0.02]]), np.tile(effect.typical_values()[1:], (ROWS, 1))
     made = []
     for of in (effect, Effect):
-        one = effect(np.array([[0.0], [0.0073], [0.02]]), DT).attach(Delayed(), np.arange(ROWS))
+        one = effect(np.hstack([times, others]), DT).attach(Delayed(), np.arange(ROWS))
         step = {"commands": one.command, "read_forces": one.read_force, "read_positions": one.read_position}[hook]
         for signal in signals[:seen_before]:
             step(signal, *(known[0] for known in more))

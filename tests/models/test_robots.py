@@ -72,7 +72,8 @@ def test_every_effect_of_a_robot_has_a_prior():
         "smooth_force_limit", "rate_limited_lag", "contact_friction", "hunt_crossley_contact", "encoder_scale",
         "return_spring", "contact_damping", "contact_onset", "object_mass", "table_friction", "friction_asymmetry",
         "backlash_asymmetry", "compliance_asymmetry", "two_mass_backlash", "motor_asymmetry",
-        "rounded_force_hysteresis", "viscous_friction", "object_pull", "second_order_lag",
+        "rounded_force_hysteresis", "viscous_friction", "object_pull", "second_order_lag", "delay_asymmetry",
+        "deadzone_asymmetry",
     }  # fmt: skip
     assert set(EFFECTS) == (robots - left_out) | {ObjectBody.name}
     assert all(0 < p.chance <= 1 and 0 < p.low <= p.high and p.why for p in EFFECTS.values())

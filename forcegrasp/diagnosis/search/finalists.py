@@ -75,8 +75,8 @@ class Finalists:
         families_tried: set[str] = set()
         doubted_of_set: set[str] = set()
         while True:
-            redundant = add_nothing(every)
-            every.sort(key=lambda c: (c.effect.name in redundant, *self._start.place(c)))
+            redundant = add_nothing(every, enough=ALL_FITTED**2 * self._study.target.readings)
+            every = self._start.best_first(every, last=redundant)
             first = every[0] if every else None
             if first is None:
                 return (), redundant

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Sequence
+
 import numpy as np
 
-from forcegrasp.diagnosis.evidence import LEAST_SHARE_OF_MANY, is_significant
+from forcegrasp.diagnosis.evidence import LEAST_SHARE_OF_MANY, is_significant, outdone
 from forcegrasp.diagnosis.noise.noise_check import unexpected_noise
 from forcegrasp.diagnosis.result import Candidate
 from forcegrasp.diagnosis.search.judge import LEAST_GAIN, LEAST_GAIN_AT_FLOOR, judged
@@ -52,6 +54,17 @@ class Start:
     def place(self, candidate: Candidate) -> tuple[bool, float]:
         """What candidates are ordered by: a true effect that explains too little yet must not hide one that does."""
         return not self.shows(candidate), -candidate.heldout_gain
+
+    def best_first(self, candidates: Sequence[Candidate], last: Collection[str] = ()) -> list[Candidate]:
+        """Candidates by :meth:`place`, what is outdone by another behind the others, and what adds nothing last.
+
+        Args:
+          candidates: in any order.
+          last: names of effects that add nothing to one that they contain.
+        """
+        behind = outdone([c for c in candidates if c.effect.name not in last and self.shows(c)])
+        ids = set(map(id, behind))
+        return sorted(candidates, key=lambda c: (c.effect.name in last, id(c) in ids, *self.place(c)))
 
     def may_be_of_many(self, candidate: Candidate, share_together: float, least: float) -> bool:
         """Whether an effect that explains little is worth a trial: all signatures together must promise enough."""

@@ -76,7 +76,7 @@ def look_further(
         promising = tuple(sorted(candidates, key=start.place))
         return Step((), promising, look.scores, start.error, start.error, of_none=True)
     variants: dict[str, list[Candidate]] = {}
-    for candidate in sorted(candidates, key=start.place):
+    for candidate in start.best_first(candidates):
         variants.setdefault(candidate.effect.name, []).append(candidate)
     ordered, redundant = finalists.fitted(list(variants.values()))
     screens = sorted([some for some in (ordered, before) if some], key=lambda some: start.place(some[0]))
