@@ -214,9 +214,12 @@ def preference(step: Step) -> str:
     """Why the first of the effects that can't be told apart is preferred; empty if there is one only."""
     if len(step.effects) < 2:
         return ""
-    first, *others = (len(candidate.effect.parameters) for candidate in step.candidates[: len(step.effects)])
+    tied = step.candidates[: len(step.effects)]
+    first, *others = (len(candidate.effect.parameters) for candidate in tied)
     if all(first < other for other in others):
         return "it has fewer parameters"
+    if tied[0].heldout_gain < max(candidate.heldout_gain for candidate in tied):
+        return "it fits all grasps better"
     if all(first == other for other in others):
         return "its held-out gain is larger"
     return "it has fewer parameters or a larger held-out gain"

@@ -320,6 +320,16 @@ def test_of_equally_many_parameters_the_gain_decides(made_up):
     assert "for its held-out gain is larger" in answer
 
 
+def test_what_gains_less_is_preferred_for_how_it_fits_all_grasps(made_up):
+    diagnosis = made_up.diagnosis("one_of")
+    (step,) = diagnosis.steps
+    first, *others = step.candidates
+    less = dataclasses.replace(first, gains=0.5 * others[0].gains)
+    step = dataclasses.replace(step, candidates=(less, *others))
+    answer = diagnosis_answer.answer(dataclasses.replace(diagnosis, steps=(step,)))
+    assert "force_bias is preferred, for it fits all grasps better" in answer
+
+
 @pytest.mark.parametrize(
     ("before", "after", "left", "said"),
     [
