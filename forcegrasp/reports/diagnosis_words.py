@@ -95,6 +95,11 @@ def left_out_words(diagnosis: Diagnosis) -> str:
     under = "× noise under the model that was found"
     named = listed([f"grasp {g.name} of {g.object} ({g.error:.1f} {under})" for g in diagnosis.left_out])
     one = len(diagnosis.left_out) == 1
+    if all(grasp.error <= MUCH * diagnosis.error_after for grasp in diagnosis.left_out):
+        return (
+            f"Left out: {named}, which the model without it missed far more than all others. What was found foretells"
+            f" {'it' if one else 'them'} as well as the others, of which alone it was found."
+        )
     return (
         f"Left out: {named}, which the model misses far more than all others; what is said here is of the others alone."
         f" {'It' if one else 'Each'} went wrong, or shook in a way that no fit can follow."

@@ -17,6 +17,7 @@ from forcegrasp.identify.verdict import Verdict
 from forcegrasp.reports.diagnosis_answer import answer
 from forcegrasp.reports.diagnosis_as_json import diagnosis_json
 from forcegrasp.reports.diagnosis_box import answer_box
+from forcegrasp.reports.diagnosis_words import left_out_words
 from forcegrasp.reports.results import DiagnoseResult
 from tests.diagnosis.test_faults_of_the_set import silent, with_model
 from tests.light_set import light_set
@@ -74,6 +75,15 @@ def test_so_are_effects_that_leave_no_more_than_their_model_can_foretell(made_up
     found = dataclasses.replace(made_up.diagnosis("effect"), left="in all", error_after=3.0, floor=1.0)
     monkeypatch.setattr(type(found), "floor_of_model", of_model)
     assert is_answer(found) == good
+
+
+@pytest.mark.parametrize(("errors", "went_wrong"), [((9.0,), True), ((1.4,), False), ((1.4, 9.0), True)])
+def test_a_grasp_that_the_final_model_foretells_did_not_go_wrong(made_up, errors, went_wrong):
+    odd = tuple(OddGrasp(str(place), "a", error) for place, error in enumerate(errors))
+    told = left_out_words(dataclasses.replace(made_up.diagnosis("effect"), error_after=1.0, left_out=odd))
+    assert told.startswith(f"Left out: grasp 0 of a ({errors[0]} × noise under the model that was found)")
+    assert ("went wrong" in told) == went_wrong
+    assert ("foretells it as well as the others" in told) != went_wrong
 
 
 @pytest.fixture(scope="module")
