@@ -94,16 +94,26 @@ def left_out_words(diagnosis: Diagnosis) -> str:
         return ""
     under = "× noise under the model that was found"
     named = listed([f"grasp {g.name} of {g.object} ({g.error:.1f} {under})" for g in diagnosis.left_out])
-    one = len(diagnosis.left_out) == 1
-    if all(grasp.error <= MUCH * diagnosis.error_after for grasp in diagnosis.left_out):
-        return (
-            f"Left out: {named}, which the model without it missed far more than all others. What was found foretells"
-            f" {'it' if one else 'them'} as well as the others, of which alone it was found."
-        )
+    left_out, one = f"Left out: {named}, {why_left_out(diagnosis)}", len(diagnosis.left_out) == 1
+    if foretells_left_out(diagnosis):
+        them = "it" if one else "them"
+        return f"{left_out}. What was then found in those alone foretells {them} as well as the others."
+    each = "It" if one else "Each"
     return (
-        f"Left out: {named}, which the model misses far more than all others; what is said here is of the others alone."
-        f" {'It' if one else 'Each'} went wrong, or shook in a way that no fit can follow."
+        f"{left_out}; what is said here is of the others alone."
+        f" {each} went wrong, or shook in a way that no fit can follow."
     )
+
+
+def why_left_out(diagnosis: Diagnosis) -> str:
+    """Of grasps that were left out, in a relative clause."""
+    misses = "at first missed" if foretells_left_out(diagnosis) else "misses"
+    return f"which the model {misses} far more than all others"
+
+
+def foretells_left_out(diagnosis: Diagnosis) -> bool:
+    """Whether the model that was found misses the grasps that were left out about as little as the others."""
+    return all(grasp.error <= MUCH * diagnosis.error_after for grasp in diagnosis.left_out)
 
 
 def is_of_labels(diagnosis: Diagnosis) -> bool:

@@ -30,6 +30,7 @@ from forcegrasp.reports import diagnosis_answer, diagnosis_as_json, next_step
 from forcegrasp.reports import final_force as final_force_report
 from forcegrasp.reports import fit as fit_report
 from forcegrasp.reports.diagnosis_box import answer_box
+from forcegrasp.reports.diagnosis_words import why_left_out
 from forcegrasp.reports.html import Answer, Command, Section
 from forcegrasp.reports.physics_step import warning_of_fit
 from forcegrasp.short_repr import ShortRepr, counted, cut, some
@@ -251,7 +252,7 @@ class DiagnoseResult(Result):
         if not diagnosis.left_out:
             return model
         names = listed([grasp.name for grasp in diagnosis.left_out])
-        warning = f"fitted without {names}, which the model misses far more than all other grasps"
+        warning = f"fitted without {names}, {why_left_out(diagnosis)}"
         return dataclasses.replace(model, warnings=(warning, *model.warnings))
 
     @cached_property

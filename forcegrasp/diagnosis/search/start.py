@@ -63,8 +63,7 @@ class Start:
           last: names of effects that add nothing to one that they contain.
         """
         behind = outdone([c for c in candidates if c.effect.name not in last and self.shows(c)])
-        ids = set(map(id, behind))
-        return sorted(candidates, key=lambda c: (c.effect.name in last, id(c) in ids, *self.place(c)))
+        return sorted(candidates, key=lambda c: (c.effect.name in last, c in behind, *self.place(c)))
 
     def may_be_of_many(self, candidate: Candidate, share_together: float, least: float) -> bool:
         """Whether an effect that explains little is worth a trial: all signatures together must promise enough."""
