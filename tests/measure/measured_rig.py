@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from time import monotonic
 
 import numpy as np
 import pytest
@@ -117,12 +116,10 @@ def change(grasp: MeasuredGrasp, **changes) -> MeasuredGrasp:
 
 
 def refuse(path: Path, *parts: str) -> str:
-    """Asserts that reading is refused at once, in one line that says all of this; returns the line."""
-    start = monotonic()
+    """Asserts that reading is refused in one line that says all of this; returns the line."""
     with pytest.raises(MeasurementError) as caught:
         read_set(path)
     message = str(caught.value)
-    assert monotonic() - start < 2
     assert message.splitlines() == [message]
     assert message.isprintable()
     assert len(message) < 600
