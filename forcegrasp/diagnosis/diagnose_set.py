@@ -184,7 +184,8 @@ class _Ways:
         if found.stopped:
             return found, None
         try:
-            if moves is not None and moves.beyond and (further := self.put_right_besides(found, loaded, least=1.0)):
+            put_right = moves is not None and (moves.beyond or moves.zeros)
+            if put_right and (further := self.put_right_besides(found, loaded, least=1.0)):
                 return found, further
             further = self.moved(found, loaded, briefly=moves is not None and not (moves.asked or leave_out.names))
             if further is None and leave_out.names:

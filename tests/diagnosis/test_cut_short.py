@@ -99,7 +99,7 @@ def test_it_may_be_cut_short_anywhere_once_the_base_model_is_fitted(rubbing, mon
 @pytest.mark.parametrize("when", [1, 2])
 def test_a_fault_that_was_put_right_by_then_is_told(monkeypatch, when, reason):
     """Cut short while the set put right is doubted again, or while the set as it is, is searched to be held against."""
-    loaded, asked = light_set(), []
+    loaded, asked = light_set(grasps=6), []
     grasps = tuple(dataclasses.replace(grasp, time_s=1.5 * grasp.time_s) for grasp in loaded.measured.grasps)
     loaded = dataclasses.replace(loaded, measured=dataclasses.replace(loaded.measured, grasps=grasps))
     suspects = OF_SET.suspects

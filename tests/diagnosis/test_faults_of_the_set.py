@@ -342,6 +342,7 @@ def test_a_fault_is_put_right_and_told(request, measured, name, told, change):
     assert told in found["fault"]["words"]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("name", "change"),
     [

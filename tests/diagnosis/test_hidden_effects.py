@@ -50,6 +50,7 @@ def check_found(diagnosis, name: str) -> None:
     assert diagnosis.error_after < diagnosis.error_before
 
 
+@pytest.mark.long
 def test_finds_what_was_hidden_in_the_whole_catalogue(tmp_path):
     check_found(diagnosed(recorded(tmp_path, {"force_lag": "medium"})), "force_lag")
 
@@ -134,6 +135,7 @@ def test_the_wrong_effect_does_not_lower_the_error():
         add_effect(lagging, right.model, get_effect("force_lag"), silent)
 
 
+@pytest.mark.long
 def test_adds_an_effect_that_the_base_model_has_made_up_for(tmp_path):
     record(tmp_path / "set", {}, SEED, GRASPS, contact="mujoco_firm", samples=SAMPLES)
     firm = load(tmp_path / "set")

@@ -40,6 +40,7 @@ def test_the_right_term_is_found(bent):
     assert law.share > 0.8
 
 
+@pytest.mark.long
 def test_a_curve_whose_turning_point_is_on_the_way_is_found():
     """A cable that pulls at a sensor, most where the gripper is half open: with a line or a square much was left."""
     loaded = light_set(seed=15, grasps=6)

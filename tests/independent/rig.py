@@ -100,7 +100,7 @@ def record(
     setup = draw_setup(seed, grasps, plan, samples)
     hidden = build_effects(effects or {})
     recording = simulate(setup, hidden, seed, contact, noise, jitter_s)
-    _write(folder, spoil(_sheet(setup, recording), spoiled, np.random.default_rng([seed, 4])), setup.session)
+    _write(folder, spoil(_sheet(setup, recording), spoiled, np.random.default_rng([seed, 4])))
     placed = zip(setup.thing, setup.offset, setup.session, strict=True)
     truth = Truth(
         seed, plan, contact, setup.servo.gain, setup.servo.b2,
@@ -145,12 +145,12 @@ def record_one_more(
     places = {"thing": np.array([index]), "offset": np.array([offset]), "session": np.array([1])}
     setup = replace(setup, **places, commands=np.asarray(commands)[None])
     recording = simulate(setup, build_effects(dict(truth.effects)), noise_seed, truth.contact)
-    _write(Path(folder), _sheet(setup, recording), setup.session)
+    _write(Path(folder), _sheet(setup, recording))
 
 
 def _sheet(setup: Setup, recording: Recording) -> Sheet:
     return Sheet(
-        SAMPLE_S, [setup.things[i].name for i in setup.thing], setup.per_grasp("radius"), setup.offset,
+        SAMPLE_S, [setup.things[i].name for i in setup.thing], setup.session, setup.per_grasp("radius"), setup.offset,
         setup.commands, recording.q, recording.f,
     )  # fmt: skip
 
@@ -261,7 +261,7 @@ def _parameters(effect: Effect) -> dict[str, float]:
     return {f.name: float(getattr(effect, f.name)) for f in fields(effect) if f.init}
 
 
-def _write(folder: Path, sheet: Sheet, session: np.ndarray) -> None:
+def _write(folder: Path, sheet: Sheet) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     meta = {
         "format": "forcegrasp-measurements/1", "kind": "grasps", "gripper": "tiago",
@@ -272,7 +272,7 @@ def _write(folder: Path, sheet: Sheet, session: np.ndarray) -> None:
     with (folder / "grasps.csv").open("w", newline="") as file:
         rows = csv.writer(file)
         rows.writerow(["grasp", "object", "session", "object_radius_m", "object_offset_m"])
-        columns = zip(sheet.label, session, sheet.radius, sheet.offset, strict=True)
+        columns = zip(sheet.label, sheet.session, sheet.radius, sheet.offset, strict=True)
         for grasp, (label, day, radius, offset) in enumerate(columns):
             rows.writerow([grasp, label, f"session_{day}", round(float(radius), 6), float(offset)])
     with (folder / "samples.csv").open("w", newline="") as file:

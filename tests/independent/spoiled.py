@@ -14,6 +14,7 @@ class Sheet:
 
     period_s: float
     label: list[str]  # object of each grasp
+    session: np.ndarray  # (G,), 1, 2, …
     radius: np.ndarray  # (G,), metres
     offset: np.ndarray  # (G,), metres
     commands: np.ndarray  # (G, S, 2), metres
@@ -60,6 +61,23 @@ def _tare(sheet: Sheet, rng: np.random.Generator) -> Sheet:
     return replace(sheet, f=f)
 
 
+def _of_each_session(sheet: Sheet, std: float, rng: np.random.Generator) -> np.ndarray:
+    """A zero of each session's own for two columns, ``(G, 1, 2)``."""
+    days = np.unique(sheet.session)
+    return rng.normal(0.0, std, (len(days), 1, 2))[np.searchsorted(days, sheet.session)]
+
+
+def _homed_anew(sheet: Sheet, rng: np.random.Generator) -> Sheet:
+    """Before each session the gripper was homed: encoders and commands have another zero in each."""
+    off = _of_each_session(sheet, 2e-4, rng)
+    return replace(sheet, q=sheet.q + off, commands=sheet.commands + off)
+
+
+def _tared_anew(sheet: Sheet, rng: np.random.Generator) -> Sheet:
+    """Before each session force sensors were set to zero, carelessly."""
+    return replace(sheet, f=sheet.f + _of_each_session(sheet, 0.04, rng))
+
+
 SPOILED: dict[str, Spoil] = {
     "": lambda sheet, rng: sheet,
     "calliper": _calliper,
@@ -73,6 +91,8 @@ SPOILED: dict[str, Spoil] = {
     "commands_late": lambda sheet, rng: _late(sheet, commands=sheet.commands),
     "forces_late": lambda sheet, rng: _late(sheet, f=sheet.f),
     "tare": _tare,
+    "homed_anew": _homed_anew,
+    "tared_anew": _tared_anew,
 }
 
 

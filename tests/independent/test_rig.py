@@ -230,6 +230,7 @@ def test_a_spoiled_set_differs_in_what_is_written_alone(name: str, written) -> N
 
     expected = {
         "": set(), "clock_doubled": {"t_s"}, "forces_swapped": {"f_l_n", "f_r_n"}, "forces_late": {"f_l_n", "f_r_n"},
+        "homed_anew": {"qdes_l_m", "qdes_r_m", "q_l_m", "q_r_m"}, "tared_anew": {"f_l_n", "f_r_n"},
         "commands_late": {"qdes_l_m", "qdes_r_m"}, "tare": {"f_l_n"}, "calliper": {"object_radius_m"},
         "radius_0.3mm": {"object_radius_m"}, "radius_2mm": {"object_radius_m"}, "one_radius": {"object_radius_m"},
         "labels_swapped": {"object", "object_radius_m"}, "positions_swapped": {"q_l_m", "q_r_m"},

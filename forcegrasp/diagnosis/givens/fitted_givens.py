@@ -8,6 +8,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from forcegrasp.diagnosis.evidence import LEAST_SHARE_TOGETHER
+from forcegrasp.diagnosis.faults.fault import besides
 from forcegrasp.diagnosis.faults.odd_grasps import coordinates_by_name
 from forcegrasp.diagnosis.faults.suspects import leaves_nothing
 from forcegrasp.diagnosis.faults.tolerance import MOST, RULER_M, Moved
@@ -120,7 +121,9 @@ def told_as_moved(found: Diagnosis, loaded: Loaded[MeasurementSet], said: Fitted
             return with_fault(found, wrong.told_by(found.fit), (target, base.fit))
     if found.fault is not None and (timing := found.fault.moved) is not None:
         moved = Moved((*timing.numbers, *moved.numbers), np.r_[timing.deviations, moved.deviations])
-    fault = moved_as_fault(loaded, moved)
+    first = found.fault if found.fault is not None and found.fault.moved is None else None
+    fault = moved_as_fault(loaded if first is None else first.put_right, moved)
+    fault = fault if first is None else besides(first, fault)
     if shows_at_once:
         return with_fault(found, fault, (target, base.fit))
     return dataclasses.replace(found, fault=fault, error_moved=found.error_of_base)

@@ -12,6 +12,7 @@ from scipy.stats import chi2
 from forcegrasp.diagnosis.evidence import LEAST_LEAD, LEAST_SHARE_OF_MANY, is_beyond_chance, rivals_in
 from forcegrasp.diagnosis.families import refit_without, roughly_as, roughly_without
 from forcegrasp.diagnosis.faults.fault import Fault, besides
+from forcegrasp.diagnosis.faults.session_zeros import session_zeros
 from forcegrasp.diagnosis.faults.tolerance import MOST, RULER_M, WORTH, Moved, all_radii, first_move, time_of_reading
 from forcegrasp.diagnosis.faults.wrong_radii import within_tolerance
 from forcegrasp.diagnosis.few import with_few
@@ -54,6 +55,7 @@ class MovesFirst:
     loaded: Loaded[MeasurementSet]
     asked: bool = False  #: whether they were, of any fit
     beyond: bool = False  #: whether radii are to be moved beyond their tolerance, as if a ruler had measured them
+    zeros: bool = False  #: whether zeros of sessions are to be put right
 
     def __call__(self, target: Target, fit: Fit) -> bool:
         step = first_move(self.loaded.measured, target, fit, _COMES_FIRST)
@@ -68,7 +70,8 @@ class MovesFirst:
     def before_more(self, target: Target, fit: Fit) -> bool:
         """Whether moves explain most of what effects leave, and leave little, so that they come before more effects.
 
-        Not where radii are moved down alike: pads that stand further out, or lost motion, would have them so.
+        Not where radii are moved down alike: pads that stand further out, or lost motion, would have them so. Of zeros
+        of sessions some is enough, as of an effect.
         """
         measured = self.loaded.measured
         first = self.explain(target, fit)
@@ -76,6 +79,8 @@ class MovesFirst:
             moved = _most_explained(dataclasses.replace(measured, radius_std_m=RULER_M), target, fit)
             # if all are off alike it may be an effect
             first = self.beyond = moved is not None and moved.radii_differ_by_m > MOST * measured.radius_std_m
+        if not first:
+            first = self.zeros = session_zeros(target, fit) is not None
         self.asked |= first
         return first
 
