@@ -12,7 +12,7 @@ import numpy as np
 from forcegrasp.diagnosis.cut_short import REASONS, cut_short
 from forcegrasp.diagnosis.evidence import LEAST_SHARE_TOGETHER
 from forcegrasp.diagnosis.faults.fault import Fault
-from forcegrasp.diagnosis.faults.suspects import leaves_nothing, suspects, uneven_stamps
+from forcegrasp.diagnosis.faults.suspects import leaves_nothing, of_sessions, suspects, uneven_stamps
 from forcegrasp.diagnosis.givens.doubt import is_worth_a_search, more_likely, with_fault_beside
 from forcegrasp.diagnosis.givens.fitted_givens import told_as_moved, with_fitted_givens
 from forcegrasp.diagnosis.givens.give_back import without_move
@@ -34,7 +34,7 @@ from forcegrasp.effects import Effect
 from forcegrasp.effects.for_gripper import effect_of, effects_of
 from forcegrasp.errors import MeasurementError
 from forcegrasp.identify import fit_set
-from forcegrasp.identify.base_fit import BaseFit
+from forcegrasp.identify.base_fit import BaseFit, rms_error
 from forcegrasp.identify.fit import Fit, with_own_slopes
 from forcegrasp.identify.fitted_model import model_of
 from forcegrasp.identify.givens import errors_by_givens
@@ -103,6 +103,14 @@ def diagnose_set(
     return dataclasses.replace(may_be_late_rows(diagnosis, loaded), law=found, law_sought=sought), simulators
 
 
+class _ZerosFirst(Exception):  # noqa: N818  (nothing is wrong with the search)
+    """Zeros of sessions are to be put right before more effects are looked for than were found."""
+
+    def __init__(self, found: Diagnosis) -> None:
+        super().__init__()
+        self.found = found
+
+
 @dataclass(frozen=True)
 class _Ways:
     """How sets are fitted and searched: as they are, with givens moved, or without some grasps."""
@@ -111,6 +119,7 @@ class _Ways:
     effects: list[type[Effect]]
     seed: int
     progress: Progress
+    ask_sessions: bool = True  #: whether zeros of sessions may be put right once effects are known
 
     def fitted(self, loaded: Loaded[MeasurementSet]) -> Fitted:
         """A set, fitted."""
@@ -162,7 +171,29 @@ class _Ways:
 
     def search_and_move(self, loaded: Loaded[MeasurementSet], fitted: Fitted) -> tuple[Diagnosis, Found | None]:
         """The diagnosis of a set; and that with moves within its tolerance, or without some grasps, if it wants any."""
+        alone = self.one_effect_alone(loaded, fitted)
+        if alone is not None:
+            return alone, None
         return self.search_with_givens(loaded, fitted) or self.search_as_it_is(loaded, fitted)
+
+    def one_effect_alone(self, loaded: Loaded[MeasurementSet], fitted: Fitted) -> Diagnosis | None:
+        """The diagnosis of a set in which one effect leaves only noise; None if none does, or moved givens might.
+
+        Where it does, radii and places are as they are given: to fit them beside all effects takes as long as the rest.
+        """
+        target, _, base = fitted
+        if loaded.gripper.is_servo or rms_error(base.fit, target) < MUCH:
+            return None
+        if MovesFirst(loaded, ask_sessions=False).before_more(target, base.fit):
+            return None
+        found = self.search(*fitted, stop_when=StopWhen(always, given_first=always))
+        one = found.verdict.names_effects and len(kept_steps(found.steps)) == 1
+        nearly_all = explained_share(found.error_before, found.error_after, noise=found.floor) >= EXPLAINED_FAR
+        if found.stopped or (one and nearly_all and not found.left):
+            return found
+        if self.ask_sessions and found.verdict.names_effects and of_sessions(loaded, found.target, found.fit):
+            raise _ZerosFirst(found)
+        return None
 
     def search_with_givens(self, loaded: Loaded[MeasurementSet], fitted: Fitted) -> tuple[Diagnosis, Found] | None:
         """The same with radii and places fitted beside all effects; None if they explain little, or are wrong."""
@@ -173,7 +204,8 @@ class _Ways:
         return None if told is None else (found, (told, Simulators(told.fit.problem)))
 
     def search_as_it_is(self, loaded: Loaded[MeasurementSet], fitted: Fitted) -> tuple[Diagnosis, Found | None]:
-        moves, leave_out = None if loaded.gripper.is_servo else MovesFirst(loaded), LeaveOutFirst()
+        moves = None if loaded.gripper.is_servo else MovesFirst(loaded, self.ask_sessions)
+        leave_out = LeaveOutFirst()
 
         def something_else_first(target: Target, fit: Fit) -> bool:
             move = moves is not None and moves(target, fit)
@@ -183,9 +215,10 @@ class _Ways:
         found = self.search(*fitted, stop_when=StopWhen(something_else_first, first, explains))
         if found.stopped:
             return found, None
+        if moves is not None and moves.zeros:
+            raise _ZerosFirst(found)
         try:
-            put_right = moves is not None and (moves.beyond or moves.zeros)
-            if put_right and (further := self.put_right_besides(found, loaded, least=1.0)):
+            if moves is not None and moves.beyond and (further := self.put_right_besides(found, loaded, least=1.0)):
                 return found, further
             further = self.moved(found, loaded, briefly=moves is not None and not (moves.asked or leave_out.names))
             if further is None and leave_out.names:
@@ -286,9 +319,34 @@ def _put_right_or_as_said(
       known: faults that were put right already, or are not to be.
     """
     try:
-        return _likeliest(ways, loaded, said, known)
+        try:
+            return _likeliest(ways, loaded, said, known)
+        except _ZerosFirst as first:
+            return _with_zeros_put_right(ways, loaded, said, known, first.found)
     except REASONS as reason:
         return ways.found_nothing(said, reason)
+
+
+def _with_zeros_put_right(
+    ways: _Ways, loaded: Loaded[MeasurementSet], said: Fitted, known: Sequence[Fault], found: Diagnosis
+) -> Found:
+    """The diagnosis, begun anew with zeros of sessions put right that effects had hidden; as it is if none is better.
+
+    Args:
+      ways, loaded, said, known: as for :func:`_put_right_or_as_said`.
+      found: with the effects that had hidden them.
+    """
+    once = dataclasses.replace(ways, ask_sessions=False)
+    with_effects = dataclasses.replace(ways, model=model_of(found.fit, found.target, loaded, ()))
+    as_fitted = dataclasses.replace(loaded, measured=dataclasses.replace(loaded.measured, grasps=found.target.grasps))
+    (fault,) = of_sessions(as_fitted, found.target, found.fit)
+    base = dataclasses.replace(found.base, fit=found.fit)
+    if with_effects.put_right(fault, (found.target, Simulators(found.fit.problem), base)) is None:
+        return _put_right_or_as_said(once, loaded, said, known)
+    (fault,) = of_sessions(loaded, found.target, found.fit)
+    right = ways.fitted(fault.put_right)
+    further, simulators = _put_right_or_as_said(once, fault.put_right, right, (*known, fault))
+    return with_fault_beside(further, fault, _model(said)), simulators
 
 
 def _likeliest(ways: _Ways, loaded: Loaded[MeasurementSet], said: Fitted, known: Sequence[Fault]) -> Found:

@@ -50,7 +50,7 @@ def test_moves_that_leave_much_do_not_come_first(monkeypatch, left, first):
     """An effect that is not known yet has its part in the move then."""
     moved = SimpleNamespace(is_within=True, smaller_m=0.0, radii_differ_by_m=0.0)
     monkeypatch.setattr(moved_set, "first_move", lambda *_: (moved, left))
-    moves = MovesFirst(light_set())
+    moves = MovesFirst(light_set(), ask_sessions=False)
     assert moves.before_more(cast(Any, None), cast(Any, None)) is first
     assert not moves.beyond
 
@@ -60,8 +60,8 @@ def test_a_search_that_ended_for_a_move_that_was_none_goes_on_where_it_stood(mad
     """Unless what is missing is in no catalogue, which is no other when it is asked again."""
     found, begun = made_up.diagnosis("effect"), []
     found = dataclasses.replace(found, steps=(*found.steps, Step((), (), (), 2.0, 2.0, of_none=of_none)))
-    first = SimpleNamespace(asked=True, beyond=False, before_more=never, explain=never)
-    monkeypatch.setattr(diagnose_set, "MovesFirst", lambda _: first)
+    first = SimpleNamespace(asked=True, beyond=False, zeros=False, before_more=never, explain=never)
+    monkeypatch.setattr(diagnose_set, "MovesFirst", lambda *_: first)
     monkeypatch.setattr(_Ways, "moved", lambda *_, **__: None)
     monkeypatch.setattr(_Ways, "search", lambda *_, start=None, stop_when=None: begun.append(start) or found)
     loaded = SimpleNamespace(gripper=found.target.gripper)
@@ -75,8 +75,8 @@ def test_it_goes_on_with_what_was_not_believed_and_keeps_what_it_adds_up_to(made
     """A motor that fades was load friction for twelve minutes, and again when it was asked for a third time."""
     bolder, again, begun = made_up.diagnosis("effect"), made_up.diagnosis(verdict), []
     first = dataclasses.replace(made_up.diagnosis("unknown"), bolder=bolder)
-    asked = SimpleNamespace(asked=True, beyond=False, before_more=never, explain=never)
-    monkeypatch.setattr(diagnose_set, "MovesFirst", lambda _: asked)
+    asked = SimpleNamespace(asked=True, beyond=False, zeros=False, before_more=never, explain=never)
+    monkeypatch.setattr(diagnose_set, "MovesFirst", lambda *_: asked)
     monkeypatch.setattr(_Ways, "moved", lambda *_, **__: None)
 
     def search(*_, start=None, stop_when=None):

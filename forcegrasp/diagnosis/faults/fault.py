@@ -39,7 +39,6 @@ class Fault(ShortRepr):
     wider: Fault | None = None  #: the same of more objects, to be tried if something is left
     #: The log itself says so, and what the model lacks may hide all that it explains: it need not leave less at first.
     of_log: bool = False
-    beside_effects: bool = False  #: it may show only once effects are known that had hidden it, as what is fitted does
     part: str = ""  #: what of which recording is wrong, if it is one
     instead_of: str = ""  #: the one effect that it stands for where it is a rival; otherwise it stands for all
 

@@ -56,7 +56,7 @@ def suspects(loaded: Loaded[MeasurementSet], target: Target, fit: Fit) -> list[F
         return []
     measured, first = loaded.measured, [*_of_clock(loaded), *_of_swapped(loaded, target, fit)]
     others = [*wrong_zeros(loaded, target, fit), *_of_units(loaded), *wrong_rows(loaded, target, fit)]
-    others += _of_sessions(loaded, target, fit)
+    others += of_sessions(loaded, target, fit)
     # rows that do not keep step with commands make a clock seem off: that must not hide the rest
     all_of_clock = all(fault.name == "time_scale" for fault in (*first, *others))
     moved = wanted_moves(measured, target, fit) if all_of_clock else None
@@ -105,14 +105,20 @@ def _of_swapped(loaded: Loaded[MeasurementSet], target: Target, fit: Fit) -> lis
     return []
 
 
-def _of_sessions(loaded: Loaded[MeasurementSet], target: Target, fit: Fit) -> list[Fault]:
-    """Encoders or force sensors that have another zero in each session."""
+def of_sessions(loaded: Loaded[MeasurementSet], target: Target, fit: Fit) -> list[Fault]:
+    """Encoders or force sensors that have another zero in each session.
+
+    Args:
+      loaded: the set.
+      target: the same, lined up.
+      fit: of the base model, or of one with effects that had hidden it.
+    """
     if (zeros := session_zeros(target, fit)) is None:
         return []
     columns = loaded.measured.columns
     words = zeros.words(columns.force if zeros.of == "forces" else columns.position, columns.unit)
     right = with_each(loaded, lambda _, g: zeros.taken_out(g))
-    return [Fault(zeros.name, words, zeros.check, right, worth=LEAST_SHARE, beside_effects=True)]
+    return [Fault(zeros.name, words, zeros.check, right, worth=LEAST_SHARE)]
 
 
 def _of_units(loaded: Loaded[MeasurementSet]) -> list[Fault]:

@@ -36,7 +36,7 @@ def with_givens_put_right(
     found: Diagnosis, loaded: Loaded[MeasurementSet], put_right: PutRight, search_on: SearchOn, progress: Progress,
     least: float = MUCH,
 ) -> tuple[Diagnosis, Simulators] | None:  # fmt: skip
-    """The diagnosis with radii, settings or zeros put right beside effects; None if little is left, or a tie.
+    """The diagnosis with radii, or a recording's setting, put right beside effects; None if little is left, or a tie.
 
     Args:
       found: of the set as it is.
@@ -55,7 +55,7 @@ def with_givens_put_right(
     for model, of_model in _near_models(found, steps, progress):
         said = found.target, Simulators(model.problem), dataclasses.replace(found.base, fit=model)
         for fault in suspects(loaded, found.target, model):
-            if (fault.fitted or fault.beside_effects) and (better := put_right(fault, said)) is not None:
+            if fault.fitted and (better := put_right(fault, said)) is not None:
                 tried.append((*better, of_model))
                 break
     for fault, (target, simulators, base), of_model in sorted(tried, key=lambda one: one[1][2].fit.cost):

@@ -53,9 +53,10 @@ class MovesFirst:
     """Whether moves within the tolerance are to be tried before effects that promise little."""
 
     loaded: Loaded[MeasurementSet]
+    ask_sessions: bool = True  #: whether zeros of sessions may come first
     asked: bool = False  #: whether they were, of any fit
     beyond: bool = False  #: whether radii are to be moved beyond their tolerance, as if a ruler had measured them
-    zeros: bool = False  #: whether zeros of sessions are to be put right
+    zeros: bool = False  #: whether they do
 
     def __call__(self, target: Target, fit: Fit) -> bool:
         step = first_move(self.loaded.measured, target, fit, _COMES_FIRST)
@@ -74,13 +75,13 @@ class MovesFirst:
         of sessions some is enough, as of an effect.
         """
         measured = self.loaded.measured
-        first = self.explain(target, fit)
+        # places of all grasps would do as well, and be many more
+        self.zeros = self.ask_sessions and session_zeros(target, fit) is not None
+        first = self.zeros or self.explain(target, fit)
         if not first and measured.radius_std_m < RULER_M:
             moved = _most_explained(dataclasses.replace(measured, radius_std_m=RULER_M), target, fit)
             # if all are off alike it may be an effect
             first = self.beyond = moved is not None and moved.radii_differ_by_m > MOST * measured.radius_std_m
-        if not first:
-            first = self.zeros = session_zeros(target, fit) is not None
         self.asked |= first
         return first
 
