@@ -12,7 +12,8 @@ import numpy as np
 from forcegrasp.diagnosis.cut_short import REASONS, cut_short
 from forcegrasp.diagnosis.evidence import LEAST_SHARE_TOGETHER
 from forcegrasp.diagnosis.faults.fault import Fault
-from forcegrasp.diagnosis.faults.suspects import leaves_nothing, of_sessions, suspects, uneven_stamps
+from forcegrasp.diagnosis.faults.suspects import leaves_nothing, suspects, uneven_stamps
+from forcegrasp.diagnosis.faults.wrong_zeros import of_sessions
 from forcegrasp.diagnosis.givens.doubt import is_worth_a_search, more_likely, with_fault_beside
 from forcegrasp.diagnosis.givens.fitted_givens import told_as_moved, with_fitted_givens
 from forcegrasp.diagnosis.givens.give_back import without_move
@@ -319,10 +320,9 @@ def _put_right_or_as_said(
       known: faults that were put right already, or are not to be.
     """
     try:
-        try:
-            return _likeliest(ways, loaded, said, known)
-        except _ZerosFirst as first:
-            return _with_zeros_put_right(ways, loaded, said, known, first.found)
+        return _likeliest(ways, loaded, said, known)
+    except _ZerosFirst as first:
+        return _with_zeros_put_right(ways, loaded, said, known, first.found)
     except REASONS as reason:
         return ways.found_nothing(said, reason)
 
@@ -336,15 +336,18 @@ def _with_zeros_put_right(
       ways, loaded, said, known: as for :func:`_put_right_or_as_said`.
       found: with the effects that had hidden them.
     """
-    once = dataclasses.replace(ways, ask_sessions=False)
+    once, simulators = dataclasses.replace(ways, ask_sessions=False), Simulators(found.fit.problem)
     with_effects = dataclasses.replace(ways, model=model_of(found.fit, found.target, loaded, ()))
     as_fitted = dataclasses.replace(loaded, measured=dataclasses.replace(loaded.measured, grasps=found.target.grasps))
-    (fault,) = of_sessions(as_fitted, found.target, found.fit)
     base = dataclasses.replace(found.base, fit=found.fit)
-    if with_effects.put_right(fault, (found.target, Simulators(found.fit.problem), base)) is None:
-        return _put_right_or_as_said(once, loaded, said, known)
-    (fault,) = of_sessions(loaded, found.target, found.fit)
-    right = ways.fitted(fault.put_right)
+    try:
+        faults = of_sessions(as_fitted, found.target, found.fit)  # none, if another fit than this had them
+        if not any(with_effects.put_right(fault, (found.target, simulators, base)) for fault in faults):
+            return _put_right_or_as_said(once, loaded, said, known)
+        (fault,) = of_sessions(loaded, found.target, found.fit)
+        right = ways.fitted(fault.put_right)
+    except REASONS as reason:
+        return dataclasses.replace(found, stopped=cut_short(reason, ways.progress)), simulators
     further, simulators = _put_right_or_as_said(once, fault.put_right, right, (*known, fault))
     return with_fault_beside(further, fault, _model(said)), simulators
 

@@ -10,6 +10,7 @@ import pytest
 
 from forcegrasp.diagnosis.diagnose_set import diagnose_set
 from forcegrasp.diagnosis.faults.session_zeros import SessionZeros, session_zeros
+from forcegrasp.diagnosis.faults.wrong_zeros import wrong_zeros
 from forcegrasp.identify.fit_set import apply_model, fit_model
 from forcegrasp.identify.loading import Loaded
 from forcegrasp.measure.schema import MeasuredGrasp
@@ -84,16 +85,36 @@ def test_what_is_off_otherwise_is_not_told_as_of_sessions(found, change):
     assert found(lambda g, i: change(g, OFF_M[str(1 + i // 3)]), lambda i, g: str(i)) is None
 
 
+@pytest.mark.parametrize(
+    ("off", "name"),
+    [
+        ({"1": 0.0, "2": 0.08, "3": 0.08}, "force_tare"),  # one change of zero, that two sessions share
+        ({"1": 0.0, "2": 0.08, "3": -0.06}, "force_zeros"),
+    ],
+)
+def test_one_change_of_zero_is_no_zero_of_each_session(sound, off, name):
+    loaded, model = sound
+    places = {g.name: i for i, g in enumerate(loaded.measured.grasps)}
+
+    def of_session(g: MeasuredGrasp) -> MeasuredGrasp:
+        session = str(1 + places[g.name] // 3)
+        return forces(dataclasses.replace(g, session=session), [off[session], 0.0])
+
+    tared = changed(loaded, of_session)
+    target, _, base = apply_model(tared, model, silent, refit=True)
+    assert [fault.name for fault in wrong_zeros(tared, target, base.fit)] == [name]
+
+
 def test_words_say_by_how_much_each_differs_and_what_to_check():
     change = np.array([[3e-4, -2e-4], [1e-6, 0.0], [-3e-4, 2e-4]])
-    zeros = SessionZeros("homing", ("mon", "tue", "wed"), change)
+    zeros = SessionZeros("homing", ("mon", "tue", "wed"), change, 0.0)
     assert zeros.name == "position_zeros"
     assert zeros.words(("q_l_m", "q_r_m"), "m") == (
         "encoders and commands have another zero in each session: in mon q_l_m +0.3 mm, q_r_m -0.2 mm and in wed"
         " q_l_m -0.3 mm, q_r_m +0.2 mm, compared with the mean of all grasps"
     )
     assert "homed" in zeros.check
-    of_forces = SessionZeros("forces", ("mon", "tue"), np.array([[0.02], [-0.02]]))
+    of_forces = SessionZeros("forces", ("mon", "tue"), np.array([[0.02], [-0.02]]), 0.0)
     assert of_forces.name == "force_zeros"
     assert "in mon f_n +0.02 N" in of_forces.words(("f_n",), "m")
     assert "open fingers" in of_forces.check

@@ -38,6 +38,7 @@ class SessionZeros:
     of: str  #: "readings" of encoders, "homing" of encoders and commands, or "forces"
     sessions: tuple[str, ...]
     change: np.ndarray  #: ``(sessions, columns)``, m or rad, or N
+    left: float  #: the sum of squares beyond the noise that they leave, by the linear step
 
     @property
     def name(self) -> str:
@@ -104,7 +105,7 @@ def session_zeros(target: Target, fit: Fit) -> SessionZeros | None:
         sizes, left = step(of_session)
         if left < most and not _by_chance(of_session, lambda members: step(members)[1], left):
             mean = of_session.mean(axis=0) @ sizes
-            least, best = left, SessionZeros(of, sessions, sizes - mean)
+            least, best = left, SessionZeros(of, sessions, sizes - mean, left)
     return best
 
 

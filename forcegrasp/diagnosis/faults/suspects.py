@@ -9,14 +9,12 @@ from forcegrasp.diagnosis.faults.fault import ANY, Fault, with_each
 from forcegrasp.diagnosis.faults.felt_sizes import doubtful_radii
 from forcegrasp.diagnosis.faults.odd_grasps import odd_grasps
 from forcegrasp.diagnosis.faults.recording_faults import RecordingFault, recording_faults
-from forcegrasp.diagnosis.faults.session_zeros import session_zeros
 from forcegrasp.diagnosis.faults.swapped_forces import grasps_with_swapped_forces, with_forces_swapped
 from forcegrasp.diagnosis.faults.swapped_positions import positions_are_swapped, with_positions_swapped
 from forcegrasp.diagnosis.faults.tolerance import MOST, wanted_moves
 from forcegrasp.diagnosis.faults.wrong_radii import most_radii, moved_as_fault, wrong_radii
 from forcegrasp.diagnosis.faults.wrong_rows import wrong_rows
 from forcegrasp.diagnosis.faults.wrong_zeros import wrong_zeros
-from forcegrasp.diagnosis.verdict import LEAST_SHARE
 from forcegrasp.identify.base_fit import rms_error
 from forcegrasp.identify.fit import Fit
 from forcegrasp.identify.intervals import listed
@@ -56,7 +54,6 @@ def suspects(loaded: Loaded[MeasurementSet], target: Target, fit: Fit) -> list[F
         return []
     measured, first = loaded.measured, [*_of_clock(loaded), *_of_swapped(loaded, target, fit)]
     others = [*wrong_zeros(loaded, target, fit), *_of_units(loaded), *wrong_rows(loaded, target, fit)]
-    others += of_sessions(loaded, target, fit)
     # rows that do not keep step with commands make a clock seem off: that must not hide the rest
     all_of_clock = all(fault.name == "time_scale" for fault in (*first, *others))
     moved = wanted_moves(measured, target, fit) if all_of_clock else None
@@ -103,22 +100,6 @@ def _of_swapped(loaded: Loaded[MeasurementSet], target: Target, fit: Fit) -> lis
         right = with_each(loaded, lambda index, g: with_forces_swapped(g) if index in swapped else g)
         return [Fault("some_forces_swapped", words, check, right)]
     return []
-
-
-def of_sessions(loaded: Loaded[MeasurementSet], target: Target, fit: Fit) -> list[Fault]:
-    """Encoders or force sensors that have another zero in each session.
-
-    Args:
-      loaded: the set.
-      target: the same, lined up.
-      fit: of the base model, or of one with effects that had hidden it.
-    """
-    if (zeros := session_zeros(target, fit)) is None:
-        return []
-    columns = loaded.measured.columns
-    words = zeros.words(columns.force if zeros.of == "forces" else columns.position, columns.unit)
-    right = with_each(loaded, lambda _, g: zeros.taken_out(g))
-    return [Fault(zeros.name, words, zeros.check, right, worth=LEAST_SHARE)]
 
 
 def _of_units(loaded: Loaded[MeasurementSet]) -> list[Fault]:

@@ -1,4 +1,4 @@
-"""Zeros of forces that change within a set, and gains that drift."""
+"""Zeros that change within a set, or differ from session to session, and gains that drift."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 from forcegrasp.diagnosis.faults.fault import ANY, Fault, with_each
 from forcegrasp.diagnosis.faults.linear_step import linear_step
 from forcegrasp.diagnosis.faults.session_drift import order_in_session, session_drift
+from forcegrasp.diagnosis.faults.session_zeros import SessionZeros, session_zeros
 from forcegrasp.diagnosis.signatures import Background
 from forcegrasp.diagnosis.verdict import LEAST_SHARE
 from forcegrasp.identify.fit import Fit
@@ -24,25 +25,54 @@ _OTHERWISE = 0.2
 
 
 def wrong_zeros(loaded: Loaded[MeasurementSet], target: Target, fit: Fit) -> list[Fault]:
-    """Zeros or gains of forces that change."""
+    """Zeros or gains that change; of forces what leaves least, zeros of each session only if they leave much less."""
+    zeros, (of_forces, left) = session_zeros(target, fit), _of_forces(loaded, target, fit)
+    if zeros is None:
+        return of_forces
+    told = _differing(loaded, zeros)
+    if zeros.of != "forces":
+        return [*of_forces, told]
+    return [told] if zeros.left < (1 - LEAST_SHARE) * left else of_forces
+
+
+def of_sessions(loaded: Loaded[MeasurementSet], target: Target, fit: Fit) -> list[Fault]:
+    """Encoders or force sensors that have another zero in each session.
+
+    Args:
+      loaded: the set.
+      target: the same, lined up.
+      fit: of the base model, or of one with effects that had hidden it.
+    """
+    return [] if (zeros := session_zeros(target, fit)) is None else [_differing(loaded, zeros)]
+
+
+def _differing(loaded: Loaded[MeasurementSet], zeros: SessionZeros) -> Fault:
+    columns = loaded.measured.columns
+    words = zeros.words(columns.force if zeros.of == "forces" else columns.position, columns.unit)
+    right = with_each(loaded, lambda _, g: zeros.taken_out(g))
+    return Fault(zeros.name, words, zeros.check, right, worth=LEAST_SHARE)
+
+
+def _of_forces(loaded: Loaded[MeasurementSet], target: Target, fit: Fit) -> tuple[list[Fault], float]:
+    """Zeros or gains of forces that change, and the sum of squares beyond the noise that what is told leaves."""
     measured = loaded.measured
     tare, drift, left = find_tare(measured), session_drift(target, fit), np.inf
     if tare is not None:
         tare, left = _sharper(tare, target, fit)
     if tare is not None and (drift is None or left <= drift.left):
         words = f"the zero changes at grasp {measured.grasps[tare.first].name}: {tare.words(measured)}"
-        return [_tared(loaded, [tare], words, "whether sensors were set to zero there")]
+        return [_tared(loaded, [tare], words, "whether sensors were set to zero there")], left
     if drift is not None:
         order = order_in_session(measured.grasps)
         check = "whether sensors or motors warm up meanwhile: grasp one object first and last, and compare"
         right = with_each(loaded, lambda index, g: drift.taken_out(g, order[index]))
         words = drift.words(measured.columns.force)
-        return [Fault(f"force_{drift.of}_drift", words, check, right, worth=LEAST_SHARE)]
+        return [Fault(f"force_{drift.of}_drift", words, check, right, worth=LEAST_SHARE)], drift.left
     if odd := [_sharper(one, target, fit)[0] for one in find_odd_zeros(measured)]:
         each = [f"grasp {measured.grasps[one.first].name} ({one.words(measured)})" for one in odd]
         words = f"forces have another zero in {listed(each)} alone"
-        return [_tared(loaded, odd, words, "whether sensors were set to zero there while something was held")]
-    return []
+        return [_tared(loaded, odd, words, "whether sensors were set to zero there while something was held")], np.inf
+    return [], np.inf
 
 
 def _sharper(tare: Tare, target: Target, fit: Fit) -> tuple[Tare, float]:
