@@ -11,6 +11,7 @@ from forcegrasp.diagnosis.faults.fault import ANY, Fault, with_each
 from forcegrasp.diagnosis.faults.linear_step import linear_step
 from forcegrasp.diagnosis.faults.session_drift import order_in_session, session_drift
 from forcegrasp.diagnosis.faults.session_zeros import SessionZeros, session_zeros
+from forcegrasp.diagnosis.faults.shifted_rows import left_beyond_noise
 from forcegrasp.diagnosis.signatures import Background
 from forcegrasp.diagnosis.verdict import LEAST_SHARE
 from forcegrasp.identify.fit import Fit
@@ -32,7 +33,8 @@ def wrong_zeros(loaded: Loaded[MeasurementSet], target: Target, fit: Fit) -> lis
     told = _differing(loaded, zeros)
     if zeros.of != "forces":
         return [*of_forces, told]
-    return [told] if zeros.left < (1 - LEAST_SHARE) * left else of_forces
+    before = left_beyond_noise(fit.residual, Background(fit, ()), target)
+    return [told] if left - zeros.left > LEAST_SHARE * before else of_forces
 
 
 def of_sessions(loaded: Loaded[MeasurementSet], target: Target, fit: Fit) -> list[Fault]:
