@@ -85,6 +85,7 @@ def found(mixed):
     return add_several(study, base.fit, (), CATALOGUE, 0, np.random.default_rng(0), kept_by_nobody)
 
 
+@pytest.mark.long
 def test_all_are_found_and_nothing_else(found):
     steps, fit = found
     assert {one.effect.name for one in fit.problem.effects} == set(HIDDEN)
@@ -94,6 +95,7 @@ def test_all_are_found_and_nothing_else(found):
         assert fit.effect(name).values == pytest.approx(true, rel=0.15), name
 
 
+@pytest.mark.long
 def test_steps_lead_from_the_first_error_to_the_last_and_share_out_what_it_falls_by(mixed, found):
     (study, base), (steps, fit) = mixed, found
     assert steps[0].error_before == pytest.approx(study.error(study.heldout(base.fit)))
@@ -111,6 +113,7 @@ def test_steps_lead_from_the_first_error_to_the_last_and_share_out_what_it_falls
         assert candidate.parameters() == fit.effect(step.effects[0]).parameters
 
 
+@pytest.mark.long
 def test_each_is_shown_beside_all_others(mixed, found):
     """What it changes is told of the final model without it: all came at once, and no step was before it."""
     (_, base), (steps, fit) = mixed, found
