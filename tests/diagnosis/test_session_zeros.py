@@ -74,6 +74,13 @@ def test_zeros_of_sessions_are_told_and_put_right(sound, found, change, off, of,
         assert getattr(right, name) == pytest.approx(getattr(true, name), abs=exact)
 
 
+@pytest.mark.parametrize(("change", "alike"), [(encoders, False), (homed, True)])
+def test_what_all_sessions_have_in_common_is_taken_out_where_no_effect_stands_for_it(found, change, alike):
+    more = np.array([2e-4, 1e-4])
+    zeros = found(lambda g, _: change(g, OFF_M[g.session] + more))
+    assert zeros.change == pytest.approx(np.array(list(OFF_M.values())) + alike * more, abs=6e-5)
+
+
 @pytest.mark.parametrize("change", [encoders, homed])
 def test_what_is_off_otherwise_is_not_told_as_of_sessions(found, change):
     """In all grasps alike, in each by chance, of an object that has a session of its own, or in too few grasps."""
@@ -111,12 +118,14 @@ def test_words_say_by_how_much_each_differs_and_what_to_check():
     assert zeros.name == "position_zeros"
     assert zeros.words(("q_l_m", "q_r_m"), "m") == (
         "encoders and commands have another zero in each session: in mon q_l_m +0.3 mm, q_r_m -0.2 mm and in wed"
-        " q_l_m -0.3 mm, q_r_m +0.2 mm, compared with the mean of all grasps"
+        " q_l_m -0.3 mm, q_r_m +0.2 mm, compared with what radii and places say"
     )
     assert "homed" in zeros.check
     of_forces = SessionZeros("forces", ("mon", "tue"), np.array([[0.02], [-0.02]]), 0.0)
     assert of_forces.name == "force_zeros"
-    assert "in mon f_n +0.02 N" in of_forces.words(("f_n",), "m")
+    words = of_forces.words(("f_n",), "m")
+    assert "in mon f_n +0.02 N" in words
+    assert words.endswith("compared with the mean of all grasps")
     assert "open fingers" in of_forces.check
 
 

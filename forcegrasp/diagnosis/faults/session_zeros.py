@@ -33,7 +33,7 @@ _HARDLY = 0.05
 
 @dataclass(frozen=True, eq=False)
 class SessionZeros:
-    """By how much zeros of sessions differ from the mean of all grasps."""
+    """By how much zeros of sessions are off: of homing for the radii and places as given, of others from their mean."""
 
     of: str  #: "readings" of encoders, "homing" of encoders and commands, or "forces"
     sessions: tuple[str, ...]
@@ -62,10 +62,11 @@ class SessionZeros:
             if max(map(abs, row)) > least
         ]
         what = {"readings": "encoders have", "homing": "encoders and commands have", "forces": "force sensors have"}
-        return f"{what[self.of]} another zero in each session: {listed(told)}, compared with the mean of all grasps"
+        as_what = "what radii and places say" if self.of == "homing" else "the mean of all grasps"
+        return f"{what[self.of]} another zero in each session: {listed(told)}, compared with {as_what}"
 
     def taken_out(self, grasp: MeasuredGrasp) -> MeasuredGrasp:
-        """The grasp as it would have been recorded with the mean zero."""
+        """The grasp as it would have been recorded with the mean zero, or homed where it should be."""
         change = self.change[self.sessions.index(grasp.session)]
         if self.of == "forces":
             return dataclasses.replace(grasp, force_n=grasp.force_n - change)
@@ -104,8 +105,12 @@ def session_zeros(target: Target, fit: Fit) -> SessionZeros | None:
 
         sizes, left = step(of_session)
         if left < most and not _by_chance(of_session, lambda members: step(members)[1], left):
-            mean = of_session.mean(axis=0) @ sizes
-            least, best = left, SessionZeros(of, sessions, sizes - mean, left)
+            if of == "homing":  # no effect stands for what all sessions have in common
+                alone, _ = linear_step(target, fit, background, _each(per_unit, of_session))
+                sizes = alone.reshape(sizes.shape)
+            else:
+                sizes = sizes - of_session.mean(axis=0) @ sizes
+            least, best = left, SessionZeros(of, sessions, sizes, left)
     return best
 
 
