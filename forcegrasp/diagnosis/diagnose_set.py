@@ -172,29 +172,30 @@ class _Ways:
 
     def search_and_move(self, loaded: Loaded[MeasurementSet], fitted: Fitted) -> tuple[Diagnosis, Found | None]:
         """The diagnosis of a set; and that with moves within its tolerance, or without some grasps, if it wants any."""
-        alone = self.one_effect_alone(loaded, fitted)
-        if alone is not None:
-            return alone, None
+        as_given = self.search_as_given(loaded, fitted)
+        if as_given is not None:
+            return as_given, None
         return self.search_with_givens(loaded, fitted) or self.search_as_it_is(loaded, fitted)
 
-    def one_effect_alone(self, loaded: Loaded[MeasurementSet], fitted: Fitted) -> Diagnosis | None:
-        """The diagnosis of a set in which one effect leaves only noise; None if none does, or moved givens might.
+    def search_as_given(self, loaded: Loaded[MeasurementSet], fitted: Fitted) -> Diagnosis | None:
+        """The diagnosis with radii and places as given; None unless effects leave only noise, or if moves might do so.
 
-        Where it does, radii and places are as they are given: to fit them beside all effects takes as long as the rest.
+        To fit them beside all effects takes as long as all else, and changes nothing then.
         """
         target, _, base = fitted
         if loaded.gripper.is_servo or rms_error(base.fit, target) < MUCH:
             return None
-        if MovesFirst(loaded, ask_sessions=False).before_more(target, base.fit):
+        moves, sessions = MovesFirst(loaded, ask_sessions=False), MovesFirst(loaded, self.ask_sessions)
+        if moves.before_more(target, base.fit):
             return None
-        found = self.search(*fitted, stop_when=StopWhen(always, given_first=always))
-        one = found.verdict.names_effects and len(kept_steps(found.steps)) == 1
+        found = self.search(*fitted, stop_when=StopWhen(always, sessions.before_more))
         nearly_all = explained_share(found.error_before, found.error_after, noise=found.floor) >= EXPLAINED_FAR
-        if found.stopped or (one and nearly_all and not found.left):
+        if found.stopped:
             return found
-        if self.ask_sessions and found.verdict.names_effects and of_sessions(loaded, found.target, found.fit):
+        if sessions.zeros:
             raise _ZerosFirst(found)
-        return None
+        whole = found.verdict.names_effects and nearly_all and not (found.left or sessions.asked)
+        return found if whole else None
 
     def search_with_givens(self, loaded: Loaded[MeasurementSet], fitted: Fitted) -> tuple[Diagnosis, Found] | None:
         """The same with radii and places fitted beside all effects; None if they explain little, or are wrong."""

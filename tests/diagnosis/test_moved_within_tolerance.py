@@ -232,7 +232,7 @@ def test_what_was_sought_in_vain_is_not_sought_again_after_a_small_move(sound, m
         return search_on(one.target, None, one.base, one.fit, one.steps), None
 
     monkeypatch.setattr(module, "diagnose", diagnosed)
-    monkeypatch.setattr(module._Ways, "one_effect_alone", lambda *_: None)
+    monkeypatch.setattr(module._Ways, "search_as_given", lambda *_: None)
     monkeypatch.setattr(module, "suspects", lambda *_: [])
     monkeypatch.setattr(module, "go_on_with_moved", moved)
     within = SimpleNamespace(is_within=True), 1.0

@@ -1,0 +1,82 @@
+"""Where effects leave only noise what is given stays as it is: to fit it beside all effects takes long."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Any, cast
+
+import pytest
+
+from forcegrasp.diagnosis import diagnose_set
+from forcegrasp.diagnosis.diagnose_set import _Ways, _ZerosFirst
+from forcegrasp.diagnosis.givens.moved_set import MovesFirst
+from forcegrasp.identify.progress import silent
+from forcegrasp.identify.verdict import Verdict
+from tests.light_set import light_set
+
+
+@pytest.fixture
+def as_given(made_up, monkeypatch):
+    """``as_given(base=…, first=…, zeros=…, **changes)``: what comes of a search that finds an effect, told otherwise.
+
+    ``first`` are the answers whether moves come first, of the base model and then of what was found.
+    """
+
+    def ways(base: float = 4.0, first: Sequence[bool] = (False, False), zeros: bool = False, **changes):
+        left = {"error_before": 4.0, "error_after": 1.0, "floor": 1.0, "left": ""}
+        found = dataclasses.replace(made_up.diagnosis("effect"), **(left | changes))
+        answers, searched = list(first), []
+
+        def before_more(moves: MovesFirst, *_) -> bool:
+            moves.asked = answers.pop(0)
+            moves.zeros = moves.ask_sessions and zeros
+            return moves.asked
+
+        def search(*_, stop_when):
+            searched.append(stop_when)
+            stop_when.given_first(None, None)
+            return found
+
+        monkeypatch.setattr(diagnose_set, "rms_error", lambda *_: base)
+        monkeypatch.setattr(MovesFirst, "before_more", before_more)
+        monkeypatch.setattr(_Ways, "search", search)
+        fitted = found.target, cast(Any, None), found.base
+        return _Ways(None, [], 0, silent).search_as_given(light_set(), fitted), found, searched
+
+    return ways
+
+
+def test_it_is_told_and_looked_for_briefly(as_given):
+    told, found, (stop_when,) = as_given()
+    assert told is found
+    assert stop_when.may_be_given(None, None)  # effects whose signatures promise too little are not fitted
+
+
+@pytest.mark.parametrize("why", [{"base": 1.4}, {"first": (True,)}])
+def test_it_is_not_looked_for_where_little_is_left_or_moves_may_explain_it(as_given, why):
+    told, _, searched = as_given(**why)
+    assert (told, searched) == (None, [])
+
+
+@pytest.mark.parametrize(
+    "less", [{"left": "in all"}, {"error_after": 1.6}, {"verdict": Verdict.UNKNOWN, "effects": ()}]
+)
+def test_it_must_explain_nearly_all_and_leave_nothing(as_given, less):
+    told, *_ = as_given(**less)
+    assert told is None
+
+
+def test_it_is_not_told_where_it_ended_for_moves_before_rivals_were_asked(as_given):
+    told, *_ = as_given(first=(False, True))
+    assert told is None
+
+
+def test_a_search_that_was_cut_short_is_told(as_given):
+    told, found, _ = as_given(stopped="its 3 min were over", left="in all")
+    assert told is found
+
+
+def test_zeros_of_sessions_that_it_had_hidden_come_first(as_given):
+    with pytest.raises(_ZerosFirst):
+        as_given(first=(False, True), zeros=True)
