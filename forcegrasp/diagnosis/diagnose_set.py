@@ -12,8 +12,9 @@ import numpy as np
 from forcegrasp.diagnosis.cut_short import REASONS, cut_short
 from forcegrasp.diagnosis.evidence import LEAST_SHARE_TOGETHER
 from forcegrasp.diagnosis.faults.fault import Fault
+from forcegrasp.diagnosis.faults.session_zeros import session_zeros
 from forcegrasp.diagnosis.faults.suspects import leaves_nothing, suspects, uneven_stamps
-from forcegrasp.diagnosis.faults.wrong_zeros import of_sessions
+from forcegrasp.diagnosis.faults.wrong_zeros import differing
 from forcegrasp.diagnosis.givens.doubt import is_worth_a_search, more_likely, with_fault_beside
 from forcegrasp.diagnosis.givens.fitted_givens import told_as_moved, with_fitted_givens
 from forcegrasp.diagnosis.givens.give_back import without_move
@@ -342,10 +343,11 @@ def _with_zeros_put_right(
     as_fitted = dataclasses.replace(loaded, measured=dataclasses.replace(loaded.measured, grasps=found.target.grasps))
     base = dataclasses.replace(found.base, fit=found.fit)
     try:
-        faults = of_sessions(as_fitted, found.target, found.fit)  # none, if another fit than this had them
-        if not any(with_effects.put_right(fault, (found.target, simulators, base)) for fault in faults):
+        zeros = session_zeros(found.target, found.fit)  # none, if another fit than this had them
+        fitted = found.target, simulators, base
+        if zeros is None or with_effects.put_right(differing(as_fitted, zeros), fitted) is None:
             return _put_right_or_as_said(once, loaded, said, known)
-        (fault,) = of_sessions(loaded, found.target, found.fit)
+        fault = differing(loaded, zeros)
         right = ways.fitted(fault.put_right)
     except REASONS as reason:
         return dataclasses.replace(found, stopped=cut_short(reason, ways.progress)), simulators

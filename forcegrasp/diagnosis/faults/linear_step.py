@@ -10,6 +10,14 @@ from forcegrasp.identify.fit import Fit
 from forcegrasp.identify.target import Target
 
 
+def one_of_each(target: Target, channels: slice) -> np.ndarray:
+    """What one more of each of these channels, all along, adds to the signals: ``(G, S, C, channels)``."""
+    width = channels.stop - channels.start
+    always = np.zeros((*target.signals.shape, width))
+    always[..., range(channels.start, channels.stop), range(width)] = 1.0
+    return always
+
+
 def linear_step(target: Target, fit: Fit, background: Background, per_unit: np.ndarray) -> tuple[np.ndarray, float]:
     """The sizes that take most off what a fit leaves, and the sum of squares beyond the noise that they leave.
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from forcegrasp.diagnosis.faults.linear_step import linear_step
+from forcegrasp.diagnosis.faults.linear_step import linear_step, one_of_each
 from forcegrasp.diagnosis.faults.shifted_rows import left_beyond_noise
 from forcegrasp.diagnosis.signatures import Background
 from forcegrasp.diagnosis.verdict import LEAST_SHARE
@@ -71,9 +71,7 @@ def session_drift(target: Target, fit: Fit) -> SessionDrift | None:
     left = left_beyond_noise(fit.residual, background, target)
     least, best = (1 - LEAST_SHARE) * max(0.0, left), None
     for of, one_unit in (("gain", forces), ("zero", np.ones_like(forces))):
-        always = np.zeros((*target.signals.shape, forces.shape[-1]))
-        for column in range(forces.shape[-1]):
-            always[..., target.axis.forces.start + column, column] = one_unit[..., column]
+        always = one_of_each(target, target.axis.forces) * one_unit[..., None, :]
         change, left = linear_step(target, fit, background, order[:, None, None, None] * always)
         if left < min(least, linear_step(target, fit, background, always)[1]):
             least, best = left, SessionDrift(of, change, left)

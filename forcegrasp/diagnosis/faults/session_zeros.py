@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from forcegrasp.diagnosis.faults.linear_step import linear_step
+from forcegrasp.diagnosis.faults.linear_step import linear_step, one_of_each
 from forcegrasp.diagnosis.faults.shifted_rows import left_beyond_noise
 from forcegrasp.diagnosis.signatures import Background
 from forcegrasp.diagnosis.verdict import LEAST_SHARE
@@ -82,7 +82,7 @@ def session_zeros(target: Target, fit: Fit) -> SessionZeros | None:
 
     Args:
       target: the measurements.
-      fit: of the base model.
+      fit: of the base model, or of one with effects that had hidden them.
     """
     names = [grasp.session for grasp in target.grasps]
     sessions = tuple(dict.fromkeys(names))
@@ -130,24 +130,15 @@ def _each(per_unit: np.ndarray, members: np.ndarray) -> np.ndarray:
 def _kinds(target: Target, fit: Fit) -> dict[str, np.ndarray]:
     """What a unit of each kind of zero adds to the signals, ``(G, S, C, columns)``."""
     positions, forces = target.axis.positions, target.axis.forces
-    kinds = {"readings": _constant(target, positions), "forces": _constant(target, forces)}
+    kinds = {"readings": one_of_each(target, positions), "forces": one_of_each(target, forces)}
     if target.gripper.command == "position":
         kinds["homing"] = _homing(target, fit)
     return kinds
 
 
-def _constant(target: Target, channels: slice) -> np.ndarray:
-    """One more of each of these channels."""
-    width = channels.stop - channels.start
-    always = np.zeros((*target.signals.shape, width))
-    for column in range(width):
-        always[..., channels.start + column, column] = 1.0
-    return always
-
-
 def _homing(target: Target, fit: Fit) -> np.ndarray:
     """What encoders and commands add whose zero is another: the finger stands elsewhere than they say."""
-    gripper, always = target.gripper, _constant(target, target.axis.positions)
+    gripper, always = target.gripper, one_of_each(target, target.axis.positions)
     case = fit.problem.case(fit.vector)
     before = predict(Simulators(fit.problem).cheap, [case])[0]
     for index, motor in enumerate(gripper.motors):

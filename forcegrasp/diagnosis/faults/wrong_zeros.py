@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from forcegrasp.diagnosis.faults.fault import ANY, Fault, with_each
-from forcegrasp.diagnosis.faults.linear_step import linear_step
+from forcegrasp.diagnosis.faults.linear_step import linear_step, one_of_each
 from forcegrasp.diagnosis.faults.session_drift import order_in_session, session_drift
 from forcegrasp.diagnosis.faults.session_zeros import SessionZeros, session_zeros
 from forcegrasp.diagnosis.faults.shifted_rows import left_beyond_noise
@@ -30,25 +30,15 @@ def wrong_zeros(loaded: Loaded[MeasurementSet], target: Target, fit: Fit) -> lis
     zeros, (of_forces, left) = session_zeros(target, fit), _of_forces(loaded, target, fit)
     if zeros is None:
         return of_forces
-    told = _differing(loaded, zeros)
+    told = differing(loaded, zeros)
     if zeros.of != "forces":
         return [*of_forces, told]
     before = left_beyond_noise(fit.residual, Background(fit, ()), target)
     return [told] if left - zeros.left > LEAST_SHARE * before else of_forces
 
 
-def of_sessions(loaded: Loaded[MeasurementSet], target: Target, fit: Fit) -> list[Fault]:
-    """Encoders or force sensors that have another zero in each session.
-
-    Args:
-      loaded: the set.
-      target: the same, lined up.
-      fit: of the base model, or of one with effects that had hidden it.
-    """
-    return [] if (zeros := session_zeros(target, fit)) is None else [_differing(loaded, zeros)]
-
-
-def _differing(loaded: Loaded[MeasurementSet], zeros: SessionZeros) -> Fault:
+def differing(loaded: Loaded[MeasurementSet], zeros: SessionZeros) -> Fault:
+    """Encoders or force sensors that have another zero in each session of a set."""
     columns = loaded.measured.columns
     words = zeros.words(columns.force if zeros.of == "forces" else columns.position, columns.unit)
     right = with_each(loaded, lambda _, g: zeros.taken_out(g))
@@ -83,9 +73,8 @@ def _sharper(tare: Tare, target: Target, fit: Fit) -> tuple[Tare, float]:
     Readings before contact, which show that a zero has changed, are few. Also what the step leaves beyond the noise.
     """
     changed = np.flatnonzero(tare.change_n)
-    per_unit = np.zeros((*target.signals.shape, len(changed)))
-    for column, channel in enumerate(changed):
-        per_unit[tare.first : tare.end, :, target.axis.forces.start + channel, column] = 1.0
+    per_unit = one_of_each(target, target.axis.forces)[..., changed]
+    per_unit[: tare.first] = per_unit[tare.end :] = 0.0
     step, left = linear_step(target, fit, Background(fit, ()), per_unit)
     change = tare.change_n.copy()
     change[changed] = np.where(

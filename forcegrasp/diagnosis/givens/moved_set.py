@@ -54,9 +54,9 @@ class MovesFirst:
 
     loaded: Loaded[MeasurementSet]
     ask_sessions: bool = True  #: whether zeros of sessions may come first
-    asked: bool = False  #: whether they were, of any fit
+    asked: bool = False  #: whether moves were to be tried first, or zeros, of any fit
     beyond: bool = False  #: whether radii are to be moved beyond their tolerance, as if a ruler had measured them
-    zeros: bool = False  #: whether they do
+    zeros: bool = False  #: whether zeros of sessions come first, of the last fit that was asked for
 
     def __call__(self, target: Target, fit: Fit) -> bool:
         step = first_move(self.loaded.measured, target, fit, _COMES_FIRST)
