@@ -115,7 +115,7 @@ class BegunError(Exception):
 
 def begun(monkeypatch, verb: str, **values: Any) -> dict[str, Any]:
     """What a verb sets out to compute: the arguments of the first expensive step, and where it would write."""
-    from forcegrasp.diagnosis import add_effect, diagnose_set
+    from forcegrasp.diagnosis import add_effect, diagnose_set, set_search
     from forcegrasp.identify import fit_set
     from forcegrasp.identify.loading import Loaded
     from forcegrasp.identify.target import Target
@@ -147,14 +147,14 @@ def begun(monkeypatch, verb: str, **values: Any) -> dict[str, Any]:
     monkeypatch.setattr("forcegrasp.cli.measuring.check_folder", lambda path: reached.setdefault("folder", path))
     monkeypatch.setattr("forcegrasp.cli.measuring.check_file", lambda path: reached.setdefault("file", path))
     monkeypatch.setattr("time.strftime", lambda *_: "NOW")
-    for home, name in ((fit_set, "fit_base"), (diagnose_set, "diagnose"), (add_effect, "add_effect")):
+    for home, name in ((fit_set, "fit_base"), (set_search, "diagnose"), (add_effect, "add_effect")):
         monkeypatch.setattr(home, name, stop)
     if verb == "diagnose":
         monkeypatch.setattr(fit_set, "fit_model", fitted)
         monkeypatch.setattr(diagnose_set, "suspects", lambda *_: [])
-        monkeypatch.setattr(diagnose_set, "uneven_stamps", lambda *_: None)
-        monkeypatch.setattr(diagnose_set._Ways, "search_as_given", lambda *_: None)
-        monkeypatch.setattr(diagnose_set, "with_fitted_givens", lambda *_: None)
+        monkeypatch.setattr(set_search, "uneven_stamps", lambda *_: None)
+        monkeypatch.setattr(set_search.SetSearch, "search_as_given", lambda *_: None)
+        monkeypatch.setattr(set_search, "with_fitted_givens", lambda *_: None)
         whole = diagnose_set.diagnose_set
 
         def noted(*arguments, law):

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from forcegrasp.cli.diagnose import sigterm_as_ctrl_c
+from forcegrasp.diagnosis import set_search
 from forcegrasp.diagnosis.cut_short import INTERRUPTED
 from forcegrasp.diagnosis.diagnose_set import diagnose_set
 from forcegrasp.diagnosis.faults.fault import Fault
@@ -74,21 +75,24 @@ def test_effects_on_trial_are_not_told_when_the_trial_is_cut_short():
 def test_a_set_is_not_searched_on_after_that(rubbing, monkeypatch, reason):
     """No moves within tolerance, no law, no second opinion: they would take minutes."""
     loaded, target, simulators, base = rubbing
-    monkeypatch.setattr(OF_SET.fit_set, "fit_model", lambda *_, **__: (target, simulators, base))
+    monkeypatch.setattr(set_search.fit_set, "fit_model", lambda *_, **__: (target, simulators, base))
     monkeypatch.setattr(SEARCH, "look_further", raising(reason))
-    for name in ("go_on_with_moved", "find_law", "more_likely"):
+    monkeypatch.setattr(set_search, "go_on_with_moved", None)
+    for name in ("find_law", "more_likely"):
         monkeypatch.setattr(OF_SET, name, None)
     found, _ = diagnose_set(loaded, None, ["coulomb_friction"], 0, silent, law=True)
     assert found.stopped
     assert not found.law_sought
 
 
-@pytest.mark.parametrize("where", ["suspects", "go_on_with_moved", "find_law"])
+@pytest.mark.parametrize(
+    ("module", "where"), [(OF_SET, "suspects"), (set_search, "go_on_with_moved"), (OF_SET, "find_law")]
+)
 @pytest.mark.parametrize("reason", [reason for reason, _ in REASONS])
-def test_it_may_be_cut_short_anywhere_once_the_base_model_is_fitted(rubbing, monkeypatch, where, reason):
+def test_it_may_be_cut_short_anywhere_once_the_base_model_is_fitted(rubbing, monkeypatch, module, where, reason):
     loaded, target, simulators, base = rubbing
-    monkeypatch.setattr(OF_SET.fit_set, "fit_model", lambda *_, **__: (target, simulators, base))
-    monkeypatch.setattr(OF_SET, where, raising(reason))
+    monkeypatch.setattr(set_search.fit_set, "fit_model", lambda *_, **__: (target, simulators, base))
+    monkeypatch.setattr(module, where, raising(reason))
     found, _ = diagnose_set(loaded, None, ["coulomb_friction"], 0, silent, law=True)
     assert found.stopped
     assert found.effects == (() if where == "suspects" else ("coulomb_friction",))
@@ -129,7 +133,7 @@ def test_what_a_search_found_at_its_end_stands_when_its_intervals_are_cut_short(
 
 
 def test_nothing_is_told_before_the_base_model_is_fitted(rubbing, monkeypatch):
-    monkeypatch.setattr(OF_SET.fit_set, "fit_model", raising(OutOfTimeError(3)))
+    monkeypatch.setattr(set_search.fit_set, "fit_model", raising(OutOfTimeError(3)))
     with pytest.raises(OutOfTimeError, match=r"give it more \(minutes=\)"):
         diagnose_set(rubbing[0], None, [], 0, silent)
 

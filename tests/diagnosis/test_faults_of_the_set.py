@@ -9,6 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from forcegrasp.diagnosis import set_search
 from forcegrasp.diagnosis.diagnose_set import diagnose_set
 from forcegrasp.diagnosis.faults import odd_grasps as odd_grasps_module
 from forcegrasp.diagnosis.faults.fault import Fault
@@ -148,7 +149,7 @@ def test_in_place_of_a_fault_that_leaves_next_to_nothing_an_effect_must_do_as_we
             found.append(diagnose(target, *asked))
         return found[-1]  # of the set as it says: what is found there does not matter here
 
-    monkeypatch.setattr(module, "diagnose", searching)
+    monkeypatch.setattr(set_search, "diagnose", searching)
     diagnose_set(wrong, model, ["backlash"], 0, silent)
     (right, *_, unlimited), *_, (said, *_, stop_when) = searched
     assert [None in {g.radius_m for g in target.grasps} for target in (right, said)] == [True, False]

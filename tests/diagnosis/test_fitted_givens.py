@@ -8,12 +8,14 @@ import numpy as np
 import pytest
 
 from forcegrasp.diagnosis import diagnose_set as diagnose_set_module
-from forcegrasp.diagnosis.diagnose_set import _put_right_or_as_said, _Ways, diagnose_set
+from forcegrasp.diagnosis import set_search
+from forcegrasp.diagnosis.diagnose_set import _put_right_or_as_said, diagnose_set
 from forcegrasp.diagnosis.faults.fault import Fault
 from forcegrasp.diagnosis.faults.tolerance import all_radii
 from forcegrasp.diagnosis.faults.wrong_radii import moved_as_fault
 from forcegrasp.diagnosis.givens import fitted_givens
 from forcegrasp.diagnosis.givens.fitted_givens import told_as_moved, with_fitted_givens
+from forcegrasp.diagnosis.set_search import SetSearch
 from forcegrasp.effects.for_gripper import effect_of
 from forcegrasp.effects.setting import EffectSetting
 from forcegrasp.identify.cross_validation import make_folds
@@ -90,7 +92,7 @@ def test_they_stay_as_said_if_that_does_as_well(off, said, monkeypatch):
 def found(fitted):
     """Where no effect is known."""
     _, given = fitted
-    return _Ways(None, [], 0, silent).search(*given)
+    return SetSearch(None, [], 0, silent).search(*given)
 
 
 def test_where_they_were_put_is_told(off, said, found):
@@ -217,10 +219,10 @@ def test_a_set_is_searched_as_it_is_where_nothing_fits_within_its_tolerance(
     off, said, fitted, found, within, monkeypatch
 ):
     asked = []
-    monkeypatch.setattr(diagnose_set_module, "with_fitted_givens", lambda *_: fitted)
-    monkeypatch.setattr(diagnose_set_module, "told_as_moved", lambda *_: found if within else None)
-    monkeypatch.setattr(_Ways, "search_as_it_is", lambda _, loaded, __: asked.append(loaded) or (found, None))
-    first, further = _Ways(None, [], 0, silent).search_and_move(off, said)
+    monkeypatch.setattr(set_search, "with_fitted_givens", lambda *_: fitted)
+    monkeypatch.setattr(set_search, "told_as_moved", lambda *_: found if within else None)
+    monkeypatch.setattr(SetSearch, "search_as_it_is", lambda _, loaded, __: asked.append(loaded) or (found, None))
+    first, further = SetSearch(None, [], 0, silent).search_and_move(off, said)
     assert first is found
     assert asked == ([fitted[0]] if within else [fitted[0], off])
     assert (further is not None) == within
@@ -252,20 +254,20 @@ def test_what_seems_moved_is_fitted_beside_effects_before_it_is_put_there(
     suspect, told = within(off, said, 1.0), within(off, said, by_stds)
     both = found, (dataclasses.replace(found, verdict=verdict, fault=told), said[1])
     monkeypatch.setattr(diagnose_set_module, "suspects", lambda *_: [suspect])
-    monkeypatch.setattr(_Ways, "search_with_givens", lambda *_: both)
-    monkeypatch.setattr(_Ways, "put_right", lambda _, fault, __: put.append(fault))
-    monkeypatch.setattr(_Ways, "search_as_it_is", lambda *_: both)
-    assert _put_right_or_as_said(_Ways(None, [], 0, silent), off, said) is both[1]
+    monkeypatch.setattr(SetSearch, "search_with_givens", lambda *_: both)
+    monkeypatch.setattr(SetSearch, "put_right", lambda _, fault, __: put.append(fault))
+    monkeypatch.setattr(SetSearch, "search_as_it_is", lambda *_: both)
+    assert _put_right_or_as_said(SetSearch(None, [], 0, silent), off, said) is both[1]
     assert put == ([] if settled else [suspect])
 
 
 def test_where_the_log_tells_a_fault_what_is_given_is_fitted_in_either_set(off, said, found, monkeypatch):
     fault, searched = Fault("time_scale", "", "", off, of_log=True), []
     monkeypatch.setattr(diagnose_set_module, "suspects", lambda *_: [fault])
-    monkeypatch.setattr(_Ways, "put_right", lambda *_: (fault, said))
-    monkeypatch.setattr(_Ways, "search_and_move", lambda _, loaded, __: searched.append(loaded) or (found, None))
-    monkeypatch.setattr(_Ways, "search", lambda *_, **__: pytest.fail("searched as it is given"))
-    _put_right_or_as_said(_Ways(None, [], 0, silent), off, said)
+    monkeypatch.setattr(SetSearch, "put_right", lambda *_: (fault, said))
+    monkeypatch.setattr(SetSearch, "search_and_move", lambda _, loaded, __: searched.append(loaded) or (found, None))
+    monkeypatch.setattr(SetSearch, "search", lambda *_, **__: pytest.fail("searched as it is given"))
+    _put_right_or_as_said(SetSearch(None, [], 0, silent), off, said)
     assert len(searched) == 2
 
 

@@ -9,12 +9,13 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from forcegrasp.diagnosis.diagnose_set import _Ways, diagnose_set
+from forcegrasp.diagnosis.diagnose_set import diagnose_set
 from forcegrasp.diagnosis.faults.fault import Fault
 from forcegrasp.diagnosis.faults.tolerance import Moved
 from forcegrasp.diagnosis.givens import give_back
 from forcegrasp.diagnosis.givens.give_back import without_move
 from forcegrasp.diagnosis.result import Step
+from forcegrasp.diagnosis.set_search import SetSearch
 from forcegrasp.effects.for_gripper import effect_of
 from forcegrasp.identify.givens import givens_of
 from forcegrasp.identify.progress import silent
@@ -48,7 +49,7 @@ def diagnosed(loaded, names):
 def search_on(loaded):
     """Goes on with the one effect that is hidden."""
     lag = effect_of("force_lag", loaded.gripper)
-    return _Ways(None, [lag], 0, silent)._search_on
+    return SetSearch(None, [lag], 0, silent)._search_on
 
 
 @pytest.mark.long

@@ -10,6 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from forcegrasp.diagnosis import set_search
 from forcegrasp.diagnosis.diagnose_set import diagnose_set
 from forcegrasp.diagnosis.faults.suspects import suspects
 from forcegrasp.diagnosis.faults.tolerance import move_given
@@ -206,9 +207,9 @@ def test_effects_on_trial_are_believed_where_a_move_beside_them_leaves_nothing_o
     found = dataclasses.replace(made_up.diagnosis("unknown"), bolder=bolder)
     moved = dataclasses.replace(bolder, left=left, error_before=4.0, error_after=after, floor=1.2)
     module = importlib.import_module("forcegrasp.diagnosis.diagnose_set")
-    monkeypatch.setattr(module, "diagnose", lambda *_: found)
+    monkeypatch.setattr(set_search, "diagnose", lambda *_: found)
     monkeypatch.setattr(module, "suspects", lambda *_: [])
-    monkeypatch.setattr(module, "go_on_with_moved", lambda one, *_: (moved, None) if one is bolder else None)
+    monkeypatch.setattr(set_search, "go_on_with_moved", lambda one, *_: (moved, None) if one is bolder else None)
     for name in ("may_be_late_rows", "within_tolerance_after_all"):
         monkeypatch.setattr(module, name, lambda one, *_: one)
     diagnosis, _ = diagnose_set(loaded, model, [], 0, silent)
@@ -231,10 +232,10 @@ def test_what_was_sought_in_vain_is_not_sought_again_after_a_small_move(sound, m
     def moved(one, loaded, search_on, *_):
         return search_on(one.target, None, one.base, one.fit, one.steps), None
 
-    monkeypatch.setattr(module, "diagnose", diagnosed)
-    monkeypatch.setattr(module._Ways, "search_as_given", lambda *_: None)
+    monkeypatch.setattr(set_search, "diagnose", diagnosed)
+    monkeypatch.setattr(set_search.SetSearch, "search_as_given", lambda *_: None)
     monkeypatch.setattr(module, "suspects", lambda *_: [])
-    monkeypatch.setattr(module, "go_on_with_moved", moved)
+    monkeypatch.setattr(set_search, "go_on_with_moved", moved)
     within = SimpleNamespace(is_within=True), 1.0
     monkeypatch.setattr("forcegrasp.diagnosis.givens.moved_set.first_move", lambda *_: within)
     monkeypatch.setattr("forcegrasp.diagnosis.givens.left_out.most_missed", lambda *_: ())

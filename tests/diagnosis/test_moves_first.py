@@ -9,13 +9,13 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from forcegrasp.diagnosis import diagnose_set
-from forcegrasp.diagnosis.diagnose_set import _Ways
+from forcegrasp.diagnosis import set_search
 from forcegrasp.diagnosis.givens import moved_set
 from forcegrasp.diagnosis.givens.moved_set import MovesFirst
 from forcegrasp.diagnosis.result import Step, kept_steps
 from forcegrasp.diagnosis.search.refine import fit_with
 from forcegrasp.diagnosis.search.stop_when import never
+from forcegrasp.diagnosis.set_search import SetSearch
 from forcegrasp.diagnosis.study import Study
 from forcegrasp.effects.for_gripper import effect_of
 from forcegrasp.effects.setting import EffectSetting
@@ -61,11 +61,11 @@ def test_a_search_that_ended_for_a_move_that_was_none_goes_on_where_it_stood(mad
     found, begun = made_up.diagnosis("effect"), []
     found = dataclasses.replace(found, steps=(*found.steps, Step((), (), (), 2.0, 2.0, of_none=of_none)))
     first = SimpleNamespace(asked=True, beyond=False, zeros=False, before_more=never, explain=never)
-    monkeypatch.setattr(diagnose_set, "MovesFirst", lambda *_: first)
-    monkeypatch.setattr(_Ways, "moved", lambda *_, **__: None)
-    monkeypatch.setattr(_Ways, "search", lambda *_, start=None, stop_when=None: begun.append(start) or found)
+    monkeypatch.setattr(set_search, "MovesFirst", lambda *_: first)
+    monkeypatch.setattr(SetSearch, "moved", lambda *_, **__: None)
+    monkeypatch.setattr(SetSearch, "search", lambda *_, start=None, stop_when=None: begun.append(start) or found)
     loaded = SimpleNamespace(gripper=found.target.gripper)
-    assert _Ways(None, [], 0, silent).search_as_it_is(loaded, (found.target, None, found.base)) == (found, None)
+    assert SetSearch(None, [], 0, silent).search_as_it_is(loaded, (found.target, None, found.base)) == (found, None)
     again = [] if of_none else [(found.fit, kept_steps(found.steps))]
     assert begun == [None, *again]
 
@@ -76,15 +76,15 @@ def test_it_goes_on_with_what_was_not_believed_and_keeps_what_it_adds_up_to(made
     bolder, again, begun = made_up.diagnosis("effect"), made_up.diagnosis(verdict), []
     first = dataclasses.replace(made_up.diagnosis("unknown"), bolder=bolder)
     asked = SimpleNamespace(asked=True, beyond=False, zeros=False, before_more=never, explain=never)
-    monkeypatch.setattr(diagnose_set, "MovesFirst", lambda *_: asked)
-    monkeypatch.setattr(_Ways, "moved", lambda *_, **__: None)
+    monkeypatch.setattr(set_search, "MovesFirst", lambda *_: asked)
+    monkeypatch.setattr(SetSearch, "moved", lambda *_, **__: None)
 
     def search(*_, start=None, stop_when=None):
         begun.append(start)
         return again if start else first
 
-    monkeypatch.setattr(_Ways, "search", search)
+    monkeypatch.setattr(SetSearch, "search", search)
     loaded = SimpleNamespace(gripper=first.target.gripper)
-    found = _Ways(None, [], 0, silent).search_as_it_is(loaded, (first.target, None, first.base))
+    found = SetSearch(None, [], 0, silent).search_as_it_is(loaded, (first.target, None, first.base))
     assert begun == [None, (bolder.fit, kept_steps(bolder.steps))]
     assert found == (again if verdict == "effect" else first, None)

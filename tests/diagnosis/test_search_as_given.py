@@ -8,9 +8,9 @@ from typing import Any, cast
 
 import pytest
 
-from forcegrasp.diagnosis import diagnose_set
-from forcegrasp.diagnosis.diagnose_set import _Ways, _ZerosFirst
+from forcegrasp.diagnosis import set_search
 from forcegrasp.diagnosis.givens.moved_set import MovesFirst
+from forcegrasp.diagnosis.set_search import SetSearch, ZerosFirst
 from forcegrasp.identify.progress import silent
 from forcegrasp.identify.verdict import Verdict
 from tests.light_set import light_set
@@ -38,11 +38,11 @@ def as_given(made_up, monkeypatch):
             stop_when.given_first(None, None)
             return found
 
-        monkeypatch.setattr(diagnose_set, "rms_error", lambda *_: base)
+        monkeypatch.setattr(set_search, "rms_error", lambda *_: base)
         monkeypatch.setattr(MovesFirst, "before_more", before_more)
-        monkeypatch.setattr(_Ways, "search", search)
+        monkeypatch.setattr(SetSearch, "search", search)
         fitted = found.target, cast(Any, None), found.base
-        return _Ways(None, [], 0, silent).search_as_given(light_set(), fitted), found, searched
+        return SetSearch(None, [], 0, silent).search_as_given(light_set(), fitted), found, searched
 
     return ways
 
@@ -78,5 +78,5 @@ def test_a_search_that_was_cut_short_is_told(as_given):
 
 
 def test_zeros_of_sessions_that_it_had_hidden_come_first(as_given):
-    with pytest.raises(_ZerosFirst):
+    with pytest.raises(ZerosFirst):
         as_given(first=(False, True), zeros=True)
