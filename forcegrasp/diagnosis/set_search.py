@@ -113,30 +113,30 @@ class SetSearch:
 
     def search_and_move(self, loaded: Loaded[MeasurementSet], fitted: Fitted) -> tuple[Diagnosis, Found | None]:
         """The diagnosis of a set; and that with moves within its tolerance, or without some grasps, if it wants any."""
-        as_given = self.search_as_given(loaded, fitted)
-        if as_given is not None:
+        as_given, is_whole = self.search_as_given(loaded, fitted)
+        if as_given is not None and is_whole:
             return as_given, None
-        return self.search_with_givens(loaded, fitted) or self.search_as_it_is(loaded, fitted)
+        return self.search_with_givens(loaded, fitted) or self.search_as_it_is(loaded, fitted, as_given)
 
-    def search_as_given(self, loaded: Loaded[MeasurementSet], fitted: Fitted) -> Diagnosis | None:
-        """The diagnosis with radii and places as given; None unless effects leave only noise, or if moves might do so.
+    def search_as_given(self, loaded: Loaded[MeasurementSet], fitted: Fitted) -> tuple[Diagnosis | None, bool]:
+        """The diagnosis with radii and places as given, and whether it is the answer; None if moves might be it.
 
-        To fit them beside all effects takes as long as all else, and changes nothing then.
+        It is if effects leave only noise: to fit what is given beside them takes as long as all else, and changes
+        nothing then.
         """
         target, _, base = fitted
         if loaded.gripper.is_servo or rms_error(base.fit, target) < MUCH:
-            return None
+            return None, False
         moves, sessions = MovesFirst(loaded, ask_sessions=False), MovesFirst(loaded, self.ask_sessions)
         if moves.before_more(target, base.fit):
-            return None
+            return None, False
         found = self.search(*fitted, stop_when=StopWhen(always, sessions.before_more))
         nearly_all = explained_share(found.error_before, found.error_after, noise=found.floor) >= EXPLAINED_FAR
         if found.stopped:
-            return found
+            return found, True
         if sessions.zeros:
             raise ZerosFirst(found)
-        whole = found.verdict.names_effects and nearly_all and not (found.left or sessions.asked)
-        return found if whole else None
+        return found, found.verdict.names_effects and nearly_all and not (found.left or sessions.asked)
 
     def search_with_givens(self, loaded: Loaded[MeasurementSet], fitted: Fitted) -> tuple[Diagnosis, Found] | None:
         """The same with radii and places fitted beside all effects; None if they explain little, or are wrong."""
@@ -146,7 +146,16 @@ class SetSearch:
         told = told_as_moved(found if further is None else further[0], loaded, fitted)
         return None if told is None else (found, (told, Simulators(told.fit.problem)))
 
-    def search_as_it_is(self, loaded: Loaded[MeasurementSet], fitted: Fitted) -> tuple[Diagnosis, Found | None]:
+    def search_as_it_is(
+        self, loaded: Loaded[MeasurementSet], fitted: Fitted, begun: Diagnosis | None = None
+    ) -> tuple[Diagnosis, Found | None]:
+        """The same with radii and places where they are; they are moved where that explains what effects leave.
+
+        Args:
+          loaded: the set.
+          fitted: the same, fitted.
+          begun: effects that a search found before: it goes on from there.
+        """
         moves = None if loaded.gripper.is_servo else MovesFirst(loaded, self.ask_sessions)
         leave_out = LeaveOutFirst()
 
@@ -155,7 +164,8 @@ class SetSearch:
             return leave_out(target, fit) or move
 
         first, explains = (never, never) if moves is None else (moves.before_more, moves.explain)
-        found = self.search(*fitted, stop_when=StopWhen(something_else_first, first, explains))
+        start = (begun.fit, kept_steps(begun.steps)) if begun is not None and begun.verdict.names_effects else None
+        found = self.search(*fitted, start=start, stop_when=StopWhen(something_else_first, first, explains))
         if found.stopped:
             return found, None
         if moves is not None and moves.zeros:

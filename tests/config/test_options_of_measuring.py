@@ -153,7 +153,7 @@ def begun(monkeypatch, verb: str, **values: Any) -> dict[str, Any]:
         monkeypatch.setattr(fit_set, "fit_model", fitted)
         monkeypatch.setattr(diagnose_set, "suspects", lambda *_: [])
         monkeypatch.setattr(set_search, "uneven_stamps", lambda *_: None)
-        monkeypatch.setattr(set_search.SetSearch, "search_as_given", lambda *_: None)
+        monkeypatch.setattr(set_search.SetSearch, "search_as_given", lambda *_: (None, False))
         monkeypatch.setattr(set_search, "with_fitted_givens", lambda *_: None)
         whole = diagnose_set.diagnose_set
 

@@ -221,7 +221,7 @@ def test_a_set_is_searched_as_it_is_where_nothing_fits_within_its_tolerance(
     asked = []
     monkeypatch.setattr(set_search, "with_fitted_givens", lambda *_: fitted)
     monkeypatch.setattr(set_search, "told_as_moved", lambda *_: found if within else None)
-    monkeypatch.setattr(SetSearch, "search_as_it_is", lambda _, loaded, __: asked.append(loaded) or (found, None))
+    monkeypatch.setattr(SetSearch, "search_as_it_is", lambda _, loaded, *__: asked.append(loaded) or (found, None))
     first, further = SetSearch(None, [], 0, silent).search_and_move(off, said)
     assert first is found
     assert asked == ([fitted[0]] if within else [fitted[0], off])

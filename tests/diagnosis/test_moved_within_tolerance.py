@@ -233,7 +233,7 @@ def test_what_was_sought_in_vain_is_not_sought_again_after_a_small_move(sound, m
         return search_on(one.target, None, one.base, one.fit, one.steps), None
 
     monkeypatch.setattr(set_search, "diagnose", diagnosed)
-    monkeypatch.setattr(set_search.SetSearch, "search_as_given", lambda *_: None)
+    monkeypatch.setattr(set_search.SetSearch, "search_as_given", lambda *_: (None, False))
     monkeypatch.setattr(module, "suspects", lambda *_: [])
     monkeypatch.setattr(set_search, "go_on_with_moved", moved)
     within = SimpleNamespace(is_within=True), 1.0

@@ -10,6 +10,7 @@ import pytest
 
 from forcegrasp.diagnosis import set_search
 from forcegrasp.diagnosis.givens.moved_set import MovesFirst
+from forcegrasp.diagnosis.result import kept_steps
 from forcegrasp.diagnosis.set_search import SetSearch, ZerosFirst
 from forcegrasp.identify.progress import silent
 from forcegrasp.identify.verdict import Verdict
@@ -49,34 +50,48 @@ def as_given(made_up, monkeypatch):
 
 def test_it_is_told_and_looked_for_briefly(as_given):
     told, found, (stop_when,) = as_given()
-    assert told is found
+    assert told == (found, True)
     assert stop_when.may_be_given(None, None)  # effects whose signatures promise too little are not fitted
 
 
 @pytest.mark.parametrize("why", [{"base": 1.4}, {"first": (True,)}])
 def test_it_is_not_looked_for_where_little_is_left_or_moves_may_explain_it(as_given, why):
     told, _, searched = as_given(**why)
-    assert (told, searched) == (None, [])
+    assert (told, searched) == ((None, False), [])
 
 
 @pytest.mark.parametrize(
     "less", [{"left": "in all"}, {"error_after": 1.6}, {"verdict": Verdict.UNKNOWN, "effects": ()}]
 )
 def test_it_must_explain_nearly_all_and_leave_nothing(as_given, less):
-    told, *_ = as_given(**less)
-    assert told is None
+    told, found, _ = as_given(**less)
+    assert told == (found, False)
 
 
 def test_it_is_not_told_where_it_ended_for_moves_before_rivals_were_asked(as_given):
-    told, *_ = as_given(first=(False, True))
-    assert told is None
+    told, found, _ = as_given(first=(False, True))
+    assert told == (found, False)
 
 
 def test_a_search_that_was_cut_short_is_told(as_given):
     told, found, _ = as_given(stopped="its 3 min were over", left="in all")
-    assert told is found
+    assert told == (found, True)
 
 
 def test_zeros_of_sessions_that_it_had_hidden_come_first(as_given):
     with pytest.raises(ZerosFirst):
         as_given(first=(False, True), zeros=True)
+
+
+@pytest.mark.parametrize("verdict", ["effect", "unknown"])
+def test_the_search_with_moves_goes_on_with_the_effects_that_it_found(made_up, monkeypatch, verdict):
+    """They were found anew, for minutes."""
+    begun, searched = made_up.diagnosis(verdict), []
+    found = made_up.diagnosis("effect")
+    monkeypatch.setattr(SetSearch, "search_as_given", lambda *_: (begun, False))
+    monkeypatch.setattr(SetSearch, "search_with_givens", lambda *_: None)
+    monkeypatch.setattr(SetSearch, "moved", lambda *_, **__: None)
+    monkeypatch.setattr(SetSearch, "search", lambda *_, start=None, stop_when=None: searched.append(start) or found)
+    fitted = found.target, cast(Any, None), found.base
+    assert SetSearch(None, [], 0, silent).search_and_move(light_set(), fitted) == (found, None)
+    assert searched == [(begun.fit, kept_steps(begun.steps)) if verdict == "effect" else None]
