@@ -130,7 +130,7 @@ class SetSearch:
         moves, sessions = MovesFirst(loaded, ask_sessions=False), MovesFirst(loaded, self.ask_sessions)
         if moves.before_more(target, base.fit):
             return None, False
-        found = self.search(*fitted, stop_when=StopWhen(always, sessions.before_more))
+        found = self.search(*fitted, stop_when=StopWhen(always, sessions.before_more, goes_on=True))
         nearly_all = explained_share(found.error_before, found.error_after, noise=found.floor) >= EXPLAINED_FAR
         if found.stopped:
             return found, True

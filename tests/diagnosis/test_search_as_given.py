@@ -52,6 +52,7 @@ def test_it_is_told_and_looked_for_briefly(as_given):
     told, found, (stop_when,) = as_given()
     assert told == (found, True)
     assert stop_when.may_be_given(None, None)  # effects whose signatures promise too little are not fitted
+    assert stop_when.goes_on
 
 
 @pytest.mark.parametrize("why", [{"base": 1.4}, {"first": (True,)}])

@@ -199,6 +199,28 @@ def test_no_more_are_looked_for_where_what_is_given_explains_most_of_what_they_l
     assert diagnosis.left
 
 
+@pytest.mark.parametrize("left", ["in all", ""])
+def test_rivals_are_not_asked_of_what_leaves_something_where_another_search_goes_on(small, monkeypatch, left):
+    study, base = small
+    told, tidied, believed = [], [], ("what is sure of it",)
+
+    def adds(so_far, *_):
+        so_far.believed = believed
+
+    def concluded(_, *found, in_a_hurry=False):
+        told.append((found, in_a_hurry))
+
+    monkeypatch.setattr(search, "_add_effects", adds)
+    monkeypatch.setattr(search, "left_over", lambda *_: (left,))
+    monkeypatch.setattr(search, "_tidy_up", lambda *_: tidied.append(True))
+    monkeypatch.setattr(search, "concluded", concluded)
+    monkeypatch.setattr(search, "_believed", lambda *_: SimpleNamespace(base=base))
+    rng = np.random.default_rng(0)
+    search.diagnose(study.target, base, study.simulators, CATALOGUE, rng, stop_when=StopWhen(goes_on=True))
+    assert told == ([(believed, True)] if left else [])
+    assert tidied == ([] if left else [True])
+
+
 def test_one_effect_alone_is_not_several(small, monkeypatch):
     """It was looked for by itself before."""
     study, base = small

@@ -120,6 +120,9 @@ def diagnose(
                 return diagnose(target, base, simulators, effects, rng, progress, start, stop_when)
         if so_far.given_first:
             return concluded(begun, *so_far.all, in_a_hurry=True)
+        study, _, fit = so_far.all
+        if stop_when.goes_on and left_over(study, fit)[0]:
+            return concluded(begun, *so_far.sure, in_a_hurry=True)
         _tidy_up(so_far, begun)
         found = _believed(so_far, begun)
         if start is None and found.base.fit is not base.fit:

@@ -36,6 +36,8 @@ class StopWhen:
     given_first: Asked = never
     #: The same of a fit with one more effect: then it is not begun elsewhere, for no effect leaves what sizes do.
     given_explains: Asked = never
+    #: What leaves more than noise is no answer yet: another search goes on from it, which tells its rivals.
+    goes_on: bool = False
     #: Cost that the first effect must come down to: one that stays too far from it is not looked for.
     most: float = np.inf
 
