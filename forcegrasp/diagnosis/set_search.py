@@ -164,8 +164,12 @@ class SetSearch:
             return leave_out(target, fit) or move
 
         first, explains = (never, never) if moves is None else (moves.before_more, moves.explain)
-        start = (begun.fit, kept_steps(begun.steps)) if begun is not None and begun.verdict.names_effects else None
-        found = self.search(*fitted, start=start, stop_when=StopWhen(something_else_first, first, explains))
+        (target, simulators, base), start = fitted, None
+        if begun is not None and begun.verdict.names_effects:
+            base = begun.base  # which may be better
+            start = begun.fit, kept_steps(begun.steps)
+        stop_when = StopWhen(something_else_first, first, explains)
+        found = self.search(target, simulators, base, start=start, stop_when=stop_when)
         if found.stopped:
             return found, None
         if moves is not None and moves.zeros:
@@ -182,7 +186,7 @@ class SetSearch:
             something_else = leave_out.names or (moves is not None and moves.asked)
             if further is None and something_else and not found.is_of_none:  # it was neither
                 trial = found.bolder or found  # what was not believed need not be looked for anew
-                again = self.search(*fitted, start=(trial.fit, kept_steps(trial.steps)))
+                again = self.search(target, simulators, base, start=(trial.fit, kept_steps(trial.steps)))
                 if again.stopped:
                     return dataclasses.replace(found, stopped=again.stopped), None
                 if trial is found or again.verdict.lacks_effects:

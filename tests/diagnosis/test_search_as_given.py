@@ -87,12 +87,20 @@ def test_zeros_of_sessions_that_it_had_hidden_come_first(as_given):
 @pytest.mark.parametrize("verdict", ["effect", "unknown"])
 def test_the_search_with_moves_goes_on_with_the_effects_that_it_found(made_up, monkeypatch, verdict):
     """They were found anew, for minutes."""
-    begun, searched = made_up.diagnosis(verdict), []
-    found = made_up.diagnosis("effect")
+    found, searched = made_up.diagnosis("effect"), []
+    better = dataclasses.replace(found.base)
+    begun = dataclasses.replace(made_up.diagnosis(verdict), base=better)
     monkeypatch.setattr(SetSearch, "search_as_given", lambda *_: (begun, False))
     monkeypatch.setattr(SetSearch, "search_with_givens", lambda *_: None)
     monkeypatch.setattr(SetSearch, "moved", lambda *_, **__: None)
-    monkeypatch.setattr(SetSearch, "search", lambda *_, start=None, stop_when=None: searched.append(start) or found)
+
+    def search(_, target, simulators, base, start=None, stop_when=None):
+        searched.append((base, start))
+        return found
+
+    monkeypatch.setattr(SetSearch, "search", search)
     fitted = found.target, cast(Any, None), found.base
     assert SetSearch(None, [], 0, silent).search_and_move(light_set(), fitted) == (found, None)
-    assert searched == [(begun.fit, kept_steps(begun.steps)) if verdict == "effect" else None]
+    ((base, start),) = searched
+    assert base is (better if verdict == "effect" else found.base)
+    assert start == ((begun.fit, kept_steps(begun.steps)) if verdict == "effect" else None)
