@@ -15,10 +15,7 @@ from forcegrasp.diagnosis.faults.wrong_zeros import differing
 from forcegrasp.diagnosis.givens.doubt import more_likely, with_fault_beside
 from forcegrasp.diagnosis.givens.givens_besides import Fitted
 from forcegrasp.diagnosis.givens.late_rows import may_be_late_rows
-from forcegrasp.diagnosis.givens.moved_set import (
-    timing_within_tolerance_after_all,
-    within_tolerance_after_all,
-)
+from forcegrasp.diagnosis.givens.moved_set import timing_within_tolerance_after_all, within_tolerance_after_all
 from forcegrasp.diagnosis.law.law import find_law
 from forcegrasp.diagnosis.result import Diagnosis
 from forcegrasp.diagnosis.search.stop_when import StopWhen, always, never

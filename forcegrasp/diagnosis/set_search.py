@@ -18,10 +18,7 @@ from forcegrasp.diagnosis.givens.fitted_givens import told_as_moved, with_fitted
 from forcegrasp.diagnosis.givens.give_back import without_move
 from forcegrasp.diagnosis.givens.givens_besides import Fitted, with_givens_put_right
 from forcegrasp.diagnosis.givens.left_out import LeaveOutFirst, is_answer, told_of, without
-from forcegrasp.diagnosis.givens.moved_set import (
-    MovesFirst,
-    go_on_with_moved,
-)
+from forcegrasp.diagnosis.givens.moved_set import MovesFirst, go_on_with_moved
 from forcegrasp.diagnosis.result import Diagnosis, Step, kept_steps
 from forcegrasp.diagnosis.search.search import diagnose
 from forcegrasp.diagnosis.search.stop_when import AT_ITS_END, StopWhen, always, never
@@ -112,7 +109,11 @@ class SetSearch:
         return self.search(target, simulators, base, (fit, steps), stop_when)
 
     def search_and_move(self, loaded: Loaded[MeasurementSet], fitted: Fitted) -> tuple[Diagnosis, Found | None]:
-        """The diagnosis of a set; and that with moves within its tolerance, or without some grasps, if it wants any."""
+        """The diagnosis of a set; and that with moves within its tolerance, or without some grasps, if it wants any.
+
+        Raises:
+          ZerosFirst: if zeros differ from session to session, which effects that were found had hidden.
+        """
         as_given, is_whole = self.search_as_given(loaded, fitted)
         if as_given is not None and is_whole:
             return as_given, None
